@@ -1,0 +1,144 @@
+"""A motion: one skeleton moving; and the few things everyone does to motions (forward kinematics, sampling, placing).
+
+`Motion` is frozen and its arrays are read-only; every function returns a new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError
+from . import quaternion
+from .skeleton import Skeleton, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A skeleton's movement (Faustino §2.3.1 eq. 4).
+
+    root_positions: (T, 3) metres, world, Z up. rotations: (T, J, 4) unit quaternions, each relative to its parent (the
+    root's to the world), sign-continuous over time. fps: frames per second.
+    """
+
+    skeleton: Skeleton
+    root_positions: np.ndarray
+    rotations: np.ndarray
+    fps: float
+
+    def __post_init__(self):
+        root = frozen_array(self.root_positions)
+        rotations = frozen_array(quaternion.continuous(quaternion.normalized(self.rotations)))
+        if root.ndim != 2 or root.shape[1] != 3 or rotations.shape != (len(root), len(self.skeleton), 4):
+            raise InputError(
+                "motion", f"root {root.shape}, rotations {rotations.shape}", f"(T, 3) and (T, {len(self.skeleton)}, 4)"
+            )
+        if not self.fps > 0:
+            raise InputError("motion", f"{self.fps} frames per second", "a positive rate")
+        object.__setattr__(self, "root_positions", root)
+        object.__setattr__(self, "rotations", rotations)
+        object.__setattr__(self, "fps", float(self.fps))
+
+    def __len__(self) -> int:
+        return len(self.root_positions)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last."""
+        return (len(self) - 1) / self.fps
+
+    def frames(self, start: int, stop: int) -> "Motion":
+        """Frames start .. stop-1."""
+        return replace(self, root_positions=self.root_positions[start:stop], rotations=self.rotations[start:stop])
+
+
+def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """World positions (T, J, 3) in metres and world rotations (T, J, 4) of all joints."""
+    return pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+
+
+def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """World positions (..., J, 3) and rotations (..., J, 4) from root positions (..., 3) and local rotations (..., J, 4).
+
+    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
+    """
+    lead = local.shape[:-2]
+    flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
+    world = np.empty_like(flat)
+    places = np.empty((len(skeleton), 3, flat.shape[2]))
+    for joint, parent in enumerate(skeleton.parents):
+        if parent < 0:
+            world[joint] = flat[joint]
+            places[joint] = root.reshape(-1, 3).T
+            continue
+        aw, ax, ay, az = world[parent]
+        bw, bx, by, bz = flat[joint]
+        world[joint, 0] = aw * bw - ax * bx - ay * by - az * bz
+        world[joint, 1] = aw * bx + ax * bw + ay * bz - az * by
+        world[joint, 2] = aw * by - ax * bz + ay * bw + az * bx
+        world[joint, 3] = aw * bz + ax * by - ay * bx + az * bw
+        places[joint] = places[parent] + _turn(world[parent], skeleton.offsets[joint])
+    return (
+        places.transpose(2, 0, 1).reshape(*lead, len(skeleton), 3),
+        world.transpose(2, 0, 1).reshape(*lead, len(skeleton), 4),
+    )
+
+
+def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """One constant vector (3,) turned by component-first rotations (4, N): (3, N)."""
+    w, x, y, z = q
+    vx, vy, vz = v
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return np.stack(
+        [vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx]
+    )
+
+
+def end_positions(motion: Motion) -> np.ndarray:
+    """World positions (T, E, 3) in metres of the skeleton's tips (BVH End Sites)."""
+    positions, rotations = forward_kinematics(motion)
+    parents = list(motion.skeleton.end_parents)
+    return positions[:, parents] + quaternion.rotate(rotations[:, parents], motion.skeleton.end_offsets)
+
+
+def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root positions (N, 3) and local rotations (N, J, 4) at fractional frames (N,), clamped to the motion.
+
+    Positions linear, rotations slerped: Faustino §3.3.2.
+    """
+    frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)
+    low = np.minimum(np.floor(frames).astype(int), max(len(motion) - 2, 0))
+    high = np.minimum(low + 1, len(motion) - 1)
+    weight = frames - low
+    root = motion.root_positions[low] * (1.0 - weight[:, None]) + motion.root_positions[high] * weight[:, None]
+    if not np.any(weight):
+        return root, motion.rotations[low].copy()
+    return root, quaternion.slerp(motion.rotations[low], motion.rotations[high], weight[:, None])
+
+
+def resample(motion: Motion, fps: float) -> Motion:
+    """The motion at another rate: frame 0 stays, the last frame is the last that lies within the old duration."""
+    if abs(fps - motion.fps) < 1e-9:
+        return motion
+    count = int(np.floor(motion.duration * fps + 1e-6)) + 1
+    root, rotations = at_frames(motion, np.arange(count) * (motion.fps / fps))
+    return Motion(motion.skeleton, root, rotations, fps)
+
+
+def place(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0)) -> Motion:
+    """The motion turned by `angle` radians (one, or one per frame) about the world's Z, then moved by `offset` metres."""
+    turn = quaternion.about_up(np.broadcast_to(angle, (len(motion),)))
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])
+    return replace(motion, root_positions=quaternion.rotate(turn, motion.root_positions) + offset, rotations=rotations)
+
+
+def concatenate(motions: list[Motion]) -> Motion:
+    """One motion after the other, same skeleton and rate; nothing is aligned or blended."""
+    first = motions[0]
+    return replace(
+        first,
+        root_positions=np.concatenate([m.root_positions for m in motions]),
+        rotations=np.concatenate([m.rotations for m in motions]),
+    )

@@ -1,0 +1,209 @@
+"""Rotations as unit quaternions (w, x, y, z); every function takes free leading axes.
+
+Conventions: `multiply(a, b)` rotates by b first, then by a; `rotate(q, v)` turns column vectors; angles are radians.
+Euler angles are intrinsic, in the order of their letters ("ZXY": about Z, then the turned X, then the turned Y), which is
+how BVH channels are read (Faustino §4.2.1 eq. 30-31 is the case "ZXY").
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+IDENTITY.setflags(write=False)
+_AXES = {"X": 0, "Y": 1, "Z": 2}
+
+
+def identity(*shape: int) -> np.ndarray:
+    """Unit rotations: (*shape, 4)."""
+    out = np.zeros((*shape, 4))
+    out[..., 0] = 1.0
+    return out
+
+
+def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotation b followed by a: (..., 4) x (..., 4) -> (..., 4)."""
+    aw, ax, ay, az = np.moveaxis(np.asarray(a), -1, 0)
+    bw, bx, by, bz = np.moveaxis(np.asarray(b), -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def inverse(q: np.ndarray) -> np.ndarray:
+    """The opposite rotation of unit quaternions: (..., 4)."""
+    return np.asarray(q) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def normalized(q: np.ndarray) -> np.ndarray:
+    """The same rotations with length one; a zero quaternion becomes the identity: (..., 4)."""
+    q = np.asarray(q, dtype=float)
+    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(length > 1e-12, q / np.maximum(length, 1e-12), IDENTITY)
+
+
+def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Vectors turned by rotations: (..., 4), (..., 3) -> (..., 3)."""
+    q, v = np.asarray(q), np.asarray(v)
+    w, u = q[..., :1], q[..., 1:]
+    t = 2.0 * cross(u, v)
+    return v + w * t + cross(u, t)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of (..., 3) vectors, several times faster than `numpy.cross` on long arrays."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def about_axis(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Rotation by `angle` (...,) radians about unit `axis` (..., 3): (..., 4)."""
+    half = 0.5 * np.asarray(angle, dtype=float)
+    return np.concatenate([np.cos(half)[..., None], np.sin(half)[..., None] * np.asarray(axis, dtype=float)], axis=-1)
+
+
+def about_up(angle: np.ndarray) -> np.ndarray:
+    """Rotation by `angle` (...,) radians about the world's up axis Z: (..., 4)."""
+    half = 0.5 * np.asarray(angle, dtype=float)
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+
+
+def from_rotation_vector(v: np.ndarray) -> np.ndarray:
+    """The exponential map: rotation vectors (..., 3) in radians -> (..., 4)."""
+    v = np.asarray(v, dtype=float)
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    half = 0.5 * angle
+    scale = np.where(angle > 1e-9, np.sin(half) / np.maximum(angle, 1e-9), 0.5 - angle**2 / 48.0)
+    return np.concatenate([np.cos(half), scale * v], axis=-1)
+
+
+def to_rotation_vector(q: np.ndarray) -> np.ndarray:
+    """The logarithm map on the short way round: (..., 4) -> rotation vectors (..., 3) of at most pi radians."""
+    q = np.asarray(q, dtype=float)
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(length, q[..., :1])
+    scale = np.where(length > 1e-9, angle / np.maximum(length, 1e-9), 2.0)
+    return scale * q[..., 1:]
+
+
+def from_euler(angles: np.ndarray, order: str) -> np.ndarray:
+    """Intrinsic Euler angles (..., n) in radians about the axes named in `order` (n letters of XYZ): (..., 4)."""
+    angles = np.asarray(angles, dtype=float)
+    out = None
+    for index, letter in enumerate(order):
+        half = 0.5 * angles[..., index]
+        turn = np.zeros((*half.shape, 4))
+        turn[..., 0] = np.cos(half)
+        turn[..., 1 + _AXES[letter]] = np.sin(half)
+        out = turn if out is None else multiply(out, turn)
+    return identity(*angles.shape[:-1]) if out is None else out
+
+
+def to_euler(q: np.ndarray, order: str) -> np.ndarray:
+    """Intrinsic Tait-Bryan angles (..., 3) in radians of rotations (..., 4); `order` is a permutation of XYZ.
+
+    The middle angle is within +-90 degrees. At the pole, where only the sum of the outer angles is determined, the third
+    is zero; the rotation is the same.
+    """
+    i, j, k = (_AXES[letter] for letter in order)
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    m = to_matrix(q)
+    sine = np.clip(sign * m[..., i, k], -1.0, 1.0)
+    # the middle angle from both its sine and cosine: arcsin alone loses half the digits near 90 degrees
+    cosine = np.hypot(m[..., i, i], m[..., i, j])
+    middle = np.arctan2(sine, cosine)
+    first = np.arctan2(-sign * m[..., j, k], m[..., k, k])
+    third = np.arctan2(-sign * m[..., i, j], m[..., i, i])
+    pole = cosine < 1e-9
+    first = np.where(pole, np.arctan2(sign * m[..., k, j], m[..., j, j]), first)
+    third = np.where(pole, 0.0, third)
+    return np.stack([first, middle, third], axis=-1)
+
+
+def to_matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def from_matrix(m: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3)."""
+    m = np.asarray(m, dtype=float)
+    trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
+    # four ways to solve, each safe where its own component is the largest (Shepperd 1978)
+    squares = np.stack([trace] + [2.0 * m[..., i, i] - trace for i in range(3)], axis=-1)
+    a = [m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]]
+    s = {(i, j): m[..., i, j] + m[..., j, i] for i, j in ((0, 1), (0, 2), (1, 2))}
+    one = 1.0 + squares
+    candidates = np.stack(
+        [
+            np.stack([one[..., 0], a[0], a[1], a[2]], axis=-1),
+            np.stack([a[0], one[..., 1], s[0, 1], s[0, 2]], axis=-1),
+            np.stack([a[1], s[0, 1], one[..., 2], s[1, 2]], axis=-1),
+            np.stack([a[2], s[0, 2], s[1, 2], one[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(squares, axis=-1)
+    q = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
+    q = normalized(q)
+    return np.where(q[..., :1] < 0.0, -q, q)
+
+
+def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The shortest rotation that turns vectors a onto b: (..., 3), (..., 3) -> (..., 4); opposite ones turn about any axis."""
+    a = np.asarray(a, dtype=float)
+    b = np.asarray(b, dtype=float)
+    a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
+    b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
+    dot = np.sum(a * b, axis=-1, keepdims=True)
+    axis = cross(a, b)
+    other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    axis = np.where(dot < -1.0 + 1e-9, cross(a, other), axis)
+    return normalized(np.concatenate([np.maximum(1.0 + dot, 0.0), axis], axis=-1))
+
+
+def continuous(q: np.ndarray) -> np.ndarray:
+    """The same rotations (T, ..., 4) with signs chosen so that neighbours in time are close (q and -q rotate alike)."""
+    q = np.asarray(q, dtype=float)
+    if len(q) < 2:
+        return q.copy()
+    flips = np.sum(q[1:] * q[:-1], axis=-1) < 0.0
+    sign = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
+    out = q.copy()
+    out[1:] *= sign[..., None]
+    return out
+
+
+def slerp(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Spherical interpolation on the short way (Faustino eq. 8): (..., 4), (..., 4), (...,) -> (..., 4)."""
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    weight = np.asarray(weight, dtype=float)
+    dot = np.sum(a * b, axis=-1)
+    b = np.where(dot[..., None] < 0.0, -b, b)
+    theta = np.arccos(np.clip(np.abs(dot), 0.0, 1.0))
+    small = theta < 1e-4
+    sine = np.where(small, 1.0, np.sin(theta))
+    wa = np.where(small, 1.0 - weight, np.sin((1.0 - weight) * theta) / sine)
+    wb = np.where(small, weight, np.sin(weight * theta) / sine)
+    return normalized(wa[..., None] * a + wb[..., None] * b)
+
+
+def yaw(q: np.ndarray) -> np.ndarray:
+    """The turn about Z that is nearest to the rotation (its twist): (..., 4) -> (...,) radians."""
+    q = np.asarray(q)
+    return 2.0 * np.arctan2(q[..., 3], q[..., 0])

@@ -1,0 +1,77 @@
+"""A skeleton: named joints, parents before children, offsets in the rest pose where no joint is rotated."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+
+
+def frozen_array(values, dtype=float) -> np.ndarray:
+    """A read-only copy of `values`."""
+    out = np.array(values, dtype=dtype)
+    out.setflags(write=False)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Joints of one body.
+
+    names: J joint names. parents: J indices, -1 for the one root, which is joint 0; parents stand before children.
+    offsets: (J, 3) metres, from the parent's joint to this one while no joint is rotated, Z up; the root's is zero.
+    end_parents (E,), end_offsets (E, 3): tips (BVH End Sites), which carry no rotation of their own.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: np.ndarray
+    end_parents: tuple[int, ...] = ()
+    end_offsets: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self):
+        object.__setattr__(self, "names", tuple(self.names))
+        object.__setattr__(self, "parents", tuple(int(p) for p in self.parents))
+        object.__setattr__(self, "end_parents", tuple(int(p) for p in self.end_parents))
+        object.__setattr__(self, "offsets", frozen_array(self.offsets).reshape(-1, 3))
+        object.__setattr__(self, "end_offsets", frozen_array(self.end_offsets).reshape(-1, 3))
+        count = len(self.names)
+        if not (count and len(self.parents) == len(self.offsets) == count):
+            raise InputError("skeleton", f"{count} names, {len(self.parents)} parents, {len(self.offsets)} offsets")
+        if self.parents[0] != -1 or any(not 0 <= p < i for i, p in enumerate(self.parents) if i):
+            raise InputError("skeleton", "parents out of order", "one root first, then parents before children")
+        if len(set(self.names)) != count:
+            raise InputError("skeleton", "two joints of one name", "unique joint names")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def index(self, name: str) -> int:
+        """The joint's index; InputError if there is none of that name."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise InputError("skeleton", f"no joint {name!r}", f"one of {', '.join(self.names)}") from None
+
+    def children(self, joint: int) -> tuple[int, ...]:
+        """Indices of the joints that hang on `joint`."""
+        return tuple(i for i, p in enumerate(self.parents) if p == joint)
+
+    def same_bones(self, other: "Skeleton", tolerance: float = 1e-3) -> bool:
+        """Whether names, parents and offsets agree, offsets within `tolerance` metres."""
+        return (
+            self.names == other.names
+            and self.parents == other.parents
+            and bool(np.all(np.abs(self.offsets - other.offsets) <= tolerance))
+        )
+
+    @property
+    def fingerprint(self) -> str:
+        """A short hash of names, parents and offsets to a tenth of a millimetre."""
+        digest = hashlib.sha256("\n".join(self.names).encode())
+        digest.update(np.array(self.parents, np.int64).tobytes())
+        digest.update(np.round(self.offsets * 1e4).astype(np.int64).tobytes())
+        return digest.hexdigest()[:16]

@@ -1,0 +1,67 @@
+"""What came out: the motion on the pitch, where each of its frames came from, the ball, and the filled timeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .annotation import KeyMoment, Timeline
+from .motion.motion import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class BallPath:
+    """The ball at the output's rate: times (T,) s on the track's clock, positions (T, 3) m of its centre, measured (T,) bool."""
+
+    times: np.ndarray
+    positions: np.ndarray
+    measured: np.ndarray
+
+
+@dataclass(frozen=True)
+class KeyResult:
+    """How one key moment was served.
+
+    asked: the line of the timeline. frame: output frame (fractional) where the clip's key frame is played. clip (path below
+    the library), clip_frame (in the clip's own rate), mirrored. words: what the clip carries there, sides after mirroring.
+    used_instead: the words used where the asked ones were not to be had, else None.
+    """
+
+    asked: KeyMoment
+    frame: float
+    clip: str
+    clip_frame: float
+    mirrored: bool
+    words: tuple[str, ...]
+    used_instead: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A synthesized player.
+
+    motion: T frames at the output's rate on the pitch (metres, Z up); frame 0 is at `start_time` seconds on the track's
+    clock. clips: table of clip paths below the library; clip (T,) index into it, clip_frame (T,) fractional frame in that
+    clip's own rate, mirrored (T,) bool. words: per frame the source frame's words, sides after mirroring. contacts (T, 2)
+    bool, left and right, carried from the source. seams: output frames that start a new piece of clip.
+    correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it.
+    """
+
+    motion: Motion
+    start_time: float
+    clips: tuple[str, ...]
+    clip: np.ndarray
+    clip_frame: np.ndarray
+    mirrored: np.ndarray
+    words: tuple[tuple[str, ...], ...]
+    contacts: np.ndarray
+    seams: np.ndarray
+    timeline: Timeline
+    keys: tuple[KeyResult, ...]
+    ball: BallPath | None
+    method: str
+    seed: int
+    seconds: dict[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    correction: np.ndarray | None = None
