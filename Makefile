@@ -1,0 +1,54 @@
+# Everything runs in virtual environments that packaging/venv.sh makes on demand; nothing to prepare but
+# make and Python 3.11 (or 3.13). `make help` lists what there is.
+PLATFORMS ?= linux-x64
+PYTEST = -P -m pytest
+REAL_BLENDER ?= ../shared/tools/real-blender
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help venv venv-oldest test test-core test-blender test-oldest demo bench extension extension-all window-test clean
+
+help:
+	@echo 'make venv           .venv with Blender as a Python module and all that the tests need'
+	@echo 'make test           all tests but the window ones: the core, then Blender 5.0 (or 5.2) and Blender 4.5'
+	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
+	@echo 'make bench          time and quality on recordings'
+	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
+	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
+	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
+	@echo 'make clean          remove build/ and the links to the virtual environments'
+
+venv:
+	@packaging/venv.sh main
+
+venv-oldest:
+	@packaging/venv.sh oldest
+
+test: test-core test-blender test-oldest
+
+test-core: venv
+	.venv/bin/python $(PYTEST) tests/core
+
+test-blender: venv
+	.venv/bin/python $(PYTEST) tests/blender
+
+test-oldest: venv-oldest
+	@if [ -e .venv-4.5 ]; then set -x; .venv-4.5/bin/python $(PYTEST) tests/blender; fi
+
+demo: venv
+	.venv/bin/python sample_blend/demo.py --out build/demo
+
+bench: venv
+	.venv/bin/python -m benchmarks
+
+extension: venv
+	.venv/bin/python packaging/build.py --platforms $(PLATFORMS)
+
+extension-all: PLATFORMS = linux-x64 windows-x64 macos-arm64 macos-x64
+extension-all: extension
+
+window-test:
+	@tests/gui/run $(REAL_BLENDER)
+
+clean:
+	rm -rf build .venv .venv-4.5

@@ -1,0 +1,50 @@
+"""A fresh Blender profile with the extension switched on, for every test in this folder.
+
+The extension is loaded the way Blender loads it: from a profile's repository, under the
+name in EXTENSION. Tests reach the core only through it (the `core` fixture); the plain
+name `beyond_mocap` is blocked, because the same class under two names fails `isinstance`.
+"""
+
+import os
+import pathlib
+import sys
+import tempfile
+from importlib import import_module
+
+import pytest
+
+EXTENSION = "bl_ext.user_default.beyond_mocap"
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+
+_profile = tempfile.TemporaryDirectory(prefix="beyond-mocap-profile-")
+os.environ["BLENDER_USER_RESOURCES"] = _profile.name  # read once, when bpy is imported
+_repository = pathlib.Path(_profile.name, "extensions", "user_default")
+_repository.mkdir(parents=True)
+(_repository / "beyond_mocap").symlink_to(SOURCE, target_is_directory=True)
+sys.modules["beyond_mocap"] = None
+
+import bpy  # noqa: E402
+import addon_utils  # noqa: E402  (bpy brings it)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def extension():
+    """The loaded extension module; on for the whole session, off at its end."""
+    module = addon_utils.enable(EXTENSION, default_set=True)
+    assert module is not None, "the extension could not be enabled; see the traceback above"
+    yield module
+    addon_utils.disable(EXTENSION, default_set=True)
+
+
+@pytest.fixture(autouse=True)
+def empty_scene(extension):
+    """An empty file before each test; keeps the extension on (a factory reset would not)."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+
+
+@pytest.fixture(scope="session")
+def core(extension):
+    """Import a core module by its dotted name below the core: `core("motion.quaternion")`; `core()` is the core."""
+    def module(name=""):
+        return import_module(f"{EXTENSION}.beyond_mocap" + (f".{name}" if name else ""))
+    return module
