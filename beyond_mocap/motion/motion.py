@@ -29,7 +29,7 @@ class Motion:
 
     def __post_init__(self):
         root = frozen_array(self.root_positions)
-        rotations = frozen_array(quaternion.continuous(quaternion.normalized(self.rotations)))
+        rotations = frozen_array(quaternion.continuous(_unit(self.rotations)))
         if root.ndim != 2 or root.shape[1] != 3 or rotations.shape != (len(root), len(self.skeleton), 4):
             raise InputError(
                 "motion", f"root {root.shape}, rotations {rotations.shape}", f"(T, 3) and (T, {len(self.skeleton)}, 4)"
@@ -51,6 +51,12 @@ class Motion:
     def frames(self, start: int, stop: int) -> "Motion":
         """Frames start .. stop-1."""
         return replace(self, root_positions=self.root_positions[start:stop], rotations=self.rotations[start:stop])
+
+
+def _unit(q: np.ndarray) -> np.ndarray:
+    """Unit quaternions, untouched where they already are: dividing again would change the last bits at every copy."""
+    q = np.asarray(q, dtype=float)
+    return q if np.all(np.abs(np.sum(q * q, axis=-1) - 1.0) < 1e-12) else quaternion.normalized(q)
 
 
 def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:

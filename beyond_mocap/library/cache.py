@@ -1,0 +1,130 @@
+"""What building a library worked out, kept in one `.npz` (never pickled) that depends on the content of every file read.
+
+A damaged or stale cache is simply not used and written anew; the file is written beside its place and renamed, so two
+processes that build at once do no harm: the later one wins with the same content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from ..annotation import ClipAnnotation
+from ..motion.motion import Motion
+from ..motion.skeleton import Skeleton
+from .clusters import Clusters
+from .features import Frames
+from .scan import CACHE_FOLDER
+
+# raised whenever what is computed or stored changes, so that old caches are not used
+VERSION = 1
+_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "features", "words")
+
+
+def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
+    """A hash of names and contents of all files that a build reads, the options, and this file's VERSION."""
+    digest = hashlib.blake2b(json.dumps([VERSION, str(np.__version__), options], sort_keys=True).encode())
+    for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
+        digest.update(os.path.relpath(path, folder).encode() + b"\0")
+        try:
+            digest.update(hashlib.blake2b(Path(path).read_bytes()).digest())
+        except OSError:
+            digest.update(b"unreadable")
+    return digest.hexdigest()[:32]
+
+
+def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
+    """Where the cache is kept, and a note for the user where that is not beside the recordings."""
+    if cache_dir is not None:
+        return Path(cache_dir), ""
+    beside = folder / CACHE_FOLDER
+    if os.access(beside if beside.is_dir() else folder, os.W_OK):
+        return beside, ""
+    base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    name = hashlib.blake2b(str(folder.absolute()).encode()).hexdigest()[:16]
+    elsewhere = Path(base) / "beyond_mocap" / name
+    return elsewhere, f"{folder} cannot be written: its cache is kept in {elsewhere}"
+
+
+def save(place: Path, key: str, library) -> None:
+    """Writes `library` as `place`/library.npz; a place that cannot be written is left alone."""
+    arrays = {f"frames.{name}": getattr(library.frames, name) for name in _FRAME_ARRAYS}
+    for length, clusters in library.clusters.items():
+        for name in ("start", "label", "medoid"):
+            arrays[f"clusters.{length}.{name}"] = getattr(clusters, name)
+    arrays["root"] = np.concatenate([clip.motion.root_positions for clip in library.clips])
+    arrays["rotations"] = np.concatenate([clip.motion.rotations for clip in library.clips])
+    arrays["contacts"] = np.concatenate([clip.contacts for clip in library.clips])
+    arrays["offsets"], arrays["end_offsets"] = library.skeleton.offsets, library.skeleton.end_offsets
+    arrays["header"] = np.frombuffer(json.dumps(_header(key, library)).encode(), np.uint8)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        handle, beside = tempfile.mkstemp(suffix=".part", dir=place)
+    except OSError:
+        return
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez(file, **arrays)
+        os.replace(beside, place / "library.npz")
+    except OSError:
+        Path(beside).unlink(missing_ok=True)
+
+
+def _header(key: str, library) -> dict:
+    skeleton = library.skeleton
+    return {
+        "key": key,
+        "names": skeleton.names,
+        "parents": skeleton.parents,
+        "end_parents": skeleton.end_parents,
+        "vocabulary": library.frames.vocabulary,
+        "fps": library.fps,
+        "notes": library.notes,
+        "lengths": list(library.clusters),
+        "clips": [
+            [clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations]]
+            for clip in library.clips
+        ],
+    }
+
+
+def load(place: Path, key: str):
+    """The cached library, or None where there is none, it belongs to other content, or it is damaged."""
+    try:
+        with np.load(place / "library.npz", allow_pickle=False) as arrays:
+            header = json.loads(arrays["header"].tobytes())
+            if header["key"] != key:
+                return None
+            return _restore(header, {name: arrays[name] for name in arrays.files})
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _restore(header: dict, arrays: dict):
+    from .library import Clip, Library
+
+    skeleton = Skeleton(
+        header["names"], header["parents"], arrays["offsets"], header["end_parents"], arrays["end_offsets"]
+    )
+    clips, start = [], 0
+    for path, mirrored, fps, count, rows in header["clips"]:
+        part = slice(start, start + count)
+        motion = Motion(skeleton, arrays["root"][part], arrays["rotations"][part], fps)
+        rows = tuple(ClipAnnotation(row["start"], row["end"], row["key"], tuple(row["words"])) for row in rows)
+        clips.append(Clip(path, mirrored, motion, rows, arrays["contacts"][part]))
+        start += count
+    frames = Frames(
+        vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}
+    )
+    clusters = {
+        length: Clusters(length, *(arrays[f"clusters.{length}.{name}"] for name in ("start", "label", "medoid")))
+        for length in header["lengths"]
+    }
+    return Library("", skeleton, tuple(clips), frames, clusters, header["fps"], tuple(header["notes"]))

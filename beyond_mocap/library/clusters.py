@@ -1,0 +1,78 @@
+"""Blocks of frames grouped into clusters, so that the first search looks at a hundred things and not at all (Faustino §3.2).
+
+A block of B frames starts at every frame of a clip that has B frames left. Its place is the augmented feature vector: the
+frames' features, one after the other. We take eight frames of each block (every fourth of 32, every second of 16, all of
+8) and the principal components that hold 98 % of the blocks' variance before k-means: neighbouring frames say the same,
+and the clusters come out within a percent of those in all dimensions in a tenth of the time (../shared/perf.md §3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .features import Frames, principal_components
+
+BLOCK_LENGTHS = (32, 16, 8)
+CLUSTERS = 100
+SAMPLES_PER_BLOCK = 8
+MOST_FITTED = 20000
+
+
+@dataclass(frozen=True, eq=False)
+class Clusters:
+    """Blocks of one length: start (M,) first frame of each; label (M,) its cluster; medoid (K,) the block (index into
+    `start`) nearest to each cluster's centre, which stands for the cluster (the paper's representative frame block)."""
+
+    length: int
+    start: np.ndarray
+    label: np.ndarray
+    medoid: np.ndarray
+
+    def members(self, cluster: int) -> np.ndarray:
+        """First frames of the blocks in `cluster`."""
+        return self.start[self.label == cluster]
+
+    def label_at(self, frame: int) -> int:
+        """Cluster of the block that starts at `frame`, or -1 where none starts."""
+        place = int(np.searchsorted(self.start, frame))
+        return int(self.label[place]) if place < len(self.start) and self.start[place] == frame else -1
+
+
+def block_starts(frames: Frames, length: int) -> np.ndarray:
+    """First frames of all blocks of `length` frames that lie within one clip."""
+    return np.flatnonzero(frames.left_in_clip >= length - 1)
+
+
+def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
+    """k-means of all blocks of one length into 100 clusters (fewer where there are fewer blocks); empty where none fits."""
+    start = block_starts(frames, length)
+    if not len(start):
+        nothing = np.zeros(0, int)
+        return Clusters(length, nothing, nothing, nothing)
+    step = max(1, length // SAMPLES_PER_BLOCK)
+    offsets = np.arange(0, length, step)
+    blocks = frames.features[start[:, None] + offsets].reshape(len(start), -1)
+    mean, basis = principal_components(blocks)
+    label, medoid = _kmeans(np.ascontiguousarray((blocks - mean) @ basis), min(CLUSTERS, len(start)), seed)
+    return Clusters(length, start, label, medoid)
+
+
+def _kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Labels (M,) and the point nearest to each centre (count,); empty clusters are dropped.
+
+    One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ.
+    """
+    from sklearn.cluster import KMeans
+    from threadpoolctl import threadpool_limits
+
+    step = -(-len(points) // MOST_FITTED)
+    with threadpool_limits(limits=1):
+        fit = KMeans(min(count, len(points[::step])), n_init=1, max_iter=60, tol=1e-3, random_state=seed)
+        fit.fit(points[::step])
+        label = fit.labels_ if step == 1 else fit.predict(points)
+    distance = np.sum((points - fit.cluster_centers_[label]) ** 2, axis=1)
+    order = np.lexsort((distance, label))
+    used, first = np.unique(label[order], return_index=True)
+    return np.searchsorted(used, label), order[first]

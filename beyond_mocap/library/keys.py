@@ -1,0 +1,64 @@
+"""Key moments: which clips carry the asked words at their key frame, and what is nearest where none does.
+
+"The library has a key moment when one clip's key frame, or its mirror's, carries all of its words" (../shared/contract.md);
+words of a branch of the vocabulary may be left out, so carrying is being a subset.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..annotation import nearest
+
+# a foot meets the ball in all of these: where one is lacking, another shows at least the same contact
+_FOOT_ON_BALL = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"}, {"stomp"})
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key moment of a clip: clip index, frame in the clip's own rate, first and last frame of its annotated row (the
+    entry and exit it needs), and the words that the frame carries."""
+
+    clip: int
+    frame: float
+    start: float
+    end: float
+    words: frozenset[str]
+
+
+def keys_of(clips) -> tuple[Key, ...]:
+    """Key moments of all clips, in their order. A key's words are those of every row that covers its frame."""
+    found = []
+    for index, clip in enumerate(clips):
+        for row in clip.annotations:
+            if row.key is not None:
+                found.append(Key(index, float(row.key), float(row.start), float(row.end), clip.words_at(row.key)))
+    return tuple(found)
+
+
+def serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
+    """The keys that carry all of `words`."""
+    wanted = frozenset(words)
+    return tuple(key for key in keys if wanted <= key.words)
+
+
+def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
+    """The keys whose words come nearest to `words`: most shared words, then fewest extra; none where nothing is shared
+    (a kick is no answer to a slide), except that a foot on the ball stands for a foot on the ball."""
+    wanted = frozenset(words)
+    scores = [(len(wanted & key.words) + _same_contact(wanted, key.words), -len(key.words - wanted)) for key in keys]
+    best = max(scores, default=(0, 0))
+    if best[0] <= 0:
+        return ()
+    return tuple(key for key, score in zip(keys, scores) if score == best)
+
+
+def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
+    both = any(part <= a for part in _FOOT_ON_BALL) and any(part <= b for part in _FOOT_ON_BALL)
+    return 0.5 if both else 0.0
+
+
+def nearest_words(keys: tuple[Key, ...], words, count: int = 3) -> tuple[str, ...]:
+    """Word combinations of the library's key moments nearest to `words`, as text, best first."""
+    choices = sorted({tuple(sorted(key.words)) for key in keys})
+    return tuple(" ".join(choice) for choice in nearest(tuple(words), choices, count))

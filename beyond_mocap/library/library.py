@@ -1,0 +1,264 @@
+"""A library: the clips of a folder, a mirrored twin of each, their words, features, clusters and key moments.
+
+`build` reads a folder once and keeps what it worked out in a cache (`library.cache`); the next call is quick.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Callable
+
+import numpy as np
+
+from ..annotation import LOCOMOTION, ClipAnnotation, swap_sides
+from ..errors import Cancelled, InputError
+from ..files import bvh
+from ..motion import contacts as foot_contacts
+from ..motion.mirror import mirror
+from ..motion.motion import Motion
+from ..motion.skeleton import Skeleton
+from . import cache
+from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
+from .features import Frames, describe
+from .keys import Key, keys_of
+from .scan import Annotations, find_clips
+
+FPS = 30.0
+SAME_BONES = 5e-3
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """One recording or its mirrored twin.
+
+    path: below the library's folder, with slashes. motion: at its own rate, metres, the floor (2nd percentile of its toe
+    heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
+    contacts: (T, 2) bool, left and right foot on the ground.
+    """
+
+    path: str
+    mirrored: bool
+    motion: Motion
+    annotations: tuple[ClipAnnotation, ...]
+    contacts: np.ndarray
+
+    def words_at(self, frame: float) -> frozenset[str]:
+        """Words of every row that covers `frame` (the clip's own rate)."""
+        return frozenset(word for row in self.annotations if row.start <= frame <= row.end for word in row.words)
+
+    def twin(self) -> "Clip":
+        """The same clip with left and right exchanged (Faustino §3.1.2), words too."""
+        rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
+        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, self.contacts[:, ::-1])
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A kind of locomotion that the library holds: its word, all words of its most common row, and mean speed in m/s."""
+
+    word: str
+    words: tuple[str, ...]
+    speed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Library:
+    """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was decided."""
+
+    folder: str
+    skeleton: Skeleton
+    clips: tuple[Clip, ...]
+    frames: Frames
+    clusters: dict[int, Clusters]
+    fps: float = FPS
+    notes: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def keys(self) -> tuple[Key, ...]:
+        """Key moments of all clips."""
+        return keys_of(self.clips)
+
+    @cached_property
+    def words(self) -> frozenset[str]:
+        """Every word that a clip carries."""
+        return frozenset(word for clip in self.clips for row in clip.annotations for word in row.words)
+
+    @cached_property
+    def gaits(self) -> tuple[Gait, ...]:
+        """The library's own locomotion from slow to fast; InputError where it has none."""
+        return measure_gaits(self)
+
+    @property
+    def minutes(self) -> float:
+        """Recorded minutes, twins not counted."""
+        return sum(clip.motion.duration for clip in self.clips if not clip.mirrored) / 60.0
+
+
+def build(
+    folder: str | Path,
+    *,
+    rebuild: bool = False,
+    cache_dir: str | Path | None = None,
+    skeleton: str | Path | None = None,
+    unit: float | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Library:
+    """The library of all recordings below `folder`, from its cache where nothing has changed.
+
+    rebuild: ignore the cache. cache_dir: where to keep it (default: the folder itself, else the user's cache folder).
+    skeleton: a BVH file whose skeleton it is (default: the one with most frames, ties by name). unit: metres per file
+    unit (default: guessed per file). seed: of the clustering.
+    Raises InputError for unreadable files, a folder without clips, or clips of more than one skeleton; Cancelled.
+    """
+    folder = Path(folder)
+    report = progress or (lambda fraction, text: None)
+    paths = find_clips(folder)
+    annotations = Annotations(folder, paths)
+    chosen = Path(skeleton) if skeleton else None
+    key = cache.fingerprint(folder, paths, annotations.sources(paths), chosen, unit=unit, seed=seed)
+    place, where = cache.place(folder, cache_dir)
+    if not rebuild:
+        report(0.0, "Reading the cache")
+        found = cache.load(place, key)
+        if found is not None:
+            return replace(found, folder=str(folder))
+    notes: list[str] = [where] if where else []
+    clips = _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled)
+    built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
+    cache.save(place, key, built)
+    report(1.0, "Library ready")
+    return built
+
+
+def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled) -> tuple[Clip, ...]:
+    """Reads all recordings, checks that they share one skeleton, sets each on the floor, and adds the twins."""
+    read = []
+    for number, path in enumerate(paths):
+        _check(cancelled)
+        report(0.5 * number / len(paths), f"Reading {path.name}")
+        read.append(bvh.read(path, unit))
+    skeleton = _choose_skeleton(paths, read, chosen, unit)
+    notes += _unit_notes(read)
+    clips = []
+    for number, (path, source) in enumerate(zip(paths, read)):
+        _check(cancelled)
+        report(0.5 + 0.2 * number / len(paths), f"Mirroring {path.name}")
+        motion = replace(source.motion, skeleton=skeleton)
+        floor = foot_contacts.floor_height(motion)
+        motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, floor])
+        rows = _rows(path, annotations.of(path, motion.fps), len(motion))
+        clip = Clip(path.relative_to(folder).as_posix(), False, motion, rows, foot_contacts.detect(motion))
+        clips += [clip, clip.twin()]
+    if not any(clip.annotations for clip in clips):
+        raise InputError(
+            folder, "no annotation for any clip", "NAME.txt beside NAME.bvh or an annotations.csv",
+            "write which frames are standing, walking, jogging, running, kick ...",
+        )
+    return tuple(clips)
+
+
+def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
+    """Rows cut to the clip; InputError for one that begins after its end."""
+    for row in rows:
+        if row.start >= count:
+            raise InputError(path, f"a row that begins at frame {row.start:g}", f"frames 0 to {count - 1}", "mend the row")
+    return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
+
+
+def _choose_skeleton(paths, read, chosen: Path | None, unit) -> Skeleton:
+    """The library's skeleton; InputError naming two files where the clips do not share one."""
+    if chosen is not None:
+        skeleton, name = bvh.read(chosen, unit).motion.skeleton, chosen
+    else:
+        frames: Counter[str] = Counter()
+        for source in read:
+            frames[source.motion.skeleton.fingerprint] += len(source.motion)
+        best = max(range(len(read)), key=lambda i: (frames[read[i].motion.skeleton.fingerprint], -i))
+        skeleton, name = read[best].motion.skeleton, paths[best]
+    for path, source in zip(paths, read):
+        if not source.motion.skeleton.same_bones(skeleton, SAME_BONES):
+            raise InputError(
+                path, f"another skeleton ({len(source.motion.skeleton)} joints) than {name} ({len(skeleton)} joints)",
+                "one skeleton in all clips of a library", "keep clips of one skeleton in the folder",
+            )
+    return skeleton
+
+
+def _unit_notes(read) -> list[str]:
+    """What the reader decided, each sentence once with the number of clips it holds for."""
+    told = Counter(note for source in read for note in source.notes)
+    return [f"{note} ({count} clips)" if count > 1 else note for note, count in told.items()]
+
+
+def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
+    """Features, words and clusters of `clips`."""
+    _check(cancelled)
+    report(0.7, "Describing frames")
+    skeleton = clips[0].motion.skeleton
+    vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
+    frames = describe(skeleton, clips, lambda clip, source: words_matrix(clip, source, vocabulary), vocabulary, FPS)
+    clusters = {}
+    for number, length in enumerate(BLOCK_LENGTHS):
+        _check(cancelled)
+        report(0.8 + 0.06 * number, f"Clustering blocks of {length} frames")
+        clusters[length] = cluster_blocks(frames, length, seed)
+    return Library(folder, skeleton, clips, frames, clusters, FPS, notes)
+
+
+def words_matrix(clip: Clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:
+    """(T, V) bool: which words of `vocabulary` a clip carries at fractional frames `source` (T,) of its own rate."""
+    column = {word: i for i, word in enumerate(vocabulary)}
+    out = np.zeros((len(source), len(vocabulary)), bool)
+    for row in clip.annotations:
+        inside = (source >= row.start) & (source <= row.end)
+        for word in row.words:
+            out[inside, column[word]] = True
+    return out
+
+
+def measure_gaits(library: Library) -> tuple[Gait, ...]:
+    """Speeds of the library's locomotion (Faustino §3.1.1): per gait word, distance over time of its most common rows.
+
+    A gait without a direction in its words counts as well as one with; rows of key moments and dribbles do not count,
+    nor do rows that a slower one would overtake in the mean (then the word is dropped, since thresholds need an order).
+    """
+    seconds: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
+    metres: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
+    frames = library.frames
+    step = np.linalg.norm(np.diff(frames.path, axis=0), axis=1)
+    for index, clip in enumerate(library.clips):
+        first, rate = frames.first[index], library.fps / clip.motion.fps
+        for row in () if clip.mirrored else clip.annotations:
+            words = [word for word in row.words if word in seconds]
+            if row.key is not None or len(words) != 1 or set(row.words) - {words[0]} - _DIRECTIONS:
+                continue
+            low, high = first + int(np.ceil(row.start * rate)), first + int(row.end * rate)
+            seconds[words[0]][row.words] += (row.end - row.start) / clip.motion.fps
+            metres[words[0]][row.words] += float(step[low:high].sum())
+    found = []
+    for word, times in seconds.items():
+        if times:
+            words = max(times, key=lambda w: (times[w], w))
+            found.append(Gait(word, words, metres[word][words] / max(times[words], 1e-9)))
+    if not any(gait.word != "standing" for gait in found):
+        raise InputError(
+            library.folder, "no locomotion clip", "clips annotated walking, jogging, running or sprinting",
+            "annotate which clips are locomotion",
+        )
+    ordered = [gait for i, gait in enumerate(found) if all(gait.speed > other.speed for other in found[:i])]
+    return tuple(ordered)
+
+
+_DIRECTIONS = frozenset({"front", "back", "left", "right"})
+
+
+def _check(cancelled) -> None:
+    if cancelled is not None and cancelled():
+        raise Cancelled("library: cancelled")

@@ -1,0 +1,69 @@
+"""Which recordings lie below a folder, and which words were written about them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
+from ..errors import InputError
+
+CACHE_FOLDER = ".beyond_mocap"
+TABLE_NAME = "annotations.csv"
+
+
+def find_clips(folder: str | Path) -> list[Path]:
+    """All BVH files below `folder`, sorted by their path below it; symbolic links are followed, loops are not.
+
+    Raises InputError where the folder is missing or holds no BVH file.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(folder, "no such folder", "a folder with BVH files", "give the folder of your library")
+    found: list[Path] = []
+    seen: set[tuple[int, int]] = set()
+    for here, folders, files in os.walk(folder, followlinks=True):
+        status = os.stat(here)
+        if (status.st_dev, status.st_ino) in seen:
+            folders.clear()
+            continue
+        seen.add((status.st_dev, status.st_ino))
+        folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
+        found += [Path(here) / name for name in files if name.lower().endswith(".bvh")]
+    if not found:
+        raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
+    return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
+
+
+def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
+    """The `annotations.csv` files that may speak about `clips`: from each clip's folder up to the library's top, and the
+    one in the folder above that, since a library is often one folder of a larger collection."""
+    folder = Path(folder)
+    places = {parent for clip in clips for parent in clip.parents if parent == folder or folder in parent.parents}
+    places |= {folder, folder.absolute().parent}
+    return sorted(place / TABLE_NAME for place in places if (place / TABLE_NAME).is_file())
+
+
+class Annotations:
+    """What was written about the clips of a library, found as ../shared/contract.md describes "Library annotations"."""
+
+    def __init__(self, folder: Path, clips: list[Path]):
+        """Reads every table that may apply; InputError where one is broken."""
+        self.tables = {table.parent.absolute(): read_annotation_csv(table) for table in find_tables(folder, clips)}
+
+    def of(self, clip: Path, fps: float) -> tuple[ClipAnnotation, ...]:
+        """Rows of one clip: NAME.txt beside it, else the nearest table from its folder upward that has rows for it."""
+        beside = clip.with_suffix(".txt")
+        if beside.is_file():
+            return tuple(read_clip_annotations(beside, fps))
+        for place in clip.absolute().parents:
+            if place in self.tables:
+                rows = self.tables[place].get(clip.absolute().relative_to(place).as_posix())
+                if rows:
+                    return tuple(rows)
+        return ()
+
+    def sources(self, clips: list[Path]) -> list[Path]:
+        """Every file that was or would be read for words: part of what the cache depends on."""
+        texts = [clip.with_suffix(".txt") for clip in clips]
+        return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
