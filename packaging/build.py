@@ -1,0 +1,77 @@
+"""Build the extension's zips into build/extension: one per platform, packed and validated by Blender's own tool.
+
+    .venv/bin/python packaging/build.py --platforms linux-x64 windows-x64
+"""
+
+import argparse
+import pathlib
+import shutil
+import sys
+import tomllib
+
+import bundle
+import lint
+import stage
+import wheels
+
+TOP = bundle.HERE.parent
+OUT = TOP / "build" / "extension"
+
+
+def main(argv=None):
+    """Fetch, stage, lint, validate, build, lint again; 0 where the zips stand."""
+    known = bundle.platforms()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--platforms", nargs="+", choices=sorted(known), default=["linux-x64"])
+    names = parser.parse_args(argv).platforms
+    packages = bundle.packages()
+
+    shutil.rmtree(OUT, ignore_errors=True)
+    for platform in (known[name] for name in names):
+        path = build(packages, platform)
+        print(f"built {path.relative_to(TOP)}: {path.stat().st_size / 1e6:.1f} MB", flush=True)
+    return 0
+
+
+def build(packages, platform):
+    """The zip for one platform."""
+    folder = OUT / "stage" / platform.name
+    lay_out(folder, packages, platform)
+    complain(lint.lint_stage(folder, packages, platform))
+    pack(folder, OUT)
+    path = OUT / f"beyond_mocap-{version()}-{platform.name.replace('-', '_')}.zip"
+    complain(lint.lint_zip(path, platform))
+    return path
+
+
+def lay_out(folder, packages, platform):
+    """Fill the staging folder."""
+    names = wheels.gather(packages, platform, folder / "wheels")
+    stage.copy_parts(TOP, folder)
+    text = (TOP / "blender_manifest.toml").read_text("utf-8")
+    (folder / "blender_manifest.toml").write_text(stage.complete_manifest(text, packages, platform.name, names), "utf-8")
+
+
+def version():
+    """The version that the manifest gives."""
+    return tomllib.loads((TOP / "blender_manifest.toml").read_text("utf-8"))["version"]
+
+
+def pack(folder, out):
+    """Let Blender's own tool validate the folder and build the zip of its one platform."""
+    import bpy  # noqa: F401  (brings bl_pkg)
+    from bl_pkg.bl_extension_cli import cli_extension_handler as extension_tool
+
+    for verb in (["validate", str(folder)], ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"]):
+        if extension_tool(verb) != 0:
+            sys.exit(f"Blender's own tool refused: {verb[0]} {folder}")
+
+
+def complain(lines):
+    """Stop with these lines, if there are any."""
+    if lines:
+        sys.exit("\n".join(lines))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

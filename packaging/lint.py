@@ -1,0 +1,62 @@
+"""What Blender's `validate` lets through and a user would meet.
+
+A platform with a typo, a wheel that is not there, a Python without its wheel, a bundled package that the copyright
+does not name, a file in the zip that is not ours to ship.
+"""
+
+import tomllib
+import zipfile
+
+from bundle import plain, wheel
+
+BLENDERS = {f"{system}-{processor}" for system in ("linux", "windows", "macos") for processor in ("x64", "arm64")}
+NEVER = ("tests/", "benchmarks/", "docs/", "packaging/", "build/", "training/", ".git", ".venv", "shared/")
+
+
+def lint_stage(folder, packages, platform):
+    """Complaints about the folder staged for one platform, one line each; empty where all is well."""
+    manifest = tomllib.loads((folder / "blender_manifest.toml").read_text("utf-8"))
+    listed = [path.removeprefix("./wheels/") for path in manifest["wheels"]]
+    there = {path.name for path in (folder / "wheels").iterdir()}
+    return [
+        *(f"platform {name!r} is none of Blender's" for name in manifest["platforms"] if name not in BLENDERS),
+        *(f"wheel {name} is listed but not there" for name in listed if name not in there),
+        *(f"wheel {name} is there but not listed" for name in sorted(there) if name not in listed),
+        *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
+        *_copyright(manifest, packages),
+        *_coverage(listed, packages, platform),
+    ]
+
+
+def _copyright(manifest, packages):
+    for package in packages:
+        credit = f"({package.name} {package.bundled_version}, {package.license})"
+        if not any(line.endswith(credit) for line in manifest["copyright"]):
+            yield f"the copyright does not name {package.name} {package.bundled_version}"
+
+
+def _coverage(listed, packages, platform):
+    """Every Python gets exactly one wheel of each package, and no wheel serves nobody."""
+    wheels = {name: wheel(name) for name in listed}
+    idle = set(listed)
+    for python in platform.pythons:
+        for package in packages:
+            fitting = {name for name, w in wheels.items() if w.serves(platform, python)
+                       and (w.name, w.version) == (plain(package.name), package.bundled_version)}
+            idle -= fitting
+            if len(fitting) != 1:
+                yield f"{len(fitting)} wheels of {package.name} for {platform.name}, Python {python}: {sorted(fitting)}"
+    yield from (f"wheel {name} serves no Python of {platform.name}" for name in sorted(idle))
+
+
+def lint_zip(path, platform):
+    """Complaints about a finished zip for one platform."""
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+    wheels = [name.removeprefix("wheels/") for name in names if name.startswith("wheels/") and name.endswith(".whl")]
+    return [
+        *(f"{path.name}: {name} does not belong in it" for name in names if name.startswith(NEVER) or "__pycache__" in name),
+        *(f"{path.name}: {name} is for another platform" for name in wheels
+          if not any(wheel(name).serves(platform, python) for python in platform.pythons)),
+        *(f"{path.name}: lacks {name}" for name in ("__init__.py", "LICENSE", "blender_manifest.toml") if name not in names),
+    ]
