@@ -1,0 +1,64 @@
+"""The language between people, tracks and clips: a vocabulary, timelines of words, their text form, and gaits by speed.
+
+- `vocabulary`  the decision tree of words (Faustino, Appendix A), nearest words, left and right
+- `timeline`    stretches and key moments, validation, filling with automatic locomotion
+- `text`        the text form of timelines (§4.2.2)
+- `clips`       what the library's clips are annotated with
+- `gaits`       which gait a speed asks for (§3.1.1)
+
+    timeline = read_timeline("player.txt", fps=30)
+    validate(timeline, known_words=library_words, start=track.times[0], end=track.times[-1], where="player.txt")
+    gaits = automatic_gaits(sampled.speed, sampled.fps, speeds=[0.1, 1.3, 2.9])
+    filled = fill(timeline, sampled.times, [(LOCOMOTION[g],) for g in gaits])
+"""
+
+from .clips import ClipAnnotation, clip_annotations, read_annotation_csv, read_clip_annotations
+from .gaits import LOCOMOTION, LOCOMOTION_WORDS, STANDING_SPEED, automatic_gaits, gait_thresholds
+from .text import format_timeline, parse_timeline, read_text, read_timeline
+from .timeline import KeyMoment, Span, Timeline, fill, missing_keys, problems, validate, words_per_frame
+from .vocabulary import (
+    CONTINUOUS,
+    DISCRETE,
+    TRANSITION,
+    VOCABULARY,
+    nearest,
+    relatives,
+    similar_words,
+    swap_sides,
+    vocabulary_words,
+    words_below,
+)
+
+__all__ = [
+    "CONTINUOUS",
+    "DISCRETE",
+    "LOCOMOTION",
+    "LOCOMOTION_WORDS",
+    "STANDING_SPEED",
+    "TRANSITION",
+    "VOCABULARY",
+    "ClipAnnotation",
+    "KeyMoment",
+    "Span",
+    "Timeline",
+    "automatic_gaits",
+    "clip_annotations",
+    "fill",
+    "format_timeline",
+    "gait_thresholds",
+    "missing_keys",
+    "nearest",
+    "parse_timeline",
+    "problems",
+    "read_annotation_csv",
+    "read_clip_annotations",
+    "read_text",
+    "read_timeline",
+    "relatives",
+    "similar_words",
+    "swap_sides",
+    "validate",
+    "vocabulary_words",
+    "words_below",
+    "words_per_frame",
+]

@@ -1,0 +1,92 @@
+"""Which gait a speed asks for: the thresholds of Faustino §3.1.1, kept from flickering."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+
+LOCOMOTION = ("standing", "walking", "jogging", "running", "sprinting")
+"""The words that speed alone decides, slow to fast; "dribble" goes with any of them when the ball is at the feet."""
+
+LOCOMOTION_WORDS = frozenset((*LOCOMOTION, "dribble"))
+
+STANDING_SPEED = 0.5
+"""m/s; what a tracked player does below it is standing (tracking noise alone looks like 0.3 m/s)."""
+
+
+def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
+    """(G-1,) m/s, from each gait to the next faster one: s_A + (s_B - s_A) / omega, for speeds (G,) in ascending order.
+
+    Faustino §3.1.1 prints s_A + (s_A - s_B) / omega, which lies below the slower gait's own speed; the sign is turned
+    here so that omega = 4 puts the threshold a quarter of the way up, as his text explains ("to limit the usage of slower
+    locomotion mocaps on higher movement speed"). The step up from a gait below STANDING_SPEED is never lower than that.
+    """
+    speeds = np.asarray(speeds, dtype=float)
+    if speeds.ndim != 1 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
+        raise InputError("gait speeds", f"{speeds.tolist()}", "ascending speeds in m/s, one per gait")
+    if not omega >= 1.0:
+        raise InputError("omega", f"{omega}", "a number of at least 1")
+    slow, fast = speeds[:-1], speeds[1:]
+    thresholds = slow + (fast - slow) / omega
+    return np.where((slow < STANDING_SPEED) & (fast > STANDING_SPEED), np.maximum(thresholds, STANDING_SPEED), thresholds)
+
+
+def automatic_gaits(
+    speed: np.ndarray,
+    fps: float,
+    speeds: np.ndarray,
+    omega: float = 4.0,
+    hysteresis: float = 0.15,
+    minimum: float = 0.4,
+) -> np.ndarray:
+    """(T,) index into `speeds`: the gait of every frame (Faustino §3.1.1's pseudo-code, made steady).
+
+    speed: (T,) m/s at `fps` frames per second. speeds: (G,) m/s, ascending, the average speed of each gait's clips.
+    hysteresis: how far beyond a threshold the speed must go to change gait, as a share of the distance between the two
+    gaits (the paper has none: at a boundary speed its annotation flickers with the noise). minimum: seconds a gait lasts at
+    least; shorter ones go to the neighbour that is nearer in gait, then to the longer one.
+    """
+    speed = np.asarray(speed, dtype=float)
+    thresholds = gait_thresholds(speeds, omega)
+    margins = hysteresis * np.diff(np.asarray(speeds, dtype=float))
+    steps = [_trigger(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
+    gaits = np.sum(steps, axis=0, dtype=int) if steps else np.zeros(len(speed), dtype=int)
+    return _without_short_runs(gaits, int(np.ceil(minimum * fps - 1e-9)))
+
+
+def _trigger(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
+    """(T,) bool: above the threshold, where only leaving threshold +- margin changes the answer."""
+    decided = np.abs(speed - threshold) >= margin
+    decided[:1] = True
+    last = np.maximum.accumulate(np.where(decided, np.arange(len(speed)), 0))
+    return (speed >= threshold)[last]
+
+
+def _without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
+    """The gaits with every run shorter than `frames` given to a neighbour, shortest first."""
+    edges = np.flatnonzero(np.diff(gaits)) + 1
+    starts = [0, *edges.tolist()]
+    runs = [[stop - start, int(gaits[start])] for start, stop in zip(starts, [*starts[1:], len(gaits)])]
+    while len(runs) > 1:
+        short = min(range(len(runs)), key=lambda i: runs[i][0])
+        if runs[short][0] >= frames:
+            break
+        runs[short][1] = _adopting_gait(runs, short)
+        runs = _joined(runs)
+    return np.repeat([gait for _, gait in runs], [length for length, _ in runs]) if len(gaits) else gaits
+
+
+def _adopting_gait(runs: list[list[int]], index: int) -> int:
+    neighbours = runs[max(index - 1, 0) : index] + runs[index + 1 : index + 2]
+    return min(neighbours, key=lambda run: (abs(run[1] - runs[index][1]), -run[0]))[1]
+
+
+def _joined(runs: list[list[int]]) -> list[list[int]]:
+    out: list[list[int]] = []
+    for length, gait in runs:
+        if out and out[-1][1] == gait:
+            out[-1][0] += length
+        else:
+            out.append([length, gait])
+    return out

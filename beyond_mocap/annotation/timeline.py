@@ -1,0 +1,245 @@
+"""A player's timeline: stretches and key moments with words, and how automatic locomotion fills what is left open."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from .vocabulary import CONTINUOUS, DISCRETE, TRANSITION, nearest, similar_words, vocabulary_words, words_below
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
+"""What the text form reads as a time; no word may look like one."""
+
+EDGE_TOLERANCE = 0.1
+"""Seconds by which a time may lie outside the track: one sample of a 10 Hz feed."""
+
+_SAME_TIME = 1e-6
+
+
+def _checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
+    out = tuple(dict.fromkeys(str(word).lower() for word in words))
+    for word in out:
+        if not word or "#" in word or word.split() != [word] or NUMBER.fullmatch(word):
+            raise InputError(where, f"{word!r} as a word", "a word without blanks and '#' that is not a number")
+    return out
+
+
+def _checked_time(value: float, where: str) -> float:
+    time = float(value)
+    if not math.isfinite(time):
+        raise InputError(where, f"the time {time}", "a finite number of seconds")
+    return time
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch: start .. end in seconds on the track's clock; no words means automatic locomotion, TRANSITION alone
+    leaves it to continuity. Words are lower case, each once. line: where it was read, for messages only."""
+
+    start: float
+    end: float
+    words: tuple[str, ...] = ()
+    line: int | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "start", _checked_time(self.start, "span"))
+        object.__setattr__(self, "end", _checked_time(self.end, "span"))
+        object.__setattr__(self, "words", _checked_words(self.words, "span"))
+
+
+@dataclass(frozen=True)
+class KeyMoment:
+    """A moment, seconds on the track's clock, at which the clip's own key moment must be played (Faustino §4.2.2)."""
+
+    time: float
+    words: tuple[str, ...]
+    line: int | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "time", _checked_time(self.time, "key moment"))
+        object.__setattr__(self, "words", _checked_words(self.words, "key moment"))
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion throughout."""
+
+    spans: tuple[Span, ...] = ()
+    keys: tuple[KeyMoment, ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "spans", tuple(sorted(self.spans, key=lambda span: (span.start, span.end))))
+        object.__setattr__(self, "keys", tuple(sorted(self.keys, key=lambda key: key.time)))
+
+
+def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str] | None]:
+    """Per time of `times` (T,) seconds: the words in force, None in a transition, empty where locomotion is automatic.
+
+    A span holds from its start up to, not including, its end; one that ends with the last time holds there too.
+    """
+    times = np.asarray(times, dtype=float)
+    out: list[frozenset[str] | None] = [frozenset()] * len(times)
+    for span in timeline.spans:
+        if span.words:
+            first, last = np.searchsorted(times, [span.start - _SAME_TIME, span.end - _SAME_TIME])
+            if len(times) and abs(times[-1] - span.end) <= _SAME_TIME:
+                last = len(times)
+            words = None if span.words == (TRANSITION,) else frozenset(span.words)
+            out[first:last] = [words] * (last - first)
+    return out
+
+
+def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> Timeline:
+    """The timeline with automatic locomotion put in wherever no span with words holds (Faustino §3.1.1).
+
+    times: (T,) seconds of the output frames. words: T word tuples, the automatic gait of each frame. Spans with words and
+    key moments stay as they are; the others are replaced by one span per stretch of equal automatic words.
+    """
+    times = np.asarray(times, dtype=float)
+    asked = [span for span in timeline.spans if span.words]
+    automatic = [piece for start, end in _open_stretches(asked, times) for piece in _pieces(start, end, times, words)]
+    return Timeline((*asked, *automatic), timeline.keys)
+
+
+def _open_stretches(asked: list[Span], times: np.ndarray) -> list[tuple[float, float]]:
+    """(start, end) seconds between the first and the last time that no span of `asked` covers."""
+    out, reached = [], times[0] if len(times) else 0.0
+    for span in asked:
+        if span.start > reached + _SAME_TIME:
+            out.append((reached, min(span.start, times[-1])))
+        reached = max(reached, span.end)
+    if len(times) and times[-1] > reached + _SAME_TIME:
+        out.append((reached, times[-1]))
+    return out
+
+
+def _pieces(start: float, end: float, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> list[Span]:
+    """Spans of equal automatic words that together cover start .. end."""
+    first = max(int(np.searchsorted(times, start + _SAME_TIME)) - 1, 0)
+    last = int(np.searchsorted(times, end - _SAME_TIME))
+    edges = [i for i in range(first + 1, last) if tuple(words[i]) != tuple(words[i - 1])]
+    starts = [start, *(float(times[i]) for i in edges)]
+    return [Span(a, b, words[i]) for a, b, i in zip(starts, [*starts[1:], end], [first, *edges])]
+
+
+def problems(
+    timeline: Timeline,
+    known_words: Iterable[str] = (),
+    start: float | None = None,
+    end: float | None = None,
+    where: str = "annotations",
+) -> list[InputError]:
+    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown; `validate`'s list.
+
+    known_words: words beyond the vocabulary (the library's and the user's). start, end: the track's first and last time in
+    seconds, None where there is no track to compare with. where: the file, for `file:line:` in front of each message.
+    """
+    known = vocabulary_words(known_words)
+    found: list[InputError] = []
+    for item in sorted((*timeline.spans, *timeline.keys), key=_first_time):
+        place = where if item.line is None else f"{where}:{item.line}"
+        found += [*_word_problems(item, known, place), *_time_problems(item, start, end, place)]
+    return found + _overlaps(timeline, where)
+
+
+def validate(
+    timeline: Timeline,
+    known_words: Iterable[str] = (),
+    start: float | None = None,
+    end: float | None = None,
+    where: str = "annotations",
+) -> None:
+    """Raises the first of `problems(...)` as an InputError; returns when there is none."""
+    found = problems(timeline, known_words, start, end, where)
+    if found:
+        raise found[0]
+
+
+def missing_keys(
+    timeline: Timeline, choices: Iterable[Iterable[str]], count: int = 3
+) -> list[tuple[KeyMoment, tuple[tuple[str, ...], ...]]]:
+    """The key moments that no choice serves, each with the `count` nearest choices.
+
+    choices: the words of every clip's key moment, those of mirrored clips included. A choice serves a key moment when it
+    carries all of its words; further words do no harm.
+    """
+    held = [tuple(choice) for choice in choices]
+    lacking = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in held)]
+    return [(key, nearest(key.words, held, count)) for key in lacking]
+
+
+def _first_time(item: Span | KeyMoment) -> float:
+    return item.start if isinstance(item, Span) else item.time
+
+
+def _word_problems(item: Span | KeyMoment, known: frozenset[str], place: str) -> list[InputError]:
+    if TRANSITION in item.words:
+        return _transition_problems(item, place)
+    out = [_unknown_word(word, item, known, place) for word in item.words if word not in known]
+    if isinstance(item, KeyMoment) and not item.words:
+        out.append(InputError(place, "a key moment without words", "TIME words...", "say what happens there"))
+    return out
+
+
+def _transition_problems(item: Span | KeyMoment, place: str) -> list[InputError]:
+    if isinstance(item, Span) and item.words == (TRANSITION,):
+        return []
+    found = f"{TRANSITION!r} in {' '.join(item.words)!r}"
+    return [InputError(place, found, f"'START END {TRANSITION}'", "write it alone, on a line with two times")]
+
+
+def _unknown_word(word: str, item: Span | KeyMoment, known: frozenset[str], place: str) -> InputError:
+    """Offers words spelled alike, and those that the tree has below the line's other words."""
+    others = [other for other in item.words if other in known]
+    alike = similar_words(word, known)
+    roots = sorted(DISCRETE if isinstance(item, KeyMoment) else CONTINUOUS)
+    offers = dict.fromkeys((*alike, *(words_below(others)[:5] if others else roots * (not alike))))
+    return InputError(
+        place,
+        f"the word {word!r} is not in the vocabulary",
+        f"one like {', '.join(offers)}" if offers else "a word of the vocabulary",
+        "correct it, or add it to your own words",
+    )
+
+
+def _time_problems(item: Span | KeyMoment, start: float | None, end: float | None, place: str) -> list[InputError]:
+    times = (item.start, item.end) if isinstance(item, Span) else (item.time,)
+    if len(times) == 2 and times[1] <= times[0]:
+        return [InputError(place, f"the end {times[1]:g} is not after the start {times[0]:g}", "START < END")]
+    low = -math.inf if start is None else start - EDGE_TOLERANCE
+    high = math.inf if end is None else end + EDGE_TOLERANCE
+    if low <= times[0] and times[-1] <= high:
+        return []
+    outside = times[0] if times[0] < low else times[-1]
+    return [InputError(place, f"the time {outside:g} s is outside the track", _range(start, end), "correct the time")]
+
+
+def _range(start: float | None, end: float | None) -> str:
+    parts = [f"{word} {value:g} s" for word, value in (("from", start), ("to", end)) if value is not None]
+    return "times " + " ".join(parts)
+
+
+def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
+    """Spans with words that overlap, and key moments at one time: nobody can do both."""
+    asked = [span for span in timeline.spans if span.words]
+    pairs = [(a, b, "overlap") for a, b in zip(asked, asked[1:]) if b.start < a.end - _SAME_TIME]
+    pairs += [(a, b, "are at one time") for a, b in zip(timeline.keys, timeline.keys[1:]) if b.time - a.time <= _SAME_TIME]
+    return [
+        InputError(
+            where if b.line is None else f"{where}:{b.line}",
+            f"{_named(a)} and {_named(b)} {how}",
+            "one thing at a time",
+            "shorten one of them, or put all words on one line",
+        )
+        for a, b, how in pairs
+    ]
+
+
+def _named(item: Span | KeyMoment) -> str:
+    times = f"{item.start:g} {item.end:g}" if isinstance(item, Span) else f"{item.time:g}"
+    return f"'{times} {' '.join(item.words)}'" + ("" if item.line is None else f" (line {item.line})")

@@ -1,0 +1,161 @@
+"""The words that people and clips share, as the decision tree of Faustino's Appendix A.
+
+A motion carries the words from a root of the tree down to a leaf ("kick low inside running"), plus modifiers ("right").
+Words of a branch may be left out when asking: any clip below serves. Words that are not in the tree are welcome too, as
+long as the library's annotations or the user's own list bring them.
+
+The printed tree lost its indentation on the way into text; it is put back here so that every path reads as a movement.
+Doubtful places: "with" below running and getting_up is kept as printed (its second half is lost); "ender" below
+celebration is read as the end of a cut-off line and left out; bicycle stands below kick; letgo below turning's dribble.
+The continuous list names dribble and turning without branches, and fall, fly and jump read as three roots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+_PACES: dict = {"standing": {}, "running": {}}
+
+VOCABULARY: dict[str, dict] = {
+    "continuous": {
+        "standing": {"knee": {}, "turning": {}},
+        "walking": {"back": {}, "dribble": {}, "turning": {}},
+        "jogging": {"dribble": {}},
+        "running": {"with": {}, "dribble": {}},
+        "sprinting": {"dribble": {}},
+        "sitting": {},
+        "ground": {},
+        "celebration": {"running": {"arms": {"inside": {}, "outside": {}}}, "arms": {"inside": {}, "outside": {}}},
+        "hold": {"high": {}, "middle": {}, "low": {}, "ground": {}, "sitting": {}},
+        "turning": {},
+        "dribble": {},
+    },
+    "discrete": {
+        "receive": {"foot": {"low": {"inside": {}}, "high": {"inside": {}}}, "body": {}},
+        "kick": {
+            "low": {"inside": _PACES, "outside": _PACES, "top": _PACES, "volley": _PACES},
+            "high": {"inside": _PACES, "top": _PACES},
+            "bicycle": {"half": {}},
+        },
+        "throwb": {"high": {}, "middle": {}},
+        "turning": {"dribble": {"letgo": {}}},
+        "header": {"standing": {"jump": {}}, "running": {"jump": {}}},
+        "scissors": {},
+        "getting_up": {"short_duration": {}, "long_duration": {}, "with": {}},
+        "fall": {"standing": {}, "slide": {}},
+        "fly": {"slide": {}},
+        "jump": {"slide": {}},
+        "intercept": {
+            "slide": {}, "knee": {}, "inside": {}, "outside": {}, "short_duration": {}, "long_duration": {},
+        },
+        "catchb": {
+            "high": {}, "middle": {}, "low": {}, "slide": {},
+            "dive": {"long_duration": {"low": {}}, "short_duration": {"high": {}, "low": {}}},
+        },
+        "stomp": {
+            "high": {}, "middle": {}, "low": {},
+            "dive": {"long_duration": {"high": {}, "low": {}}, "short_duration": {"high": {}, "low": {}}},
+        },
+    },
+    "modifier": {"right": {}, "left": {}, "front": {}, "back": {}, "subtle": {}, "with_setup": {}},
+}
+"""Faustino, Appendix A: kind -> root word -> nested words below it."""
+
+TRANSITION = "transition"
+"""Alone in a timeline's line: this stretch is left to continuity."""
+
+CONTINUOUS = frozenset(VOCABULARY["continuous"])
+"""Cyclic motions, annotated with a start and an end."""
+
+DISCRETE = frozenset(VOCABULARY["discrete"]) - CONTINUOUS
+"""Motions with a key moment. "turning" is in both of Faustino's lists and counts as continuous here."""
+
+_SIDES = {"left": "right", "right": "left"}
+
+
+def vocabulary_words(extra: Iterable[str] = ()) -> frozenset[str]:
+    """Every word of the tree, and `extra` (the library's own words, the user's list)."""
+    return frozenset(word for path in _paths(VOCABULARY) for word in path[1:]) | frozenset(extra)
+
+
+def swap_sides(words: Iterable[str]) -> tuple[str, ...]:
+    """The words of the mirrored motion (Faustino §3.1.2): left and right change places, also inside `turn_left`."""
+    return tuple("_".join(_SIDES.get(part, part) for part in word.split("_")) for word in words)
+
+
+def relatives(word: str) -> frozenset[str]:
+    """The words that stand above or below `word` somewhere in the tree, itself left out."""
+    found: set[str] = set()
+    for path in _paths(VOCABULARY):
+        if word in path[1:]:
+            found.update(path[1:])
+    return frozenset(found - {word})
+
+
+def words_below(words: Iterable[str]) -> tuple[str, ...]:
+    """What the tree offers next after `words`, in the tree's order: all children of the deepest places they reach.
+
+    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, outside, top, volley.
+    """
+    asked = set(words)
+    reached = [path for path in _paths(VOCABULARY) if asked.issuperset(path[1:])]
+    deepest = max((len(path) for path in reached), default=0)
+    offered = dict.fromkeys(word for path in reached if len(path) == deepest for word in _at(path))
+    return tuple(word for word in offered if word not in asked)
+
+
+def similar_words(word: str, known: Iterable[str], count: int = 3) -> tuple[str, ...]:
+    """The `count` words of `known` nearest to `word` in spelling (edit distance), at most half of its letters away."""
+    ranked = sorted((edit_distance(word, other), other) for other in set(known))
+    return tuple(other for distance, other in ranked[:count] if distance <= max(1, (len(word) + 1) // 2))
+
+
+def edit_distance(a: str, b: str) -> int:
+    """Least number of letters to insert, delete or replace that turns `a` into `b` (Levenshtein)."""
+    row = list(range(len(b) + 1))
+    for i, letter in enumerate(a, start=1):
+        diagonal, row[0] = row[0], i
+        for j, other in enumerate(b, start=1):
+            diagonal, row[j] = row[j], min(row[j] + 1, row[j - 1] + 1, diagonal + (letter != other))
+    return row[-1]
+
+
+def nearest(words: Iterable[str], choices: Iterable[Iterable[str]], count: int = 3) -> tuple[tuple[str, ...], ...]:
+    """The `count` word combinations of `choices` that come closest to `words`, best first; equal sets count once.
+
+    Ordered by the asked words a choice lacks (one that names the action, like "kick", weighs more than all that only
+    colour it), then by how many words it has that stand near the missing ones in the tree (so that "header", where there
+    is none, leads to "jump"), then by words nobody asked for, then in the tree's order.
+    """
+    asked = frozenset(words)
+    unique = {frozenset(choice): tuple(choice) for choice in map(tuple, choices)}
+    ranked = sorted(unique, key=lambda choice: (*_distance(asked, choice), _in_tree_order(choice)))
+    return tuple(unique[choice] for choice in ranked[:count])
+
+
+def _distance(asked: frozenset[str], choice: frozenset[str]) -> tuple[int, int, int]:
+    missing = asked - choice
+    actions = asked & DISCRETE or asked & CONTINUOUS
+    kin = frozenset().union(*(relatives(word) for word in missing))
+    weight = len(missing) + len(asked) * len(missing & actions)
+    return weight, -len(kin & (choice - asked)), len(choice - asked)
+
+
+def _in_tree_order(words: frozenset[str]) -> list[tuple[int, str]]:
+    order = {word: place for place, word in enumerate(dict.fromkeys(path[-1] for path in _paths(VOCABULARY)))}
+    return sorted((order.get(word, len(order)), word) for word in words)
+
+
+def _paths(tree: Mapping[str, dict], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Every place of the tree as its path (kind, root, ... , word), parents first."""
+    for word, below in tree.items():
+        yield (*above, word)
+        yield from _paths(below, (*above, word))
+
+
+def _at(path: tuple[str, ...]) -> Mapping[str, dict]:
+    """The branch below the place `path`."""
+    branch: Mapping[str, dict] = VOCABULARY
+    for word in path:
+        branch = branch[word]
+    return branch
