@@ -1,0 +1,109 @@
+"""The order in frames of the library's rate: what is asked of every frame, and which clips can serve each key moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, words_per_frame
+from ..errors import NotInLibrary
+from ..library.keys import Key, nearest_serving, nearest_words, serving
+from ..library.library import Library
+from ..motion.track import SampledTrack, sample
+from ..plan import Plan
+
+Words = frozenset[str] | None
+
+
+@dataclass(frozen=True)
+class WantedKey:
+    """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may serve
+    it (empty: locomotion stands in), and the words used where the asked ones are lacking."""
+
+    asked: KeyMoment
+    frame: float
+    choices: tuple[Key, ...]
+    used_instead: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
+    gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use."""
+
+    track: SampledTrack
+    asked: tuple[Words, ...]
+    gait: np.ndarray
+    timeline: Timeline
+    keys: tuple[WantedKey, ...]
+    allowed: np.ndarray
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.track.times)
+
+
+def wanted(library: Library, plan: Plan) -> Wanted:
+    """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless plan.nearest)."""
+    track = sample(plan.track, library.fps)
+    gaits = library.gaits
+    gait = automatic_gaits(track.speed, library.fps, np.array([g.speed for g in gaits]), plan.omega)
+    timeline = fill(plan.timeline, track.times, [gaits[g].words for g in gait])
+    allowed = np.array([plan.mirror or not clip.mirrored for clip in library.clips])
+    warnings: list[str] = []
+    keys = tuple(_key(library, moment, track, gait, allowed, plan.nearest, warnings) for moment in timeline.keys)
+    asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
+    warnings += _lacking(library, plan.timeline)
+    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings))
+
+
+def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:
+    frame = float(np.clip((moment.time - track.times[0]) * library.fps, 0, len(track.times) - 1))
+    usable = tuple(key for key in library.keys if allowed[key.clip])
+    choices = serving(usable, moment.words)
+    if choices:
+        return WantedKey(moment, frame, choices, None)
+    offered = nearest_words(usable, moment.words)
+    text = f"{moment.time:g} s: the library has no clip for '{' '.join(moment.words)}'; nearest: {_listed(offered)}"
+    if not go_on:
+        raise NotInLibrary(f"{text}; ask for one of these, add such a clip, or go on with --nearest", offered)
+    choices = nearest_serving(usable, moment.words)
+    gait_words = library.gaits[int(gait[int(round(frame))])].words
+    used = tuple(sorted(choices[0].words)) if choices else gait_words
+    warnings.append(f"{text}; used instead: {' '.join(used)}")
+    return WantedKey(moment, frame, choices, used)
+
+
+def _listed(offered: tuple[str, ...]) -> str:
+    return " | ".join(offered) if offered else "no key moment at all"
+
+
+def _lacking(library: Library, timeline: Timeline) -> list[str]:
+    """One warning per word of a span that no clip carries."""
+    asked = {word for span in timeline.spans for word in span.words} - {TRANSITION}
+    return [f"no clip carries the word '{word}': spans that ask for it follow the rest" for word in sorted(asked - library.words)]
+
+
+def _with_transitions(asked: list[Words], keys: tuple[WantedKey, ...], library: Library) -> list[Words]:
+    """Around each key moment only continuity counts, for as long as the clips that may serve it need (Faustino §3.2.2,
+    where elements of the annotation vector are zero in transitions); with several clips, the mean of their needs."""
+    asked = list(asked)
+    for key in keys:
+        if key.choices:
+            entry, leave = np.mean([needed(library, choice) for choice in key.choices], axis=0)
+            low = max(0, int(np.ceil(key.frame - entry)))
+            for frame in range(low, min(len(asked), int(key.frame + leave) + 1)):
+                asked[frame] = None
+    return asked
+
+
+def needed(library: Library, key: Key) -> tuple[float, float]:
+    """Frames at the library's rate that a key's clip needs before and after its key frame."""
+    rate = library.fps / library.clips[key.clip].motion.fps
+    return (key.frame - key.start) * rate, (key.end - key.frame) * rate
+
+
+def pool_frame(library: Library, key: Key) -> float:
+    """A key's place among the library's frames (fractional)."""
+    return float(library.frames.first[key.clip] + key.frame * library.fps / library.clips[key.clip].motion.fps)
