@@ -47,7 +47,7 @@ extension: venv
 extension-all: PLATFORMS = linux-x64 windows-x64 macos-arm64 macos-x64
 extension-all: extension
 
-window-test:
+window-test: extension
 	@tests/gui/run $(REAL_BLENDER)
 
 clean:

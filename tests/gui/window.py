@@ -1,0 +1,142 @@
+"""A hand and an eye for Blender's window: move, click, type, find buttons, read what was printed.
+
+Blender answers events only between two steps of a timer, so everything that takes part in the
+conversation is a generator: each `yield` gives the seconds to wait before it goes on.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+
+import bpy
+
+
+class Output:
+    """All that Blender and its libraries print, on both streams, kept for reading and passed on at the end.
+
+    Errors in drawing do not stop anything: a Python one is printed as a traceback, a property that does not exist
+    as a bare `file.py:29` from C code. So the streams themselves are read, below Python's.
+    """
+
+    def __init__(self):
+        self.kept = tempfile.TemporaryFile()
+        self.terminal = os.dup(1)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os.dup2(self.kept.fileno(), 1)
+        os.dup2(self.kept.fileno(), 2)
+
+    def text(self):
+        """Everything printed so far."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        return os.pread(self.kept.fileno(), os.fstat(self.kept.fileno()).st_size, 0).decode("utf-8", "replace")
+
+    def say(self, line):
+        """Write a line to the terminal at once, past the keeping."""
+        os.write(self.terminal, (line + "\n").encode())
+
+
+class Window:
+    """Blender's first window, with one pointer."""
+
+    def __init__(self):
+        self.window = bpy.context.window_manager.windows[0]
+        self.pointer = (0, 0)
+
+    def area(self, kind):
+        """The first editor of this type."""
+        return next(area for area in self.window.screen.areas if area.type == kind)
+
+    def sidebar(self, area):
+        """The editor's right-hand region, where the tabs are."""
+        return next(region for region in area.regions if region.type == "UI")
+
+    def event(self, kind, value, window=None, **keys):
+        """One event at the pointer."""
+        x, y = self.pointer
+        (window or self.window).event_simulate(type=kind, value=value, x=x, y=y, **keys)
+
+    def move(self, x, y):
+        """Put the pointer there."""
+        self.pointer = (int(x), int(y))
+        self.event("MOUSEMOVE", "NOTHING")
+        yield 0.015
+
+    def press(self, key, window=None):
+        """A key or mouse button, down and up."""
+        self.event(key, "PRESS", window)
+        yield 0.05
+        self.event(key, "RELEASE", window)
+        yield 0.15
+
+    def click(self, x, y):
+        """Click there with the left button."""
+        yield from self.move(x, y)
+        yield from self.press("LEFTMOUSE")
+
+    def open_tab(self, area, category):
+        """Show the editor's sidebar with this tab in front."""
+        area.spaces.active.show_region_ui = True
+        yield 0.5
+        self.sidebar(area).active_panel_category = category
+        area.tag_redraw()
+        yield 0.5
+
+    def command_under_pointer(self, area, region):
+        """The Python call of the button under the pointer, as Blender itself writes it; "" where there is none."""
+        manager = bpy.context.window_manager
+        manager.clipboard = ""
+        with bpy.context.temp_override(window=self.window, area=area, region=region):
+            if bpy.ops.ui.copy_python_command_button.poll():
+                bpy.ops.ui.copy_python_command_button()
+        return manager.clipboard
+
+    def buttons(self, area, region, step=9):
+        """Move over all that the region shows; return each operator's button: its call -> where it is."""
+        found = {}
+        columns = [region.x + int(region.width * share) for share in (0.15, 0.4, 0.65, 0.85)]
+        for y in range(region.y + region.height - 8, region.y + 4, -step):
+            for x in columns:
+                yield from self.move(x, y)
+                call = self.command_under_pointer(area, region)
+                if call:
+                    found.setdefault(call, (x, y - 2))
+        return found
+
+    def scroll(self, region):
+        """Turn the wheel over the region by about half of what it shows; return whether it moved."""
+        before = region.view2d.view_to_region(0, 0, clip=False)
+        yield from self.move(region.x + region.width // 2, region.y + region.height // 2)
+        for _ in range(8):
+            self.event("WHEELDOWNMOUSE", "PRESS")
+            yield 0.1
+        return region.view2d.view_to_region(0, 0, clip=False) != before
+
+    def picture(self, path):
+        """Save the whole screen; by X itself, because Blender's own screenshot is black on a software renderer."""
+        subprocess.run(["import", "-window", "root", path], check=True)
+
+
+def talk(script, output, limit):
+    """Run a generator between Blender's events, then end Blender: 0 finished, 4 too slow, 5 an error."""
+    steps, start = script(), time.monotonic()
+
+    def tick():
+        try:
+            wait = next(steps)
+            if time.monotonic() - start < limit:
+                return wait
+            output.say(f"the window tests did not finish in {limit} s")
+            status = 4
+        except StopIteration as end:
+            status = end.value or 0
+        except BaseException:
+            output.say(traceback.format_exc())
+            status = 5
+        os._exit(status)  # quitting the usual way always ends with 0
+
+    bpy.app.timers.register(tick, first_interval=1.5, persistent=True)
