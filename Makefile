@@ -27,7 +27,7 @@ venv-oldest:
 test: test-core test-blender test-oldest
 
 test-core: venv
-	.venv/bin/python $(PYTEST) tests/core
+	.venv/bin/python $(PYTEST) tests/core tests/packaging
 
 test-blender: venv
 	.venv/bin/python $(PYTEST) tests/blender
