@@ -1,0 +1,23 @@
+"""A tracked player: samples as a feed delivers them, put right, and brought to an even rate.
+
+    track = files.tracking.read_track_csv("player.csv")
+    track, report = clean(track)
+    sampled = sample(track, fps=30)
+"""
+
+from .cleaning import FASTEST, DataReport, clean
+from .data import BALL_RADIUS, SampledTrack, Track
+from .sampling import sample, smoothed, travel_direction, zero_phase_hann
+
+__all__ = [
+    "BALL_RADIUS",
+    "FASTEST",
+    "DataReport",
+    "SampledTrack",
+    "Track",
+    "clean",
+    "sample",
+    "smoothed",
+    "travel_direction",
+    "zero_phase_hann",
+]

@@ -1,0 +1,320 @@
+"""What is wrong with a feed's samples, put right and told.
+
+How real feeds err: samples are missing, or kept going at constant velocity while the player was out of sight, and then snap
+back by 0.4-1.4 m from one sample to the next, some 8 times per player and half; single samples jump away and return; an
+absent ball stands at a sentinel (z = -10, or exactly at the origin).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from .data import Track
+from .sampling import GAP_INTERVALS
+
+FASTEST = 12.0
+"""m/s; nobody runs faster, so a sample that wants it is wrong."""
+
+_HARDEST = 12.0  # m/s^2, hardest acceleration of a player
+_SPIKE = 0.2  # metres off the line between the neighbours that a spike has at least, beyond what acceleration explains
+_EXCURSION = 0.5  # seconds that a feed may be away and still be seen to return
+_COAST = (0.2, 0.9)  # seconds before a snap that are not believed: at least, and at most while the feed coasts
+_CATCH_UP = 3.0  # m/s; so much faster than before may a snap be made up for, which asks for more seconds than the least
+_COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
+_SNAP_LIMIT = 3.0  # metres; a longer step is another player, or truth: told, not repaired
+_LEAN = 0.3  # seconds whose slope is the velocity next to a gap
+_LONGEST_GAP = 3600.0
+_PITCH = 200.0  # metres from the centre beyond which no ball is
+
+
+@dataclass(frozen=True)
+class DataReport:
+    """What `clean` found. lines: for people, one finding each, with times. rate: samples per second (median). dropped:
+    rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start, end)
+    seconds between measured samples. ball_unknown: samples without a ball. warnings: those lines that ask for attention."""
+
+    lines: tuple[str, ...]
+    rate: float
+    dropped: int
+    merged: int
+    filled: int
+    outliers: int
+    gaps: tuple[tuple[float, float], ...]
+    ball_unknown: int
+    warnings: tuple[str, ...]
+
+
+def clean(track: Track) -> tuple[Track, DataReport]:
+    """The track in order of time, with one believable position per sample, and a report of what that took.
+
+    Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the coasted
+    samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample intervals, are
+    put in and marked `filled`. Both get a cubic between the believed neighbours that starts and ends with their velocities
+    (beyond one second only as curved as the distance allows); before the first and after the last believed sample, the
+    velocity dies away within half a second. A track that is already clean comes back equal.
+    InputError where fewer than two samples have a position, or a gap is longer than an hour.
+    """
+    times, positions, ball, notes, dropped, merged = _in_order(track)
+    ball, notes = _real_ball(ball, notes)
+    times, positions, ball = _with_missing_rows(times, positions, ball, track.name)
+    known = np.isfinite(positions).all(axis=1)
+    if np.count_nonzero(known) < 2:
+        raise InputError(track.name, f"{np.count_nonzero(known)} samples with a position", "at least two")
+    outlier, snaps = np.zeros(len(times), dtype=bool), ()
+    outlier[known], snaps = _outliers(times[known], positions[known])
+    believed = known & ~outlier
+    positions = _bridge(times, positions, believed)
+    cleaned = Track(times, positions, ball, np.isfinite(ball[:, 2]), ~known, outlier, track.name)
+    return cleaned, _report(cleaned, notes, snaps, dropped, merged)
+
+
+def _in_order(track: Track):
+    """Rows sorted by time, repeated times merged, unknown times dropped; with notes and counts of what was done."""
+    timed = np.isfinite(track.times)
+    rows = np.column_stack([track.positions, track.ball])[timed]
+    rows[~np.isfinite(rows[:, :2]).all(axis=1), :2] = np.nan
+    rows[:, 4] = np.where(track.ball_height_known[timed], rows[:, 4], np.nan)
+    notes = [f"{np.count_nonzero(~timed)} rows without a time left out"] if not timed.all() else []
+    times = track.times[timed]
+    if np.any(np.diff(times) < 0):
+        late = times[1:][np.diff(times) < 0]
+        notes.append(f"times out of order put in order: {_places(late)}")
+    order = np.argsort(times, kind="stable")
+    times, rows = times[order], rows[order]
+    starts = np.flatnonzero(np.diff(times, prepend=-np.inf) > 1e-6)
+    merged = len(times) - len(starts)
+    if merged:
+        repeated = times[starts][np.diff(starts, append=len(times)) > 1]
+        notes.append(f"{merged} rows with a repeated time merged: {_places(repeated)}")
+        rows = _mean_of_groups(rows, starts)
+    return times[starts], rows[:, :2], rows[:, 2:], notes, int(np.count_nonzero(~timed)), merged
+
+
+def _mean_of_groups(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """(G, k): mean of the finite values in each group of rows (N, k); NaN where a group has none."""
+    finite = np.isfinite(rows)
+    counts = np.add.reduceat(finite, starts, axis=0, dtype=float)
+    sums = np.add.reduceat(np.where(finite, rows, 0.0), starts, axis=0)
+    return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0)
+
+
+def _real_ball(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarray, list[str]]:
+    """Ball rows (N, 3) with NaN in place of sentinels: z below the ground, far outside, or parked at the origin."""
+    seen = np.isfinite(ball[:, :2]).all(axis=1)
+    with np.errstate(invalid="ignore"):
+        wrong = seen & ((np.abs(ball) > _PITCH).any(axis=1) | (ball[:, 2] < -1.0) | _parked_at_origin(ball))
+    if wrong.any():
+        notes = [*notes, f"{np.count_nonzero(wrong)} samples with the ball at a sentinel taken as unknown"]
+    ball = np.where((seen & ~wrong)[:, None], ball, np.nan)
+    return ball, notes
+
+
+def _parked_at_origin(ball: np.ndarray) -> np.ndarray:
+    """(N,) bool: in a run of three or more samples exactly at (0, 0) that the ball did not roll into or out of."""
+    zero = (ball[:, :2] == 0.0).all(axis=1)
+    out = np.zeros(len(ball), dtype=bool)
+    for start, stop in _runs(zero):
+        beside = [i for i in (start - 1, stop) if 0 <= i < len(ball) and np.isfinite(ball[i, :2]).all()]
+        out[start:stop] = stop - start >= 3 and all(np.linalg.norm(ball[i, :2]) > 1.5 for i in beside)
+    return out
+
+
+def _with_missing_rows(times, positions, ball, name: str):
+    """Rows of NaN put in, evenly, wherever two rows are more than three sample intervals apart."""
+    steps = np.diff(times)
+    interval = np.median(steps) if len(steps) else 1.0
+    gaps = np.flatnonzero(steps > GAP_INTERVALS * interval + 1e-9)
+    if len(gaps) and steps[gaps].max() > _LONGEST_GAP:
+        worst = gaps[np.argmax(steps[gaps])]
+        raise InputError(
+            name, f"nothing between {times[worst]:g} and {times[worst + 1]:g} s", "gaps of an hour at most", "cut the track"
+        )
+    new = [np.linspace(times[i], times[i + 1], int(round(steps[i] / interval)) + 1)[1:-1] for i in gaps]
+    at = np.repeat(gaps + 1, [len(piece) for piece in new])
+    if not len(at):
+        return times, positions, ball
+    blank = np.nan
+    return np.insert(times, at, np.concatenate(new)), np.insert(positions, at, blank, 0), np.insert(ball, at, blank, 0)
+
+
+def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
+    """(N,) bool samples not to be believed, and the times of steps too large to be repaired; all positions are numbers."""
+    wrong = _spikes(times, positions)
+    left = np.flatnonzero(~wrong)
+    jumps, excess = _jumps(times[left], positions[left])
+    too_far, used = [], set()
+    for place, jump in enumerate(jumps):
+        if jump in used:
+            continue
+        back = _return(times[left], jumps, excess, place)
+        if back is not None:
+            used.add(back)
+            wrong[left[jump + 1 : back + 1]] = True
+        elif np.linalg.norm(excess[place]) > _SNAP_LIMIT:
+            too_far.append(float(times[left[jump + 1]]))
+        else:
+            wrong[left[_coasted(times[left], positions[left], jump, float(np.linalg.norm(excess[place])))]] = True
+    return wrong, tuple(too_far)
+
+
+def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """(N,) bool: single samples far off the line between their neighbours, while the neighbours' own lines are better.
+
+    A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it off
+    theirs equally, so neither stands out and steps are left to `_jumps`.
+    """
+    wrong = np.zeros(len(times), dtype=bool)
+    if len(times) < 3:
+        return wrong
+    span = times[2:] - times[:-2]
+    share = ((times[1:-1] - times[:-2]) / span)[:, None]
+    off = np.linalg.norm(positions[1:-1] - positions[:-2] * (1 - share) - positions[2:] * share, axis=1)
+    beside = np.pad(off, 1)
+    wrong[1:-1] = (off > _SPIKE + _HARDEST / 8.0 * span**2) & (off > 1.5 * np.maximum(beside[:-2], beside[2:]))
+    return wrong
+
+
+def _jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
+    """Steps that no player takes: indices j (the step is from sample j to j+1), and each one's excess (len, 2) metres over
+    the median velocity of the 0.6 s (7 samples at least) around it."""
+    steps = np.diff(times)
+    if len(steps) < 3:
+        return [], np.zeros((0, 2))
+    velocity = np.diff(positions, axis=0) / steps[:, None]
+    half = int(max(3, round(0.3 / np.median(steps))))
+    padded = np.pad(velocity, ((half, half), (0, 0)), mode="reflect" if half < len(steps) else "edge")
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0), axis=2)
+    excess = (velocity - usual) * steps[:, None]
+    short = steps <= GAP_INTERVALS * np.median(steps) + 1e-9
+    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > _SPIKE + _HARDEST / 3.0 * steps))
+    return jumps.tolist(), excess[jumps]
+
+
+def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int) -> int | None:
+    """The later jump within half a second that takes back the jump number `place`, if there is one."""
+    for other in range(place + 1, len(jumps)):
+        if times[jumps[other]] - times[jumps[place]] > _EXCURSION:
+            break
+        if np.linalg.norm(excess[place] + excess[other]) < 0.5 * np.linalg.norm(excess[place]):
+            return jumps[other]
+    return None
+
+
+def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
+    """Indices of the samples up to `jump` that are not believed: as many as making up for `size` metres takes, and on back
+    while they lie on an exact line. The first sample of such a line is where the player was last seen, and is kept.
+    """
+    before = times[jump] - times[: jump + 1]
+    first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
+    for start in range(min(first, jump - 3), -1, -1):
+        if before[start] > _COAST[1] or not _on_a_line(times[start : jump + 1], positions[start : jump + 1]):
+            break
+        first = start
+    return np.arange(max(first + 1, 1), jump + 1)
+
+
+def _on_a_line(times: np.ndarray, positions: np.ndarray) -> bool:
+    """Whether the samples keep one velocity up to the feed's rounding."""
+    basis = np.column_stack([np.ones(len(times)), times - times[0]])
+    line = basis @ np.linalg.lstsq(basis, positions, rcond=None)[0]
+    return bool(np.abs(positions - line).max() <= _COAST_EXACT)
+
+
+def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> np.ndarray:
+    """(N, 2): the believed positions, and a cubic between them everywhere else."""
+    out = positions.copy()
+    for start, stop in _runs(~believed):
+        before = _end_state(times, positions, believed, start - 1, -1)
+        after = _end_state(times, positions, believed, stop, +1)
+        out[start:stop] = _cubic(times[start:stop], before, after)
+    return out
+
+
+def _end_state(times, positions, believed, index: int, direction: int):
+    """(time, position, velocity) of the believed sample `index`, velocity over the believed samples beside it; or None."""
+    if not 0 <= index < len(times):
+        return None
+    members = [index]
+    while 0 <= (other := members[-1] + direction) < len(times) and believed[other]:
+        if abs(times[other] - times[index]) > _LEAN and len(members) > 1:
+            break
+        members.append(other)
+    moment = times[members] - np.mean(times[members])
+    place = positions[members] - np.mean(positions[members], axis=0)
+    velocity = moment @ place / max(moment @ moment, 1e-12)
+    speed = np.linalg.norm(velocity)
+    return times[index], positions[index], velocity * min(1.0, FASTEST / max(speed, 1e-9))
+
+
+def _cubic(at: np.ndarray, before, after) -> np.ndarray:
+    """(len(at), 2): Hermite cubic from one end state to the other; beyond the track's ends, a velocity that dies away."""
+    if before is None or after is None:
+        time, place, velocity = before or after
+        away = at - time
+        return place + velocity * np.sign(away)[:, None] * (0.25 * (1.0 - np.exp(-np.abs(away) / 0.25)))[:, None]
+    (t0, p0, v0), (t1, p1, v1) = before, after
+    length = t1 - t0
+    if length > 1.0:
+        most = 3.0 * np.linalg.norm(p1 - p0) / length
+        v0, v1 = (v * min(1.0, most / max(np.linalg.norm(v), 1e-9)) for v in (v0, v1))
+    s = ((at - t0) / length)[:, None]
+    return (
+        p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s)
+    )
+
+
+def _report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
+    interval = track.interval
+    believed = np.flatnonzero(track.measured)
+    wide = np.flatnonzero(np.diff(track.times[believed]) > GAP_INTERVALS * interval + 1e-9)
+    gaps = tuple((float(track.times[believed[i]]), float(track.times[believed[i + 1]])) for i in wide)
+    warnings = [f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}"] if snaps else []
+    speed = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
+    fast = track.times[1:][speed > FASTEST]
+    if len(fast):
+        warnings.append(f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}")
+    warnings += [f"no samples from {a:.2f} to {b:.2f} s" for a, b in gaps if b - a > 1.0]
+    lines = list(notes)
+    for count, what, where in (
+        (track.filled.sum(), "samples filled", track.times[track.filled]),
+        (track.outlier.sum(), "outliers replaced", track.times[track.outlier]),
+    ):
+        if count:
+            lines.append(f"{count} {what}: {_stretches(where, interval)}")
+    unknown = int(np.count_nonzero(~np.isfinite(track.ball[:, :2]).all(axis=1)))
+    if 0 < unknown < len(track):
+        lines.append(f"ball unknown in {unknown} of {len(track)} samples")
+    return DataReport(
+        lines=(*lines, *warnings),
+        rate=1.0 / interval,
+        dropped=dropped,
+        merged=merged,
+        filled=int(track.filled.sum()),
+        outliers=int(track.outlier.sum()),
+        gaps=gaps,
+        ball_unknown=unknown,
+        warnings=tuple(warnings),
+    )
+
+
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """(start, stop) of every run of True in flags (N,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+
+
+def _places(times, most: int = 5) -> str:
+    """The first few of some times, in words."""
+    named = ", ".join(f"{time:.2f}" for time in list(times)[:most])
+    return f"{named} s" + (f" and {len(times) - most} more" if len(times) > most else "")
+
+
+def _stretches(times: np.ndarray, interval: float) -> str:
+    """Times (N,) as stretches of neighbouring samples, in words."""
+    starts = np.flatnonzero(np.diff(times, prepend=-np.inf) > 1.5 * interval)
+    ends = [*(starts[1:] - 1), len(times) - 1]
+    named = [f"{times[a]:.2f}" if a == b else f"{times[a]:.2f}-{times[b]:.2f}" for a, b in zip(starts, ends)]
+    return ", ".join(named[:5]) + " s" + (f" and {len(named) - 5} more" if len(named) > 5 else "")

@@ -1,0 +1,100 @@
+"""The samples of one tracked player and the ball, as a feed delivers them (`Track`) and at a rate of ours (`SampledTrack`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from ..skeleton import frozen_array
+
+BALL_RADIUS = 0.11
+"""Metres; where a feed gives no height, the ball's centre lies this high."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One player's samples, N of them.
+
+    times: (N,) seconds. positions: (N, 2) metres on the pitch, origin its centre, x along its length, y to the left of +x.
+    ball: (N, 3) metres, the ball's centre, NaN where unknown (z alone may be unknown); None means no ball.
+    ball_height_known: (N,) bool, False where the feed has no height; None means wherever z is a number.
+    filled: (N,) bool, put in by `clean` because the feed had nothing. outlier: (N,) bool, replaced by `clean` because the
+    feed was wrong; None means none. name: who this is, for messages. Arrays are read-only copies.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    ball: np.ndarray | None = None
+    ball_height_known: np.ndarray | None = None
+    filled: np.ndarray | None = None
+    outlier: np.ndarray | None = None
+    name: str = "track"
+
+    def __post_init__(self):
+        times = frozen_array(self.times).reshape(-1)
+        count = len(times)
+        arrays = {
+            "positions": (self.positions, (count, 2), float),
+            "ball": (np.full((count, 3), np.nan) if self.ball is None else self.ball, (count, 3), float),
+            "filled": (np.zeros(count, bool) if self.filled is None else self.filled, (count,), bool),
+            "outlier": (np.zeros(count, bool) if self.outlier is None else self.outlier, (count,), bool),
+        }
+        if self.ball_height_known is None:
+            known = np.isfinite(np.asarray(arrays["ball"][0], dtype=float)[..., -1])
+        else:
+            known = self.ball_height_known
+        arrays["ball_height_known"] = (known, (count,), bool)
+        object.__setattr__(self, "times", times)
+        for name, (values, shape, kind) in arrays.items():
+            array = frozen_array(values, kind)
+            if array.shape != shape:
+                raise InputError(self.name, f"{name} of shape {array.shape}", f"{shape}")
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def measured(self) -> np.ndarray:
+        """(N,) bool: positions that the feed itself has and that are believed."""
+        return ~(self.filled | self.outlier) & np.isfinite(self.positions).all(axis=1)
+
+    @property
+    def interval(self) -> float:
+        """Median seconds from one sample to the next."""
+        steps = np.diff(np.unique(self.times[np.isfinite(self.times)]))
+        return float(np.median(steps)) if len(steps) else np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class SampledTrack:
+    """A track at an even rate, T frames; frame 0 is the track's first time. Arrays are read-only.
+
+    times: (T,) seconds on the track's clock. positions: (T, 2) metres, smoothed. raw: (T, 2) metres, the measured samples
+    linearly interpolated (what errors are measured against). velocity: (T, 2) m/s of the smoothed positions. speed: (T,) m/s.
+    direction: (T,) radians from +x, of travel, unwrapped; holds while the player stands. valid: (T,) bool, False within a
+    long gap, where nobody knows what the player did (and which is not standing). ball: (T, 3) metres, NaN where there is no
+    ball at all. ball_measured: (T,) bool, False where it lies between samples too far apart. fps: frames per second.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    raw: np.ndarray
+    velocity: np.ndarray
+    speed: np.ndarray
+    direction: np.ndarray
+    valid: np.ndarray
+    ball: np.ndarray
+    ball_measured: np.ndarray
+    fps: float
+
+    def __post_init__(self):
+        for name in ("times", "positions", "raw", "velocity", "speed", "direction", "ball"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name)))
+        for name in ("valid", "ball_measured"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), bool))
+
+    def __len__(self) -> int:
+        return len(self.times)
