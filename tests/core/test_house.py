@@ -37,7 +37,7 @@ ROOMS = {
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
 LAZY = {
-    "library": ["sklearn"],
+    "library": ["sklearn", "threadpoolctl"],
     "files": ["kloppy"],
     "evaluation": ["matplotlib"],
     "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn"],
