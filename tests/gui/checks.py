@@ -158,14 +158,16 @@ def press_all(wanted=None):
     while more:
         found = yield from window.buttons(area, region)
         while new := [call for call in found if call not in pressed and (wanted is None or call in wanted)]:
-            pressed.add(new[0])
-            yield from press_one(area, region, new[0], found[new[0]])
+            for call in new:  # a press may move the others: then they are looked for again
+                if (yield from window.points_at(area, region, found[call])) == call:
+                    pressed.add(call)
+                    yield from press_one(call, found[call])
             found = yield from window.buttons(area, region)
         more = yield from window.scroll(region)
     return pressed
 
 
-def press_one(area, region, call, place):
+def press_one(call, place):
     """Press the button that stood there, and tell what came of it."""
     yield from window.click(*place)
     yield 0.3

@@ -95,16 +95,19 @@ class Window:
                 bpy.ops.ui.copy_python_command_button()
         return manager.clipboard
 
+    def points_at(self, area, region, place):
+        """Move to this place; return the call of the button there, or ""."""
+        yield from self.move(*place)
+        return self.command_under_pointer(area, region)
+
     def buttons(self, area, region, step=9):
         """Move over all that the region shows; return each operator's button: its call -> where it is."""
         found = {}
         columns = [region.x + int(region.width * share) for share in (0.15, 0.4, 0.65, 0.85)]
         for y in range(region.y + region.height - 8, region.y + 4, -step):
             for x in columns:
-                yield from self.move(x, y)
-                call = self.command_under_pointer(area, region)
-                if call:
-                    found.setdefault(call, (x, y - 2))
+                if call := (yield from self.points_at(area, region, (x, y))):
+                    found.setdefault(call, (x, y))
         return found
 
     def scroll(self, region):
