@@ -1,0 +1,178 @@
+"""Published figures of walking and running, from standing to 9.5 m/s, for an adult with a leg (thigh plus shank) of 0.87 m.
+
+Sources, by the letters used below. Where authors differ or a speed lies between theirs, the value is a smooth line through them.
+  G  Grieve and Gear 1966, Ergonomics 9: relation of cadence and stride length to walking speed
+  W  Winter 1991, "The biomechanics and motor control of human gait": joint angles over the cycle, natural cadence
+  M  Murray, Drought and Kory 1964, J Bone Joint Surg 46-A; Murray 1967: sway, pelvis, arms, foot angles of walking men
+  N  Nilsson and Thorstensson 1987, Acta Physiol Scand 129; Nilsson, Thorstensson and Halbertsma 1985, ibid 123: support and
+     swing phases, leg movements from 1 to 9 m/s
+  V  Novacheck 1998, Gait and Posture 7: "The biomechanics of running" (joint angles of walking, running, sprinting)
+  D  Dorn, Schache and Pandy 2012, J Exp Biol 215: stride length and frequency, contact times from 3.5 to 9 m/s
+  Y  Weyand, Sternlight, Bellizzi and Wright 2000, J Appl Physiol 89: contact, aerial and swing times up to top speed
+  H  Hinrichs 1987, Int J Sport Biomech 3: the arms in running
+  T  Thorstensson 1986, Exp Brain Res 61: backward walking is forward walking run backwards
+  L  Morin, Dalleau, Kyrolainen, Jeannin and Belli 2005, J Appl Biomech 21: the sine-wave model of the ground reaction
+
+Angles in degrees here, radians outside. Speeds in m/s.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+LEG = 0.873
+GRAVITY = 9.81
+FASTEST = 9.5
+# walking turns into running here (N: spontaneous change at 1.9 to 2.3 m/s)
+_CHANGE = (1.95, 2.35)
+
+_SPEEDS = {
+    # strides per second: G below 2 (cadence grows as the root of speed), N and D above
+    "frequency": [(0, 0.55), (0.3, 0.58), (0.7, 0.72), (1.0, 0.83), (1.4, 0.96), (1.8, 1.08), (2.1, 1.22), (2.5, 1.30),
+                  (3.5, 1.38), (5.2, 1.53), (7.0, 1.76), (8.0, 1.96), (9.0, 2.17), (9.5, 2.28)],
+    # share of the stride that a foot is on the ground: N, W below the change; contact times of D, Y times frequency above
+    "duty": [(0, 0.78), (0.4, 0.72), (0.8, 0.665), (1.4, 0.62), (1.9, 0.585), (2.15, 0.48), (2.5, 0.40), (3.0, 0.365),
+             (3.5, 0.33), (4.2, 0.305), (5.2, 0.28), (7.0, 0.25), (8.0, 0.24), (9.0, 0.235), (9.5, 0.235)],
+    # knee flexion in the middle of stance: W, V, N
+    "knee_mid": [(0, 6), (0.5, 8), (1.4, 14), (1.9, 20), (2.3, 34), (2.8, 39), (3.5, 42), (5.2, 40), (7, 37), (9, 34), (9.5, 33)],
+    # forward lean of the trunk (pelvis and spine together): V, and sprinters on video
+    "lean": [(0, 0), (1.4, 3), (2.3, 5.5), (3.5, 8), (5.2, 9), (7, 9), (9.5, 8)],
+    # anterior tilt of the pelvis, part of that lean: V
+    "tilt": [(0, 0), (1.4, 2), (2.3, 5), (3.5, 7), (5.2, 9), (7, 10), (9.5, 11)],
+    # turn of the pelvis about the vertical to either side: M (4 to 5), V and N above
+    "pelvis_turn": [(0, 0), (0.5, 2), (1.4, 5), (2.0, 7), (2.5, 5), (3.5, 5.5), (5.2, 8), (7, 9), (9.5, 11)],
+    # turn of the shoulders against it
+    "chest_turn": [(0, 0), (0.5, 2), (1.4, 5), (2.0, 7), (2.5, 9), (3.5, 11), (5.2, 14), (7, 15), (9.5, 16)],
+    # list: the swing side's hip drops: M 4 to 5 each way, V 5 to 6
+    "list": [(0, 0), (0.5, 1.5), (1.4, 3.6), (2.0, 4), (3.5, 4.5), (5.2, 5), (9.5, 5)],
+    # side sway of the pelvis to either side, metres: M
+    "sway": [(0, 0), (0.4, 0.030), (1.4, 0.019), (2.0, 0.014), (2.5, 0.008), (9.5, 0.004)],
+    # vertical travel of the pelvis up and down from its middle, metres, walking only (running: L)
+    "bob": [(0, 0), (0.5, 0.006), (1.0, 0.014), (1.4, 0.021), (1.9, 0.029), (2.3, 0.034), (9.5, 0.034)],
+    # distance between the feet's lines, metres: M (8 cm between heels), less in running
+    "width": [(0, 0.20), (0.3, 0.16), (0.8, 0.12), (1.4, 0.095), (2.0, 0.085), (2.5, 0.075), (3.5, 0.06), (5.2, 0.045), (9.5, 0.03)],
+    # outward turn of the feet: M (7), nearly straight in running
+    "toe_out": [(0, 14), (0.4, 10), (1.4, 7), (2.5, 6), (3.5, 5), (9.5, 2)],
+    # where the flat foot's ankle lies relative to the hips in the middle of stance, metres: from the angles of W, V, N
+    "ahead": [(0, -0.02), (0.7, -0.055), (1.4, -0.085), (2.0, -0.10), (2.5, -0.075), (3.5, -0.095), (5.2, -0.13), (7, -0.15),
+              (9.5, -0.17)],
+    # arms: upper arm to and fro (half range) and its middle, forward positive: M (walking), H (running)
+    "arm_swing": [(0, 0), (0.5, 8), (1.4, 19), (2.0, 26), (2.5, 21), (3.5, 27), (5.2, 36), (7, 44), (9.5, 50)],
+    "arm_middle": [(0, 1), (1.4, -4), (2.0, -5), (2.5, -14), (3.5, -15), (5.2, -14), (7, -10), (9.5, -6)],
+    # elbow flexion, middle and half range: M (20 to 40 in walking), H
+    "elbow": [(0, 14), (1.4, 23), (1.9, 33), (2.4, 76), (3.5, 90), (5.2, 94), (9.5, 92)],
+    "elbow_swing": [(0, 0), (0.7, 4), (1.4, 9), (2.0, 12), (2.5, 8), (3.5, 10), (5.2, 15), (7, 22), (9.5, 27)],
+    "abduct": [(0, 9), (1.4, 8.5), (2.5, 14), (3.5, 16), (9.5, 17)],
+    "inward": [(0, 12), (1.4, 14), (2.0, 18), (2.5, 34), (3.5, 34), (7, 24), (9.5, 18)],
+}
+
+
+@lru_cache(maxsize=None)
+def _curve(name: str) -> PchipInterpolator:
+    x, y = zip(*_SPEEDS[name])
+    return PchipInterpolator(x, y, extrapolate=False)
+
+
+def at_speed(name: str, speed: np.ndarray) -> np.ndarray:
+    """The figure `name` of the table at `speed` (...,) m/s, clamped to 0 .. 9.5: degrees, metres or Hz as the table says."""
+    return _curve(name)(np.clip(speed, 0.0, FASTEST))
+
+
+def run_share(speed: np.ndarray) -> np.ndarray:
+    """How far running has replaced walking at `speed` (...,) m/s: 0 .. 1."""
+    return smooth_step((np.asarray(speed) - _CHANGE[0]) / (_CHANGE[1] - _CHANGE[0]))
+
+
+def smooth_step(x: np.ndarray) -> np.ndarray:
+    """0 below 0, 1 above 1, and a quintic with still ends between (Perlin 2002)."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (x * (6.0 * x - 15.0) + 10.0)
+
+
+# The swinging leg: thigh against the vertical (forward positive), knee flexion, ankle (dorsiflexion positive), in degrees, at
+# shares of the swing. Thigh = hip flexion less pelvic tilt. Walking W at 60 .. 100 % of the cycle; running (3.2 m/s) and
+# sprinting (9 m/s) V at 39 .. 100 and 22 .. 100 %, with N for the height of the heel; jogging between.
+_SWING_AT = (0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+_SWING = {
+    # speed: thigh, knee, ankle
+    1.4: ((-12, -3, 8, 17, 23, 25.5, 25, 22.5, 20), (42, 57, 63, 59, 47, 30, 14, 4, 5), (-17, -12, -5, 0, 2, 2, 1, 0, 0)),
+    2.6: ((-20, -14, -2, 12, 24, 31, 32, 28, 24), (32, 58, 78, 84, 77, 58, 34, 15, 13), (-22, -17, -8, -1, 3, 5, 6, 5, 4)),
+    3.6: ((-24, -19, -4, 14, 29, 38, 39, 34, 29), (24, 56, 84, 97, 92, 71, 41, 18, 15), (-25, -20, -10, -3, 2, 5, 6, 6, 4)),
+    9.0: ((-27, -20, 2, 28, 52, 66, 64, 48, 33), (24, 66, 108, 128, 122, 92, 56, 28, 24), (-28, -22, -10, -2, 4, 6, 4, -2, -6)),
+}
+
+
+@lru_cache(maxsize=None)
+def _swing_curves() -> tuple[np.ndarray, CubicSpline]:
+    table = np.array([_SWING[v] for v in sorted(_SWING)], dtype=float)
+    return np.array(sorted(_SWING)), CubicSpline(_SWING_AT, table.transpose(2, 0, 1), axis=0)
+
+
+def swing_angles(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Thigh, knee and ankle angle (..., 3) in radians at a share (...,) of the swing, for a speed (...,) in m/s."""
+    share, speed = np.broadcast_arrays(share, speed)
+    speeds, spline = _swing_curves()
+    values = spline(np.clip(share, 0.0, 1.0))
+    position = np.interp(speed, speeds, np.arange(len(speeds)))
+    weights = np.maximum(0.0, 1.0 - np.abs(position[..., None] - np.arange(len(speeds))))
+    return np.radians(np.einsum("...s,...sa->...a", weights, values))
+
+
+# The standing foot: pitch of the sole (toes down positive) in degrees at shares of the stance. W and M (heel strike at 20,
+# toe-off beyond 60), V (rearfoot runners), N and sprinters on video (forefoot: the heel never quite comes down).
+_STANCE_AT = (0, 0.06, 0.14, 0.25, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+_STANCE = {
+    1.4: (-19, -11, -2, 0, 0, 0.5, 3, 9, 20, 38, 62),
+    2.6: (-8, -4, -0.5, 0, 0, 1, 5, 13, 26, 44, 64),
+    3.6: (-6, -2, 0, 0, 0.5, 2.5, 8, 18, 32, 50, 68),
+    9.0: (8, 7, 6, 6, 8, 12, 19, 29, 42, 56, 70),
+}
+
+
+@lru_cache(maxsize=None)
+def _stance_curves() -> tuple[np.ndarray, PchipInterpolator]:
+    table = np.array([_STANCE[v] for v in sorted(_STANCE)], dtype=float)
+    return np.array(sorted(_STANCE)), PchipInterpolator(_STANCE_AT, table.T, axis=0)
+
+
+def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Pitch of the sole (...,) in radians, toes down positive, at a share (...,) of the stance, for a speed (...,) in m/s."""
+    speeds, curve = _stance_curves()
+    values = curve(np.clip(share, 0.0, 1.0))
+    position = np.interp(speed, speeds, np.arange(len(speeds)))
+    weights = np.maximum(0.0, 1.0 - np.abs(position[..., None] - np.arange(len(speeds))))
+    return np.radians(np.sum(weights * values, axis=-1))
+
+
+@lru_cache(maxsize=None)
+def _bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Height of a mass over one step for duty factors (share of the step): the sine-wave model L, by integrating twice."""
+    duties = np.linspace(0.40, 1.0, 25)
+    phase = np.linspace(0.0, 1.0, 241)
+    heights = np.empty((len(duties), len(phase)))
+    for row, duty in enumerate(duties):
+        force = np.where(phase < duty, 0.5 * np.pi / duty * np.sin(np.pi * phase / duty), 0.0) - 1.0
+        speed = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]))]) / (len(phase) - 1)
+        speed -= np.mean(0.5 * (speed[1:] + speed[:-1]))
+        height = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / (len(phase) - 1)
+        height -= height[-1] * phase
+        heights[row] = height - np.mean(0.5 * (height[1:] + height[:-1]))
+    return duties, phase, heights
+
+
+def bounce(step_phase: np.ndarray, contact_share: np.ndarray, step_time: np.ndarray) -> np.ndarray:
+    """Height of the body over its mean, metres, in running (L): contact from step phase 0 to `contact_share`, then flight.
+
+    step_phase (...,) 0 .. 1 from a foot's contact, contact_share (...,) of the step, step_time (...,) seconds.
+    """
+    duties, phase, heights = _bounce_table()
+    row = np.interp(contact_share, duties, np.arange(len(duties)))
+    column = (np.asarray(step_phase) % 1.0) * (len(phase) - 1)
+    low_row, low_column = np.minimum(row.astype(int), len(duties) - 2), np.minimum(column.astype(int), len(phase) - 2)
+    a, b = row - low_row, column - low_column
+    value = (1 - a) * ((1 - b) * heights[low_row, low_column] + b * heights[low_row, low_column + 1])
+    value = value + a * ((1 - b) * heights[low_row + 1, low_column] + b * heights[low_row + 1, low_column + 1])
+    return value * GRAVITY * step_time**2

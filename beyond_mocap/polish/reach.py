@@ -1,0 +1,136 @@
+"""Limbs that reach: two-bone inverse kinematics on a skeleton, over all frames at once, without stretching a bone.
+
+Feet are kept on the ground and striking feet brought to the ball with it. The knee keeps the plane in which it bends in the
+pose that is given; where the limb is so straight that it shows none, the plane comes from the frames where it is bent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion import limb, quaternion
+from ..motion.motion import pose_kinematics
+from ..motion.skeleton import Skeleton
+
+# below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
+_CLEAR_BEND = 0.06
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """What came of it. rotations (T, J, 4) local, miss (T,) metres between the end joint and its target."""
+
+    rotations: np.ndarray
+    miss: np.ndarray
+
+
+def two_bone(
+    skeleton: Skeleton,
+    root: np.ndarray,
+    rotations: np.ndarray,
+    joints: tuple[int, int, int],
+    target: np.ndarray,
+    *,
+    end_rotation: np.ndarray | None = None,
+    keep_end_rotation: bool = True,
+    pole: np.ndarray | None = None,
+    soft: float = 0.01,
+) -> Reached:
+    """Local rotations with which a limb's end joint is at `target`.
+
+    root (T, 3) metres, world; rotations (T, J, 4) local; joints: upper, middle and end joint (hip, knee, ankle or shoulder,
+    elbow, wrist), each below the one before, further joints between allowed; target (T, 3) metres, world.
+    end_rotation (T, 4): world rotation that the end joint gets; without it the end joint keeps its own, or (with
+    keep_end_rotation false) turns rigidly with the lower bone. pole (T, 3): world direction in which the middle joint
+    points; without it the pose's own. soft: metres below full extension from where the limb eases, see
+    `limb.soft_distance`: the miss is at most soft / e = 0.37 soft where the target is in reach.
+
+    Bones are never stretched; a target out of reach is neared along the line from the upper joint.
+    Raises InputError where a joint does not hang below the one before. Source: `motion.limb`.
+    """
+    _check_chain(skeleton, joints)
+    upper, middle, end = joints
+    target = np.asarray(target, dtype=float)
+    places, world = pose_kinematics(skeleton, root, rotations)
+    top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
+    lengths = (np.linalg.norm(knee - top, axis=-1), np.linalg.norm(ankle - knee, axis=-1))
+    old_pole = _own_pole(top, knee, ankle, world[:, upper])
+    swing = quaternion.between(ankle - top, target - top)
+    new_pole = quaternion.rotate(swing, old_pole) if pole is None else np.asarray(pole, dtype=float)
+    new_knee, new_ankle, new_hinge = limb.bend(top, target, *lengths, new_pole, soft)
+    old_hinge = quaternion.cross(limb.unit(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
+    turns = [
+        quaternion.multiply(_frame(b - a, new_hinge), quaternion.inverse(_frame(d - c, old_hinge)))
+        for a, b, c, d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
+    ]
+    out = np.array(rotations, dtype=float)
+    new_world = world.copy()
+    _turn_chain(skeleton, new_world, upper, middle, turns[0])
+    _turn_chain(skeleton, new_world, middle, end, turns[1])
+    if end_rotation is not None:
+        new_world[:, end] = end_rotation
+    elif not keep_end_rotation:
+        new_world[:, end] = quaternion.multiply(turns[1], world[:, end])
+    for joint in _between(skeleton, upper, end) + [end]:
+        out[:, joint] = _local(skeleton, new_world, joint)
+    return Reached(quaternion.continuous(out), np.linalg.norm(new_ankle - target, axis=-1))
+
+
+def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
+    upper, middle, end = joints
+    for high, low in ((upper, middle), (middle, end)):
+        if high == low or high not in _ancestors(skeleton, low):
+            raise InputError("limb", f"{skeleton.names[low]} does not hang below {skeleton.names[high]}", "a chain")
+
+
+def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joint and those above it, from below."""
+    chain = []
+    while joint >= 0:
+        chain.append(joint)
+        joint = skeleton.parents[joint]
+    return chain
+
+
+def _between(skeleton: Skeleton, high: int, low: int) -> list[int]:
+    """Joints from `high` (included) down to `low` (not included)."""
+    chain = _ancestors(skeleton, low)
+    return chain[1 : chain.index(high) + 1][::-1]
+
+
+def _turn_chain(skeleton: Skeleton, world: np.ndarray, high: int, low: int, turn: np.ndarray) -> None:
+    for joint in _between(skeleton, high, low):
+        world[:, joint] = quaternion.multiply(turn, world[:, joint])
+
+
+def _local(skeleton: Skeleton, world: np.ndarray, joint: int) -> np.ndarray:
+    parent = skeleton.parents[joint]
+    return world[:, joint] if parent < 0 else quaternion.multiply(quaternion.inverse(world[:, parent]), world[:, joint])
+
+
+def _frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
+    return limb.bone_frame(limb.unit(direction, np.array([0.0, 0.0, -1.0])), hinge)
+
+
+def _own_pole(top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray) -> np.ndarray:
+    """Direction (T, 3) in which the middle joint points in the given pose, unit, square to the line top-ankle.
+
+    A nearly straight limb says little: there the direction is mixed with the mean one of all frames, carried by the upper
+    bone (a knee is a hinge), weighted by how clearly each frame shows it.
+    """
+    line = limb.unit(ankle - top, np.array([0.0, 0.0, -1.0]))
+    off = knee - top - np.sum((knee - top) * line, axis=-1, keepdims=True) * line
+    length = np.linalg.norm(knee - top, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
+    bent = (np.linalg.norm(off, axis=-1) / np.maximum(length, 1e-9))[:, None]
+    in_bone = quaternion.rotate(quaternion.inverse(upper_world), off)
+    mean = np.sum(in_bone * bent, axis=0)
+    if np.linalg.norm(mean) < 1e-9:
+        return limb.unit(off, limb.unit(np.array([1.0, 0.0, 0.0]) - line[..., :1] * line, np.array([0.0, 0.0, 1.0])))
+    steady = quaternion.rotate(upper_world, mean / np.linalg.norm(mean))
+    steady = limb.unit(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
+    weight = np.clip(bent / _CLEAR_BEND, 0.0, 1.0) ** 2
+    mixed = weight * limb.unit(off, steady) + (1.0 - weight) * steady
+    return limb.unit(mixed, steady)
