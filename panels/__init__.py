@@ -5,30 +5,26 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 
 import bpy
 
+from . import library, menus, players, result, synthesis
 
-class BEYOND_MOCAP_PT_tab(bpy.types.Panel):
-    """The tab itself, named with the extension's version."""
-
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Beyond Mocap"
-    bl_label = "Beyond Mocap"
-
-    def draw(self, context):
-        """Say in one line what the tab is for."""
-        self.layout.label(text="From tracked dots to moving bodies", icon="ARMATURE_DATA")
-
-
-CLASSES = (BEYOND_MOCAP_PT_tab,)
+CLASSES = (
+    library.BEYOND_MOCAP_PT_library,
+    players.BEYOND_MOCAP_UL_players,
+    players.BEYOND_MOCAP_PT_players,
+    synthesis.BEYOND_MOCAP_PT_synthesis,
+    result.BEYOND_MOCAP_PT_result,
+)
 
 
 def register():
-    """Register the panels, in order."""
+    """Register the panels, in order, and the entries of the File menu."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    menus.register()
 
 
 def unregister():
-    """Unregister the panels, the last one first."""
+    """Take the menu entries away and unregister the panels, the last one first."""
+    menus.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -1,21 +1,37 @@
-"""Blender's own data: what the core's motions, tracks and clips become in a file.
+"""Blender's own data: what the core's motions, tracks and clips become in a file. No buttons here.
 
-No buttons here. The classes are registered in the order of CLASSES: what others
-point to comes first.
+- `measure`     metres and seconds against the scene's units and frames
+- `armature`, `action`   skeletons and motions, both ways
+- `channels`    curves in bulk; alone knows slots and channelbags
+- `body`, `ball`, `curve`, `stage`, `material`   what is seen
+- `settings`    what the panels show, per scene; `session` what lives as long as Blender runs
+- `tracks`, `plans`   the settings as tracks and plans of the core
+- `bake`        a take becomes all of that
+- `background`  long work in a thread
+
+The classes are registered in the order of CLASSES: what others point to comes first.
 """
 
 import bpy
 
-CLASSES = ()
+from . import background, session, settings
+
+CLASSES = (settings.BeyondMocapPlayer, settings.BeyondMocapSettings, settings.BeyondMocapWork)
 
 
 def register():
-    """Register the data classes, in order."""
+    """Register the data classes, in order, and hang the settings on every scene."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    bpy.types.Scene.beyond_mocap = bpy.props.PointerProperty(type=settings.BeyondMocapSettings)
+    bpy.types.WindowManager.beyond_mocap_work = bpy.props.PointerProperty(type=settings.BeyondMocapWork)
 
 
 def unregister():
-    """Unregister the data classes, the last one first."""
+    """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    background.stop()
+    session.clear()
+    del bpy.types.WindowManager.beyond_mocap_work
+    del bpy.types.Scene.beyond_mocap
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -16,10 +16,9 @@ def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: d
     """Give `target` a new action `name` and return it.
 
     frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n)). The action that
-    was there before is taken off and, where it was made here and nothing else uses it, removed.
+    was there before is kept in the file.
     """
     action = bpy.data.actions.new(name)
-    action["beyond_mocap"] = True
     slot = action.slots.new(id_type=target.id_type, name=target.name)
     bag = _channelbag(action, slot)
     keys = np.empty((len(frames), 2), np.float32)
@@ -38,14 +37,24 @@ def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: d
 
 
 def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> None:
-    """Play `action` on `target`, by `slot` or the first that fits; drop the old action if it was ours and is unused."""
+    """Play `action` on `target`, by `slot` or the first that fits; the action before is kept, even if unused."""
     bpy.context.view_layer.update()  # a slot given to an object that the depsgraph has not met yet crashes Blender
     data = target.animation_data_create()
-    old = data.action
+    if data.action is not None and data.action.users == 1:
+        data.action.use_fake_user = True
     data.action = action
     data.action_slot = slot or data.action_suitable_slots[0]
-    if old is not None and old != action and old.get("beyond_mocap") and not old.users:
-        bpy.data.actions.remove(old)
+
+
+def discard(target: bpy.types.Object, mark: str) -> None:
+    """Take off and remove the action that `target` plays, if it carries the custom property `mark` and nobody else uses it.
+
+    For results that are made again and again, so that they do not pile up in the file.
+    """
+    action, _ = playing(target)
+    if action is not None and action.get(mark) and action.users - action.use_fake_user == 1:
+        target.animation_data.action = None
+        bpy.data.actions.remove(action)
 
 
 def playing(target: bpy.types.Object):

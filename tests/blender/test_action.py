@@ -97,18 +97,21 @@ def test_other_rotation_modes_are_read(core, rooms, body, mode):
         np.testing.assert_allclose(posed, positions[frame - 1], atol=1e-6)
 
 
-def test_writing_again_leaves_no_orphan(core, rooms, body):
-    for _ in range(3):
-        rooms["action"].write(body, made.motion(core), bpy.context.scene, name="Take")
-    assert [action.name for action in bpy.data.actions] == ["Take"] or len(bpy.data.actions) == 1
-
-
-def test_the_users_own_action_is_not_removed(core, rooms, body):
+def test_the_action_before_is_kept(core, rooms, body):
     body.keyframe_insert("location", frame=1)
-    own = body.animation_data.action
-    own.use_fake_user = False
+    before = body.animation_data.action
     rooms["action"].write(body, made.motion(core), bpy.context.scene)
-    assert own in list(bpy.data.actions)
+    assert before.use_fake_user and before in list(bpy.data.actions)
+
+
+def test_marked_results_do_not_pile_up(core, rooms, body):
+    for _ in range(3):
+        rooms["channels"].discard(body, "take")
+        rooms["action"].write(body, made.motion(core), bpy.context.scene, name="Take")["take"] = True
+    assert [action.name for action in bpy.data.actions] == ["Take"]
+    body.animation_data.action["take"] = False
+    rooms["channels"].discard(body, "take")
+    assert body.animation_data.action is not None
 
 
 def test_missing_things_are_named(core, rooms, body):

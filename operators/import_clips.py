@@ -1,0 +1,94 @@
+"""Import Motion Clips: BVH files, one, many or a folder of them, each as an armature with an action."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.files import bvh
+from ..beyond_mocap.library.scan import find_clips
+from ..scene import action, armature
+from .verb import Verb
+
+
+class BEYOND_MOCAP_OT_import_clips(Verb, bpy.types.Operator, ImportHelper):
+    """Import BVH motion clips as armatures; choose files, or a folder without a file for all below it"""
+
+    bl_idname = "beyond_mocap.import_clips"
+    bl_label = "Import Motion Clips"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    filename_ext = ".bvh"
+
+    filter_glob: StringProperty(default="*.bvh", options={"HIDDEN"})
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+    unit: FloatProperty(
+        name="Metres per unit", default=0.0, min=0.0, precision=5,
+        description="Size of one unit of the file in metres; 0 guesses it from the height of the hips",
+    )
+    reuse: BoolProperty(
+        name="Onto Selected Armature", default=False,
+        description="Add the clips' actions to the active armature where its bones are the same, instead of making new ones",
+    )
+
+    def invoke(self, context, event):
+        """Dropped files are imported at once; else the file browser opens."""
+        if self.directory and self.files:
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def paths(self) -> list[Path]:
+        """The chosen files; all below the chosen folder where no file is chosen."""
+        names = [file.name for file in self.files if file.name]
+        if names:
+            return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
+        chosen = Path(bpy.path.abspath(self.filepath or self.directory))
+        if str(chosen) == ".":
+            raise InputError("import", "no file given", "a .bvh file or a folder", "choose one")
+        return find_clips(chosen) if chosen.is_dir() else [chosen]
+
+    def do(self, context):
+        """Read all files, then make armatures."""
+        clips = [(path.stem, bvh.read(path, self.unit or None)) for path in self.paths()]
+        own = context.object if self.reuse and context.object and context.object.type == "ARMATURE" else None
+        if own is not None:
+            self.check_bones(own, clips, context.scene)
+        made = []
+        for name, clip in clips:
+            body = own or armature.create(context, clip.motion.skeleton, name, context.collection)
+            action.write(body, clip.motion, context.scene, name=name)
+            made.append(body)
+            for note in clip.notes:
+                self.report({"INFO"}, f"{name}: {note}")
+        for other in context.selected_objects:
+            other.select_set(False)
+        for body in made:
+            body.select_set(True)
+        context.view_layer.objects.active = made[-1]
+        self.report({"INFO"}, f"{len(made)} clips imported at the scene's frame rate")
+
+    @staticmethod
+    def check_bones(body, clips, scene):
+        """InputError where a clip has other bones than the armature."""
+        skeleton = armature.skeleton_of(body, scene)
+        for name, clip in clips:
+            if not clip.motion.skeleton.same_bones(skeleton, 5e-3):
+                raise InputError(name, f"other bones than {body.name}", "the same skeleton", "import it as a new armature")
+
+
+class BEYOND_MOCAP_FH_clips(bpy.types.FileHandler):
+    """BVH files dropped into a view"""
+
+    bl_idname = "BEYOND_MOCAP_FH_clips"
+    bl_label = "Motion clip"
+    bl_import_operator = "beyond_mocap.import_clips"
+    bl_file_extensions = ".bvh"
+
+    @classmethod
+    def poll_drop(cls, context):
+        """Where animators keep motions."""
+        return context.area is not None and context.area.type in {"VIEW_3D", "NLA_EDITOR", "DOPESHEET_EDITOR"}

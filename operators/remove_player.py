@@ -1,0 +1,27 @@
+"""Remove Player: take one off the list; what was baked stays."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.settings import active_player
+from .verb import Verb
+
+
+class BEYOND_MOCAP_OT_remove_player(Verb, bpy.types.Operator):
+    """Take the active player off the list; armature and action stay in the scene"""
+
+    bl_idname = "beyond_mocap.remove_player"
+    bl_label = "Remove Player"
+
+    @classmethod
+    def poll(cls, context):
+        """There is one."""
+        cls.poll_message_set("The list of players is empty")
+        return active_player(context.scene.beyond_mocap) is not None
+
+    def do(self, context):
+        """Remove it and choose its neighbour."""
+        settings = context.scene.beyond_mocap
+        settings.players.remove(settings.active_player)
+        settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))

@@ -1,0 +1,131 @@
+"""What all verbs share: trouble becomes a report with a cause and a next step, and long work may run in the background."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..beyond_mocap.errors import BeyondMocapError
+from ..scene import background
+
+
+class Verb:
+    """An operator whose `do(context)` does the work; where it raises, the trouble is reported and nothing has changed.
+
+    `do` reads and computes first and touches the scene last, so that a step that fails leaves the scene as it was.
+    """
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        """Do it now."""
+        return self.attempt(lambda: self.do(context))
+
+    def attempt(self, action):
+        """FINISHED where `action` runs through, else a report and CANCELLED."""
+        try:
+            action()
+        except BeyondMocapError as error:
+            return self.failed(str(error))
+        except OSError as error:
+            return self.failed(f"{error.filename or 'file'}: {error.strerror or error}; check the path and its permissions")
+        return {"FINISHED"}
+
+    def failed(self, message: str):
+        """Report an error."""
+        self.report({"ERROR"}, message)
+        return {"CANCELLED"}
+
+
+class BackgroundVerb(Verb):
+    """A verb in three parts, so that the middle one can run in a thread while the window stays alive.
+
+    `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled)`, a
+    static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called from a script
+    (`execute`) all three run at once, pressed as a button (`invoke`) the work goes to a thread and ESC cancels it.
+    """
+
+    kind = ""
+
+    def do(self, context):
+        """Order, work and apply in one go."""
+        window = context.window_manager
+        window.progress_begin(0, 100)
+        try:
+            result = self.work(self.order(context), lambda done, text: window.progress_update(int(100 * done)), lambda: False)
+        finally:
+            window.progress_end()
+        self.apply(context.scene, result)
+
+    def invoke(self, context, _event):
+        """Start the thread and come back later."""
+        if bpy.app.background:
+            return self.execute(context)
+        return self.started(context) if self.attempt(lambda: self.start(context)) == {"FINISHED"} else {"CANCELLED"}
+
+    def start(self, context):
+        """Collect the order and hand it to a thread."""
+        order, work = self.order(context), self.work
+        self.scene = context.scene.session_uid
+        self.job = background.Job(self.kind, lambda progress, cancelled: work(order, progress, cancelled))
+
+    def started(self, context):
+        """Begin to poll."""
+        windows = context.window_manager
+        self.timer = windows.event_timer_add(0.05, window=context.window)
+        windows.progress_begin(0, 100)
+        windows.modal_handler_add(self)
+        self.show(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Poll, pass on all other events, and write the result once it is there."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self.job.cancel()
+        elif event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        ended = self.job.poll()
+        if not ended and not self.job.stale:
+            self.show(context)
+            return {"RUNNING_MODAL"}
+        self.ended(context)
+        scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self.scene), None)
+        if background.cancelled(self.job) or scene is None:
+            self.report({"WARNING"}, f"{self.bl_label}: cancelled, nothing has changed")
+            return {"CANCELLED"}
+        return self.attempt(lambda: self.finish(scene))
+
+    def finish(self, scene):
+        """Raise what the thread raised, or apply its result."""
+        if self.job.error is not None:
+            raise self.job.error
+        self.apply(scene, self.job.result)
+
+    def cancel(self, context):
+        """Blender takes the operator away (a file is loaded, the window closes): let the thread end, drop its result."""
+        self.job.cancel()
+        self.ended(context)
+
+    def show(self, context):
+        """Progress in the status bar, at the pointer and for the panel."""
+        running = context.window_manager.beyond_mocap_work
+        running.kind, running.fraction, running.text = self.kind, self.job.fraction, self.job.text
+        context.window_manager.progress_update(int(100 * self.job.fraction))
+        text = self.job.text or self.bl_label
+        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
+        self.redraw(context)
+
+    def ended(self, context):
+        """Take progress display and timer away."""
+        windows = context.window_manager
+        windows.beyond_mocap_work.kind = ""
+        windows.event_timer_remove(self.timer)
+        windows.progress_end()
+        context.workspace.status_text_set(None)
+        self.redraw(context)
+
+    def redraw(self, context):
+        """Let the sidebars of all 3D views be drawn again."""
+        for window in context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.tag_redraw()

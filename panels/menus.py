@@ -1,0 +1,28 @@
+"""Entries of Blender's own File menu."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def draw_import(self, _context):
+    """File > Import."""
+    self.layout.operator("beyond_mocap.import_clips", text="Beyond Mocap Clips (.bvh)")
+    self.layout.operator("beyond_mocap.import_tracking", text="Beyond Mocap Tracking (.csv ...)")
+
+
+def draw_export(self, _context):
+    """File > Export."""
+    self.layout.operator("beyond_mocap.export_bvh", text="Beyond Mocap Motion (.bvh)")
+
+
+def register():
+    """Append ours."""
+    bpy.types.TOPBAR_MT_file_import.append(draw_import)
+    bpy.types.TOPBAR_MT_file_export.append(draw_export)
+
+
+def unregister():
+    """Take ours away."""
+    bpy.types.TOPBAR_MT_file_import.remove(draw_import)
+    bpy.types.TOPBAR_MT_file_export.remove(draw_export)

@@ -1,0 +1,47 @@
+"""Step 4: onto armatures, and how good it is."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.settings import active_player
+from .tab import Step
+
+
+class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
+    """Bake, and the quality of the active player's take."""
+
+    bl_label = "4  Bake & Result"
+    bl_order = 4
+
+    def draw(self, context):
+        """Button, what is made, table, warnings."""
+        layout, settings = self.layout, context.scene.beyond_mocap
+        row = layout.row()
+        row.scale_y = 1.3
+        row.operator("beyond_mocap.bake", icon="REC")
+        row = layout.row(align=True)
+        for name in ("make_bodies", "make_ball", "make_paths"):
+            row.prop(settings, name, toggle=True)
+        header, body = layout.panel("beyond_mocap_bake_more", default_closed=True)
+        header.label(text="Time & Stage")
+        if body:
+            body.use_property_split, body.use_property_decorate = True, False
+            body.prop(settings, "start_frame")
+            body.prop(settings, "start_time")
+            body.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+        player = active_player(settings)
+        if player is not None and player.quality:
+            self.table(player)
+
+    def table(self, player) -> None:
+        """Figures of one take, a line each, then what to look at."""
+        box = self.layout.box()
+        box.label(text=player.name, icon="INFO")
+        for line in player.quality.splitlines():
+            name, _, value = line.partition(": ")
+            row = box.split(factor=0.6)
+            row.label(text=name)
+            row.label(text=value)
+        for line in player.warnings.splitlines():
+            box.label(text=line, icon="ERROR")

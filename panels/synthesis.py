@@ -1,0 +1,32 @@
+"""Step 3: from dots and words to motion."""
+
+from __future__ import annotations
+
+import bpy
+
+from .tab import Step
+
+
+class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
+    """The button, and how it goes about it."""
+
+    bl_label = "3  Synthesize"
+    bl_order = 3
+
+    def draw(self, context):
+        """Button, progress, choices."""
+        layout, settings = self.layout, context.scene.beyond_mocap
+        row = layout.row()
+        row.scale_y = 1.3
+        row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
+        self.progress(context, "synthesis")
+        header, body = layout.panel("beyond_mocap_synthesis_more", default_closed=True)
+        header.label(text="Choices")
+        if body:
+            body.use_property_split, body.use_property_decorate = True, False
+            body.prop(settings, "method")
+            if settings.method == "distance":
+                body.prop(settings, "catch_up")
+            body.prop(settings, "alpha", slider=True)
+            for name in ("mirror", "nearest", "seed", "rate"):
+                body.prop(settings, name)

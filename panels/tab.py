@@ -1,0 +1,19 @@
+"""What all steps of the "Beyond Mocap" tab share."""
+
+from __future__ import annotations
+
+
+class Step:
+    """One step: a collapsible panel in the 3D view's sidebar. The steps stand in the order of `bl_order`."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Beyond Mocap"
+
+    def progress(self, context, kind: str) -> None:
+        """A bar and a Cancel button while work of this kind runs in the background."""
+        running = context.window_manager.beyond_mocap_work
+        if running.kind == kind:
+            row = self.layout.row(align=True)
+            row.progress(factor=running.fraction, text=running.text)
+            row.operator("beyond_mocap.cancel", text="", icon="X")

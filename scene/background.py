@@ -1,0 +1,77 @@
+"""Long work in a thread, polled by whoever started it. Scripts and farms, which have no window, call the work itself.
+
+The thread sees plain values and arrays, never bpy. Each job has a number: when a newer job of its kind has started, or
+the user has cancelled, what it brings is dropped.
+"""
+
+from __future__ import annotations
+
+import itertools
+import queue
+import threading
+from typing import Any, Callable
+
+from ..beyond_mocap.errors import Cancelled
+
+Work = Callable[[Callable[[float, str], None], Callable[[], bool]], Any]
+
+_numbers = itertools.count(1)
+_newest: dict[str, "Job"] = {}
+
+
+class Job:
+    """Work of one kind ("library", "synthesis") in a thread of its own.
+
+    `work(progress, cancelled)` is called there. `fraction` and `text` say how far it is; after `poll()` has returned True
+    either `result` or `error` is set.
+    """
+
+    def __init__(self, kind: str, work: Work):
+        """Starts at once and takes the place of an older job of the same kind, which is cancelled."""
+        stop(kind)
+        self.kind, self.number = kind, next(_numbers)
+        self.fraction, self.text = 0.0, ""
+        self.result, self.error = None, None
+        self._stop, self._news = threading.Event(), queue.SimpleQueue()
+        _newest[kind] = self
+        threading.Thread(target=self._run, args=(work,), name=f"beyond-mocap {kind}", daemon=True).start()
+
+    def poll(self) -> bool:
+        """Take in what the thread has sent; True once it has ended."""
+        while not self._news.empty():
+            what, value = self._news.get()
+            if what == "progress":
+                self.fraction, self.text = value
+                continue
+            setattr(self, what, value)
+            return True
+        return False
+
+    def cancel(self) -> None:
+        """Ask the thread to stop; its result will be dropped."""
+        self._stop.set()
+
+    @property
+    def stale(self) -> bool:
+        """Whether nobody waits for this job's result any more."""
+        return self._stop.is_set() or _newest.get(self.kind) is not self
+
+    def _run(self, work: Work) -> None:
+        try:
+            result = work(lambda fraction, text: self._news.put(("progress", (fraction, text))), self._stop.is_set)
+        except BaseException as error:  # carried to the main thread, which reports or raises it
+            self._news.put(("error", error))
+        else:
+            self._news.put(("result", result))
+
+
+def stop(kind: str | None = None) -> None:
+    """Cancel the running job of one kind, or all."""
+    for name, job in list(_newest.items()):
+        if kind in (None, name):
+            job.cancel()
+
+
+def cancelled(job: Job) -> bool:
+    """Whether an ended job was stopped by the user rather than by trouble."""
+    return job.stale or isinstance(job.error, Cancelled)

@@ -1,0 +1,20 @@
+"""Plain colours: one material per name, made once."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def colour(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
+    """The material `name`, made with this colour (linear RGB) where the file has none of that name yet."""
+    found = bpy.data.materials.get(name)
+    if found is not None:
+        return found
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # Blender before 5.0 makes it on request
+        material.use_nodes = True
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = (*rgb, 1.0)
+    shader.inputs["Roughness"].default_value = roughness
+    material.diffuse_color = (*rgb, 1.0)
+    return material

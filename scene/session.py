@@ -1,0 +1,67 @@
+"""What lives as long as Blender runs: built libraries and takes, under names that a file's settings can keep.
+
+Settings follow undo, this store does not: an undone step finds the take of before still here. A file opened again finds
+nothing, and the panel says which step to press.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # the library's modules are slow to import, and switching the extension on has to be quick
+    from ..beyond_mocap.library.library import Library
+    from ..beyond_mocap.plan import Plan
+    from ..beyond_mocap.take import Take
+
+KEPT_TAKES = 200
+KEPT_LIBRARIES = 3
+
+_numbers = itertools.count(1)
+_libraries: dict[str, "Library"] = {}
+_takes: dict[str, "Made"] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What was asked and what came of it."""
+
+    plan: "Plan"
+    take: "Take"
+
+
+def keep_library(library: "Library") -> None:
+    """Keep a built library under its folder."""
+    _keep(_libraries, str(Path(library.folder).resolve()), library, KEPT_LIBRARIES)
+
+
+def library(folder: str) -> "Library | None":
+    """The library built from `folder` in this session, or None."""
+    return _libraries.get(str(Path(folder).resolve())) if folder else None
+
+
+def keep_take(plan: "Plan", take: "Take") -> str:
+    """Keep a take with its plan; returns its name."""
+    name = f"take-{next(_numbers)}"
+    _keep(_takes, name, Made(plan, take), KEPT_TAKES)
+    return name
+
+
+def made(name: str) -> Made | None:
+    """The take of that name with its plan, or None where this session has not made it."""
+    return _takes.get(name)
+
+
+def clear() -> None:
+    """Forget everything."""
+    _libraries.clear()
+    _takes.clear()
+
+
+def _keep(store: dict, name: str, value, limit: int) -> None:
+    store.pop(name, None)
+    store[name] = value
+    while len(store) > limit:
+        store.pop(next(iter(store)))

@@ -1,0 +1,124 @@
+"""What the panels show and the operators read: one group of settings per scene, saved with the file.
+
+Paths may be relative to the file. What is too large for a file's properties (a built library, a take) lives in `session`
+under the names kept here.
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import (
+    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty,
+    StringProperty,
+)
+
+METHODS = (
+    ("path", "On the path", "The player's body is laid on the track, with the sway of the clips kept"),
+    ("distance", "Distance", "Travelled distance matched by adding or leaving out steps, then by warping time"),
+    ("blocks", "Blocks", "Smoothest sequence of clips for the words; the track is not followed"),
+)
+
+
+def is_armature(_settings, candidate: bpy.types.Object) -> bool:
+    """Whether an object may be picked as a player's body."""
+    return candidate.type == "ARMATURE"
+
+
+class BeyondMocapPlayer(bpy.types.PropertyGroup):
+    """One player: the dots, the words, and the body that came of them."""
+
+    use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Bake")
+    tracking_file: StringProperty(
+        name="Tracking", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        description="The file with this player's positions",
+    )
+    metadata_file: StringProperty(
+        name="Metadata", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        description="The provider's second file, where there is one (pitch, teams)",
+    )
+    feed_id: StringProperty(
+        name="ID in the feed", description="Which player of the tracking file this is; empty for a file of one player"
+    )
+    annotation_file: StringProperty(
+        name="Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        description="Text file of lines 'START END words' and 'TIME words'; none means automatic locomotion",
+    )
+    annotation_text: PointerProperty(
+        name="Text", type=bpy.types.Text,
+        description="A text of this file with the words; it counts more than the file on disk",
+    )
+    shirt: FloatVectorProperty(
+        name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
+        description="Colour of the player's shirt",
+    )
+    body: PointerProperty(
+        name="Body", type=bpy.types.Object, poll=is_armature,
+        description="The armature that this player's takes are baked onto; made by the first Bake",
+    )
+    take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
+    quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
+    warnings: StringProperty(name="Warnings", options={"HIDDEN"}, description="Lines about what to look at in the newest take")
+
+
+class BeyondMocapSettings(bpy.types.PropertyGroup):
+    """All steps of one scene."""
+
+    library_folder: StringProperty(
+        name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        description="Folder of BVH clips with their annotations; may be relative to this file",
+    )
+    library_unit: FloatProperty(
+        name="Metres per unit", default=0.0, min=0.0, precision=5,
+        description="Size of one unit of the clips in metres; 0 guesses it from the height of the hips",
+    )
+    library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
+    players: CollectionProperty(type=BeyondMocapPlayer)
+    active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
+    method: EnumProperty(name="Method", items=METHODS, default="path", description="How position is dealt with")
+    catch_up: BoolProperty(
+        name="Catch Up", default=True, description="Let the body catch up with the track smoothly after each warp"
+    )
+    alpha: FloatProperty(
+        name="Words against Smoothness", default=0.2, min=0.0, max=1.0,
+        description="0 looks only for smooth transitions, 1 only for the words asked for",
+    )
+    mirror: BoolProperty(name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged")
+    nearest: BoolProperty(
+        name="Nearest Words", default=False,
+        description="Where the library lacks a key moment's words, go on with the nearest that it has, and say so",
+    )
+    seed: IntProperty(name="Seed", default=0, min=0, description="Another number may choose other clips; the same repeats")
+    rate: FloatProperty(
+        name="Rate", default=30.0, min=10.0, max=240.0,
+        description="Frames per second that are synthesized; the scene keeps its own rate",
+    )
+    start_frame: IntProperty(
+        name="Start Frame", default=1, description="Scene frame on which the clock below stands at its start"
+    )
+    start_time: FloatProperty(
+        name="Clock at Start", default=0.0, unit="TIME_ABSOLUTE", precision=2,
+        description="Seconds on the tracking file's clock at the start frame",
+    )
+    make_bodies: BoolProperty(name="Bodies", default=True, description="Bake makes a low-poly body for each player")
+    make_ball: BoolProperty(name="Ball", default=True, description="Bake makes the ball, where the tracking has one")
+    make_paths: BoolProperty(name="Paths", default=True, description="Bake draws each player's track on the ground")
+
+
+class BeyondMocapWork(bpy.types.PropertyGroup):
+    """What runs in the background just now; on the window manager, so that undo leaves it alone."""
+
+    kind: StringProperty(description="Name of the running step; empty while nothing runs")
+    text: StringProperty(description="What it is doing")
+    fraction: FloatProperty(min=0.0, max=1.0, description="How far it is")
+
+
+def absolute(path: str) -> str:
+    """A path as typed into a setting, made absolute; empty stays empty."""
+    return bpy.path.abspath(path) if path else ""
+
+
+def active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:
+    """The player chosen in the list; None while the list is empty."""
+    if 0 <= settings.active_player < len(settings.players):
+        return settings.players[settings.active_player]
+    return None
