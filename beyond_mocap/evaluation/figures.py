@@ -1,0 +1,253 @@
+"""The report's groups of figures, each a dict of its own, NaN or None where nothing is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..annotation import Timeline, automatic_gaits, fill, words_per_frame
+from ..errors import InputError
+from ..motion.contacts import floor_height
+from . import feet, jerk, pieces, realism, root, words
+from .moments import Moment, ball_gap, ball_shift
+from .view import View
+
+
+def place(view: View) -> dict:
+    """Root and pelvis error, surge, speed coverage."""
+    pelvis, fps = view.played.pelvis, view.fps
+    own = _mean(view.own("sway"))
+    out = {
+        "root_error_m": dict.fromkeys(("mean", "p95", "max")),
+        "pelvis_error_m": {"mean": None, "own": own, "keys": None},
+        "speed_coverage": {"above": None, "below": None},
+    }
+    if view.wanted is not None:
+        error, unsmoothed = root.root_error(pelvis, view.wanted, fps), root.pelvis_error(pelvis, view.wanted)
+        out["root_error_m"] = _spread(error, ("mean", "p95", "max"))
+        at_keys = [float(np.interp(m.asked.time, view.played.times, unsmoothed)) for m in view.moments]
+        out["pelvis_error_m"] = {"mean": _mean(unsmoothed), "own": own, "keys": _mean(np.array(at_keys))}
+    if view.wanted is not None and view.reference is not None:
+        asked = root.travel_speed(view.wanted, fps)
+        out["speed_coverage"] = root.speed_coverage(asked, view.reference.fastest, view.reference.slowest)
+    return {**out, **_surge(view)}
+
+
+def _surge(view: View) -> dict:
+    """Surge against the rms of the used recordings at the same speed."""
+    ours = root.surge(view.played.pelvis, view.fps)
+    own = root.class_rms(view.own("surge"), root.speed_class(view.own("speed")))[root.speed_class(view.speed)]
+    rms, real = _rms(ours), _rms(own)
+    return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": {"mean": rms, "own": real}}
+
+
+def keys(view: View) -> list[dict]:
+    return [_key(view, moment) for moment in view.moments]
+
+
+def _key(view: View, moment: Moment) -> dict:
+    played, time = view.played, moment.asked.time
+    place = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
+    if view.wanted is not None:
+        error = root.root_error(played.pelvis, view.wanted, view.fps)
+        place["position_error_m"] = float(np.interp(time, played.times, error))
+        place["pelvis_error_m"] = float(np.interp(time, played.times, root.pelvis_error(played.pelvis, view.wanted)))
+        place["ball_shift_m"] = ball_shift(played, moment.frame, view.track)
+    return {
+        "time_s": time,
+        "solved_time_s": None,
+        "labels": list(moment.asked.words),
+        "clip": moment.clip,
+        "clip_frame": moment.clip_frame,
+        "time_error_s": moment.played_at - time,
+        **place,
+        "contact_gap_m": ball_gap(played, moment),
+        "used_instead": None if moment.used_instead is None else list(moment.used_instead),
+    }
+
+
+def skate_and_ground(view: View) -> dict:
+    """Skate in all its forms and the ground."""
+    played, fps = view.played, view.fps
+    planted = played.feet
+    travel = feet.stance_travel(planted[:, :, 1], feet.stances(played.contacts))
+    own = np.zeros(0) if view.reference is None else view.reference.used_stances(view.used)
+    skating = feet.skating_steps(planted[:, :, 1], floor_height(played.motion), fps)
+    heel_rest = feet.heel_rest_height(planted) if view.reference is None else view.reference.heel_rest
+    support = feet.support_height(planted, played.contacts, heel_rest)
+    return {
+        "skate": {
+            "contact_cm_s": 100.0 * _mean(feet.contact_speeds(planted, played.contacts, fps)),
+            "source_contact_cm_s": 100.0 * _mean(view.own("contact_speed")),
+            "stance_mm_median": 1000.0 * _median(travel),
+            "stances_over_21mm": _mean(travel > feet.NOTICED_SLIDE),
+            "gmd_ratio": _mean(skating),
+            "source_gmd_ratio": _mean(view.own("skating")),
+            "source_stance_mm_median": 1000.0 * _median(own),
+            "source_stances_over_21mm": _mean(own > feet.NOTICED_SLIDE),
+        },
+        "ground_mm": {
+            "min": 1000.0 * float(played.positions[..., 2].min()),
+            "support_max": 1000.0 * _max(support),
+            "source_support_max": 1000.0 * _max(view.own("support")),
+        },
+    }
+
+
+def polish(view: View, ik_miss: np.ndarray | None) -> dict:
+    """What polish did to the laid-out clips: foot correction, missed targets, pelvis drop, changed bones."""
+    played = view.played
+    shift, drop = _against_source(view)
+    if played.correction is not None:
+        shift = np.asarray(played.correction)[played.contacts]
+    missed = None if ik_miss is None else np.asarray(ik_miss).reshape(view.count, -1).max(axis=1) > 0.005
+    bones = None if view.library is None else _bone_change(view)
+    return {
+        "foot_correction_m": _spread(shift, ("p95",)),
+        "ik_miss_share": None if missed is None else _mean(missed),
+        "pelvis_drop_m": drop,
+        "bone_change_m": bones,
+    }
+
+
+def _against_source(view: View) -> tuple[np.ndarray, float]:
+    """Planted feet's distance (N,) m from the source pose set at the output's pelvis and heading, and how far the pelvis
+    sinks below the source's at most, m; away from seams, where two clips are mixed."""
+    if view.reference is None or not len(view.used):
+        return np.zeros(0), np.nan
+    played = view.played
+    pure = np.isfinite(view.rows)
+    for seam in view.seams:
+        pure[max(seam - jerk.REACH, 0) : seam + jerk.REACH] = False
+    joints = feet.foot_joints(played.motion.skeleton)
+    local = realism.local_positions(played.motion.skeleton, played.positions, played.body.hips)
+    source = view.reference.source_poses(view.rows, played.mirrored)
+    shift = feet.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
+    drop = (source[:, played.body.hips, 2] - local[:, played.body.hips, 2])[pure]
+    return shift, float(max(drop.max(), 0.0)) if len(drop) else np.nan
+
+
+def _bone_change(view: View) -> float:
+    """Largest difference of any bone's length in any frame from the library's skeleton, m."""
+    skeleton, positions = view.library.skeleton, view.played.positions
+    bones = np.linalg.norm(positions[:, 1:] - positions[:, list(skeleton.parents[1:])], axis=-1)
+    return float(np.max(np.abs(bones - np.linalg.norm(skeleton.offsets[1:], axis=-1)), initial=0.0))
+
+
+def seams_and_loops(view: View) -> dict:
+    """Seams, the rest of the frames, warp and loops."""
+    out = {"seam_jerk_ratio": dict.fromkeys(("median", "p95", "max", "share_above_real"))}
+    if view.reference is not None:
+        values = jerk.jerk(view.played.positions, view.fps)
+        at_seams = jerk.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
+        rest = jerk.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
+        out["seam_jerk_ratio"] = {
+            **_spread(at_seams, ("median", "p95", "max")),
+            "share_above_real": _mean(at_seams > 1.0),
+            "source_share_above_real": _mean(view.own("jerk_above_real")),
+            "rest_max": _max(rest),
+            "rest_share_above_real": _mean(rest > 1.0),
+        }
+    known = bool(np.any(view.played.clip >= 0))
+    rates = pieces.warp_rates(*view.source)
+    return {
+        **out,
+        "seams": len(view.seams) if known else None,
+        "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
+        "loop_share": _mean(pieces.replayed(*view.source, view.fps)) if known else None,
+    }
+
+
+def poses(view: View) -> dict:
+    """Pose realism and smoothness."""
+    played = view.played
+    features = realism.pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
+    out = {"pose_realism": None, "smoothness_m": _spread(realism.smoothness(features), ("mean", "p95", "max"))}
+    if view.reference is not None and np.isfinite(view.reference.pose_p95).all():
+        distance = realism.nearest_distance(features, view.reference.poses)
+        out["pose_realism"] = _mean(realism.unreal(distance, view.speed, view.reference.pose_p95))
+    return out
+
+
+def asked_words(
+    timeline: Timeline, times: np.ndarray, moments: Sequence[Moment] = ()
+) -> list[frozenset[str] | None]:
+    """Words asked for at each of `times` (T,) s; None where nothing counts: transitions, the entry and exit of each key
+    moment's clip (Faustino §3.2.2), and automatic locomotion that was not filled in."""
+    out = [found if found else None for found in words_per_frame(timeline, times)]
+    for moment in moments:
+        out[moment.entry : moment.exit + 1] = [None] * (moment.exit + 1 - moment.entry)
+    return out
+
+
+def filled_timeline(view: View) -> Timeline:
+    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet."""
+    if view.library is None or view.wanted is None:
+        return view.timeline
+    try:
+        gaits = view.library.gaits
+    except InputError:
+        return view.timeline
+    chosen = automatic_gaits(root.travel_speed(view.wanted, view.fps), view.fps, [gait.speed for gait in gaits])
+    return fill(view.timeline, view.played.times, [(gaits[index].word,) for index in chosen])
+
+
+def annotation_similarity(view: View) -> dict:
+    """Similarity over all frames and at the key moments, over asked words and as printed (Faustino eq. 18)."""
+    played = view.played
+    if view.timeline is None or played.words is None:
+        return dict.fromkeys(("all", "keys", "eq18_all", "eq18_keys"))
+    asked = asked_words(filled_timeline(view), played.times, view.moments)
+    want, have = [m.asked.words for m in view.moments], [m.words for m in view.moments]
+
+    def mean(want, have, measure):
+        return words.mean_similarity(words.similarity(want, have, measure))
+
+    return {
+        "all": mean(asked, played.words, words.asked_similarity),
+        "keys": mean(want, have, words.asked_similarity),
+        "eq18_all": mean(asked, played.words, words.eq18),
+        "eq18_keys": mean(want, have, words.eq18),
+    }
+
+
+def coverage_warnings(view: View) -> list[str]:
+    """Names the seconds at which the track is faster than anything the library can play."""
+    if view.wanted is None or view.reference is None:
+        return []
+    fast = root.travel_speed(view.wanted, view.fps) > view.reference.fastest * 1.15
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], fast, [False]]).astype(np.int8)))
+    if not len(edges):
+        return []
+    times = view.played.start_time + edges / view.fps
+    spans = ", ".join(f"{start:.1f}-{end:.1f}" for start, end in zip(times[::2], times[1::2]))
+    return [f"the track is faster than the library's {view.reference.fastest:.1f} m/s x 1.15 at {spans} s"]
+
+
+def _mean(values: np.ndarray) -> float:
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _median(values: np.ndarray) -> float:
+    return float(np.median(values)) if len(values) else math.nan
+
+
+def _max(values: np.ndarray) -> float:
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known)]
+    return float(known.max()) if len(known) else math.nan
+
+
+def _rms(values: np.ndarray) -> float:
+    return math.sqrt(_mean(np.square(values)))
+
+
+def _spread(values: np.ndarray, names: Sequence[str]) -> dict[str, float]:
+    """Mean, median, p95 or max of values (N,), those that `names` asks for; NaN where there are none."""
+    known = values[np.isfinite(values)]
+    measures = {"mean": np.mean, "median": np.median, "p95": lambda v: np.percentile(v, 95), "max": np.max}
+    return {name: float(measures[name](known)) if len(known) else math.nan for name in names}

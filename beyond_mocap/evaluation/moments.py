@@ -1,0 +1,128 @@
+"""Key moments: which clip served each, when its key frame is played, and where body and ball were."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..annotation import KeyMoment
+from ..library.library import Library
+from ..motion.track import Track
+from . import pieces
+from .contact import contact_gap, striking_part
+from .played import Played
+
+
+@dataclass(frozen=True)
+class Moment:
+    """How one key moment was served.
+
+    asked: the timeline's line. frame: output frame nearest to the asked time. clip, clip_frame (the clip's key frame, in its
+    own rate), None where no key of a clip is played there. played_at: seconds on the track's clock at which that key frame
+    is played, NaN where it is not. words: those that the source carries at `frame`. run: output frames (R,) that play the
+    clip without a seam around it; entry, exit: first and last of them that the clip's annotated row covers. used_instead:
+    words in place of the asked ones, None where the asked ones were had.
+    """
+
+    asked: KeyMoment
+    frame: int
+    clip: str | None
+    clip_frame: float | None
+    played_at: float
+    words: tuple[str, ...]
+    entry: int
+    exit: int
+    used_instead: tuple[str, ...] | None
+
+
+def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[Moment]:
+    """Every asked key moment as it was played; stride (T,): source frames per output frame at recorded speed."""
+    starts = pieces.seams(played.clip, played.mirrored, played.clip_frame, stride)
+    number = pieces.runs(len(played.clip), starts)
+    told = {result.asked: result for result in played.keys}
+    return [_moment(played, key, number, told.get(key), library) for key in keys]
+
+
+def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> Moment:
+    count = len(played.motion)
+    frame = int(np.clip(np.rint((key.time - played.start_time) * played.motion.fps), 0, count - 1))
+    centre = frame if result is None else int(np.clip(np.rint(result.frame), 0, count - 1))
+    run = np.flatnonzero(number == number[centre])
+    words = () if played.words is None else tuple(played.words[frame])
+    found = _clip_key(played, centre, key, library)
+    if result is not None:
+        clip, clip_frame = result.clip, result.clip_frame
+        instead = result.used_instead
+    else:
+        clip, clip_frame = (None, None) if found is None else (played.clips[played.clip[centre]], found.frame)
+        lacking = found is None or not set(key.words) <= set(found.words)
+        instead = tuple(sorted(found.words)) if found is not None and lacking else None
+    at = np.nan if clip_frame is None else crossing(played.clip_frame[run], played.times[run], clip_frame)
+    covered = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)] if found else run[:0]
+    entry, leave = (covered[0], covered[-1]) if len(covered) else (centre, centre)
+    return Moment(key, frame, clip, clip_frame, at, words, int(entry), int(leave), instead)
+
+
+def _clip_key(played: Played, frame: int, key: KeyMoment, library: Library | None):
+    """The library's key that is played at `frame`: of that clip and side, carrying the asked words if any does, nearest."""
+    if library is None or played.clip[frame] < 0:
+        return None
+    path, side = played.clips[played.clip[frame]], bool(played.mirrored[frame])
+    own = [k for k in library.keys if library.clips[k.clip].path == path and library.clips[k.clip].mirrored == side]
+    carrying = [k for k in own if set(key.words) <= set(k.words)] or own
+    return min(carrying, key=lambda k: abs(k.frame - played.clip_frame[frame]), default=None)
+
+
+def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> float:
+    """Seconds at which a run plays `key_frame`: clip_frames (R,) ascending, times (R,) s.
+
+    Up to one output frame before or after the run the rate is taken to go on; NaN farther out, where it is never played.
+    """
+    if len(times) < 2 or not np.all(np.diff(clip_frames) > 0):
+        hit = np.flatnonzero(np.abs(clip_frames - key_frame) < 0.5)
+        return float(times[hit[0]]) if len(hit) else np.nan
+    first, last = clip_frames[1] - clip_frames[0], clip_frames[-1] - clip_frames[-2]
+    step = times[1] - times[0]
+    longer = np.concatenate([[clip_frames[0] - first], clip_frames, [clip_frames[-1] + last]])
+    if not longer[0] <= key_frame <= longer[-1]:
+        return np.nan
+    return float(np.interp(key_frame, longer, np.concatenate([[times[0] - step], times, [times[-1] + step]])))
+
+
+def ball_gap(played: Played, moment: Moment) -> float:
+    """Distance in metres between the striking surface and the surface of the ball as written out, at the output frame
+    nearest to the asked time (`contact.contact_gap`, overlap counted as distance too); NaN without ball or part.
+
+    The part is that of the words which are played there; of the asked ones where those touch no ball.
+    """
+    if played.ball is None:
+        return np.nan
+    words = moment.words if striking_part(moment.words) else moment.asked.words
+    return abs(
+        contact_gap(
+            played.motion.skeleton,
+            played.body,
+            played.positions[moment.frame],
+            played.tips(moment.frame),
+            words,
+            written_ball(played, moment.frame),
+        )
+    )
+
+
+def written_ball(played: Played, frame: int) -> np.ndarray:
+    """The ball's centre (3,) m as written out with the take, at the row nearest to an output frame's time."""
+    row = int(np.argmin(np.abs(played.ball.times - played.times[frame])))
+    return played.ball.positions[row]
+
+
+def ball_shift(played: Played, frame: int, track: Track) -> float:
+    """How far on the ground the written ball lies from the measured one (straight lines between samples), m; NaN where
+    either is missing."""
+    known = np.isfinite(track.ball[:, :2]).all(axis=1)
+    if played.ball is None or not known.any():
+        return np.nan
+    time = played.times[frame]
+    measured = [np.interp(time, track.times[known], track.ball[known, axis]) for axis in (0, 1)]
+    return float(np.linalg.norm(written_ball(played, frame)[:2] - measured))

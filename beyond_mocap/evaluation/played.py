@@ -1,0 +1,130 @@
+"""What was played: a body's motion, the ball, and where every frame came from; the same from memory and from files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion import contacts as foot_contacts
+from ..motion.humanoid import Humanoid, identify
+from ..motion.motion import Motion, forward_kinematics
+from ..motion.quaternion import rotate
+from ..take import BallPath, KeyResult, Take
+from .feet import foot_joints
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """One player's take as evaluation sees it.
+
+    motion: T frames on the pitch; frame 0 is at `start_time` s on the track's clock. clips: table of clip paths below the
+    library; clip (T,) int index into it, -1 where the source is not known; clip_frame (T,) fractional frame in that clip's
+    own rate, NaN where not known; mirrored (T,) bool. words: T word tuples of the source frames, sides after mirroring, or
+    None. contacts (T, 2) bool, left and right. ball: as written out, or None. correction (T, 2) m each foot was moved by
+    polish, or None. keys: how key moments were served, empty where only files tell.
+    """
+
+    motion: Motion
+    start_time: float
+    clips: tuple[str, ...]
+    clip: np.ndarray
+    clip_frame: np.ndarray
+    mirrored: np.ndarray
+    words: tuple[tuple[str, ...], ...] | None
+    contacts: np.ndarray
+    ball: BallPath | None = None
+    correction: np.ndarray | None = None
+    keys: tuple[KeyResult, ...] = ()
+
+    @property
+    def times(self) -> np.ndarray:
+        """Seconds (T,) on the track's clock."""
+        return self.start_time + np.arange(len(self.motion)) / self.motion.fps
+
+    @cached_property
+    def body(self) -> Humanoid:
+        """The meaning of the skeleton's joints."""
+        return identify(self.motion.skeleton)
+
+    @cached_property
+    def _kinematics(self) -> tuple[np.ndarray, np.ndarray]:
+        return forward_kinematics(self.motion)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """World positions (T, J, 3) m of the joints."""
+        return self._kinematics[0]
+
+    @property
+    def pelvis(self) -> np.ndarray:
+        """Ground positions (T, 2) m of the hips joint."""
+        return self.positions[:, self.body.hips, :2]
+
+    @property
+    def feet(self) -> np.ndarray:
+        """World positions (T, 2, 2, 3) m: side, (heel, toe)."""
+        return self.positions[:, foot_joints(self.motion.skeleton)]
+
+    def tips(self, frame: int) -> np.ndarray:
+        """World positions (E, 3) m of the skeleton's end sites at one frame."""
+        skeleton, (positions, rotations) = self.motion.skeleton, self._kinematics
+        parents = list(skeleton.end_parents)
+        return positions[frame, parents] + rotate(rotations[frame, parents], skeleton.end_offsets)
+
+
+def played_from_take(take: Take) -> Played:
+    """What a take in memory plays."""
+    return Played(
+        motion=take.motion,
+        start_time=take.start_time,
+        clips=tuple(take.clips),
+        clip=np.asarray(take.clip, dtype=int),
+        clip_frame=np.asarray(take.clip_frame, dtype=float),
+        mirrored=np.asarray(take.mirrored, dtype=bool),
+        words=tuple(take.words),
+        contacts=np.asarray(take.contacts, dtype=bool),
+        ball=take.ball,
+        correction=take.correction,
+        keys=tuple(take.keys),
+    )
+
+
+def played_from_tables(
+    motion: Motion,
+    start_time: float = 0.0,
+    provenance: Mapping[str, Sequence] | None = None,
+    ball: BallPath | None = None,
+    where: str = "provenance",
+) -> Played:
+    """What a motion plays, with its provenance where it is known.
+
+    provenance: columns of the contract's table, one value per frame: clip (path below the library), clip_frame, mirrored,
+    labels (a string of words or a tuple), contact_left, contact_right, and time_s, whose first entry then is the start.
+    Without provenance the contacts are detected on the motion itself. InputError where the table has another length.
+    """
+    count = len(motion)
+    if provenance is None:
+        unknown = np.full(count, -1)
+        contacts = foot_contacts.detect(motion)
+        nowhere = np.full(count, np.nan)
+        return Played(motion, start_time, (), unknown, nowhere, unknown > 0, None, contacts, ball)
+    if len(provenance["clip"]) != count:
+        raise InputError(where, f"{len(provenance['clip'])} rows", f"one per frame of the motion, {count}")
+    clips, index = np.unique(np.asarray(provenance["clip"], dtype=str), return_inverse=True)
+    contacts = np.stack([np.asarray(provenance[f"contact_{side}"], dtype=float) > 0.5 for side in ("left", "right")], -1)
+    played = Played(
+        motion=motion,
+        start_time=start_time,
+        clips=tuple(str(clip) for clip in clips),
+        clip=index.reshape(-1),
+        clip_frame=np.asarray(provenance["clip_frame"], dtype=float),
+        mirrored=np.asarray(provenance["mirrored"], dtype=float) > 0.5,
+        words=tuple(tuple(w.split()) if isinstance(w, str) else tuple(w) for w in provenance["labels"]),
+        contacts=contacts,
+        ball=ball,
+    )
+    return replace(played, start_time=float(provenance["time_s"][0])) if "time_s" in provenance else played

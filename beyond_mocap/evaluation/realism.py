@@ -1,0 +1,91 @@
+"""How near each pose is to some recorded pose, and how smooth the motion is.
+
+A pose is its joints' places and 0.12 s of their velocity, in the frame of the body's heading with its origin on the ground
+below the hips (as the search sees it); distances are root mean squares over joints, in metres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..motion.humanoid import Humanoid, heading_from_positions
+from ..motion.skeleton import Skeleton
+from .root import nearest_known, speed_class, velocity
+
+VELOCITY_SECONDS = 0.12
+_ROWS_AT_ONCE = 512
+
+
+def local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
+    """World positions (T, J, 3) m seen from the body: X ahead, Y left, Z up, origin below the hips on the ground; float32."""
+    return turned(positions - ground_point(positions, hips), -heading_from_positions(skeleton, positions))
+
+
+def ground_point(positions: np.ndarray, joint: int) -> np.ndarray:
+    """The point on the ground below a joint: positions (T, J, 3) m -> (T, 1, 3) m."""
+    return positions[:, joint, None] * np.array([1.0, 1.0, 0.0])
+
+
+def turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Vectors (T, J, 3) turned about Z by one angle per frame (T,) radians; float32."""
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y, vectors[..., 2]], axis=-1).astype(np.float32)
+
+
+def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: int) -> np.ndarray:
+    """Features (T, 6 J) float32 in metres of world positions (T, J, 3): places, then 0.12 s of velocity, both per sqrt(J).
+
+    Velocities are the world's, turned into the heading frame, so travel counts. The Euclidean distance of two rows is then
+    the root mean square over joints.
+    """
+    places = local_positions(skeleton, positions, hips)
+    moves = turned(velocity(positions, fps), -heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
+    both = np.concatenate([places, moves], axis=1).reshape(len(positions), -1)
+    return both / np.float32(np.sqrt(len(skeleton)))
+
+
+def mirrored_features(features: np.ndarray, body: Humanoid) -> np.ndarray:
+    """The features (T, 6 J) of the mirrored poses: sides exchanged, left of the body becomes right."""
+    parts = features.reshape(len(features), 2, -1, 3)[:, :, list(body.mirror)]
+    return (parts * np.array([1.0, -1.0, 1.0], dtype=np.float32)).reshape(len(features), -1)
+
+
+def nearest_distance(
+    features: np.ndarray, library: np.ndarray, left_out: np.ndarray | None = None, owner: np.ndarray | None = None
+) -> np.ndarray:
+    """Distance (T,) m from each row of features (T, D) to the nearest row of library (N, D).
+
+    left_out (T,), owner (N,): where given, library rows whose owner equals a feature row's left_out do not count; infinite
+    where none is left. Exhaustive, in chunks; |a-b|^2 = |a|^2 - 2ab + |b|^2 loses about 1e-3 m in float32 near zero.
+    """
+    squares = np.einsum("nd,nd->n", library, library)
+    out = np.empty(len(features))
+    for start in range(0, len(features), _ROWS_AT_ONCE):
+        rows = features[start : start + _ROWS_AT_ONCE]
+        gap = squares - 2.0 * (rows @ library.T)
+        if left_out is not None:
+            gap[left_out[start : start + _ROWS_AT_ONCE, None] == owner] = np.inf
+        out[start : start + len(rows)] = gap.min(axis=1) + np.einsum("td,td->t", rows, rows)
+    return np.sqrt(np.maximum(out, 0.0))
+
+
+def real_p95(distance: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
+    """95th percentile (5,) m of leave-one-clip-out distances (M,) in each speed class of speed (M,) m/s.
+
+    Classes with fewer than `least` poses take the nearest class that has them; NaN where a library has one clip only.
+    """
+    classes = speed_class(speed)
+    values = [distance[(classes == k) & np.isfinite(distance)] for k in range(5)]
+    return nearest_known(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
+
+
+def unreal(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Frames (T,) bool whose nearest library pose is farther (T,) m than the real p95 (5,) m at their speed (T,) m/s."""
+    return distance > real[speed_class(speed)]
+
+
+def smoothness(features: np.ndarray) -> np.ndarray:
+    """Distance between the features of consecutive frames: (T, D) -> (T-1,) (Faustino §5.2.1 and App. D; he uses the
+    features behind PCA, and looks at the peaks)."""
+    return np.linalg.norm(np.diff(features, axis=0), axis=-1)

@@ -1,0 +1,246 @@
+"""What a library's uncut recordings score themselves, worked out once per library and output rate.
+
+Every recording is resampled to the output's rate and measured frame by frame; a take's own score is then a look-up of the
+frames it used. Twins are not measured again: all figures here are the same for left and right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..errors import InputError
+from ..library.library import Clip, Library
+from ..motion.contacts import floor_height
+from ..motion.humanoid import Humanoid, identify
+from ..motion.motion import forward_kinematics, resample
+from ..motion.skeleton import Skeleton
+from . import feet, jerk, realism, root
+
+POSES_PER_SECOND = 10.0
+LEFT_OUT_POSES = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One uncut clip at the output's rate, T frames, measured.
+
+    local (T, J, 3) float32 m: joints seen from the body (`realism.local_positions`). features (T, 6 J) float32 m. sway,
+    surge, speed (T,): m, m/s, m/s. contact_speed (T, 2) m/s, NaN without contact. skating (T,) bool. support (T, 2) m.
+    jerk (T-3,) m/s^3. stances (S, 3) of its own frames and their travel (S,) m.
+    """
+
+    path: str
+    mirrored: bool
+    rate: float
+    local: np.ndarray
+    features: np.ndarray
+    sway: np.ndarray
+    surge: np.ndarray
+    speed: np.ndarray
+    contact_speed: np.ndarray
+    skating: np.ndarray
+    support: np.ndarray
+    jerk: np.ndarray
+    stances: np.ndarray
+    travel: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LibraryReference:
+    """A library's recordings at `fps`, one after the other (N frames), and what is real for them.
+
+    first (C + 1,): each recording's first row; rate (C,): its own frames per second; mirrored (C,): whether the row is the
+    twin; the per-frame arrays are Recording's, joined. speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, pose_p95
+    (5,) m. poses (M, 6 J): some ten poses a second of all clips, twins included. fastest: highest 1 s mean speed of a root,
+    slowest: the slowest gait, m/s.
+    """
+
+    skeleton: Skeleton
+    body: Humanoid
+    fps: float
+    index: dict[str, int]
+    first: np.ndarray
+    rate: np.ndarray
+    mirrored: np.ndarray
+    local: np.ndarray
+    sway: np.ndarray
+    surge: np.ndarray
+    speed: np.ndarray
+    contact_speed: np.ndarray
+    skating: np.ndarray
+    support: np.ndarray
+    jerk_above_real: np.ndarray
+    stances: np.ndarray
+    travel: np.ndarray
+    heel_rest: float
+    jerk_p95: np.ndarray
+    poses: np.ndarray
+    pose_p95: np.ndarray
+    fastest: float
+    slowest: float
+
+    def rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
+        """Fractional row (T,) of each output frame's source, NaN where it is not known.
+
+        clips: table of paths; clip (T,) int index into it, -1 unknown; clip_frame (T,) in the clip's own rate.
+        """
+        table = np.array([self.index.get(path, -1) for path in clips] + [-1])
+        own = table[clip]
+        frame = np.clip(clip_frame * self.fps / self.rate[own], 0, np.diff(self.first)[own] - 1)
+        return np.where((own >= 0) & (clip >= 0), self.first[own] + frame, np.nan)
+
+    def source_poses(self, rows: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
+        """Joints (T, J, 3) m seen from the body at fractional rows (T,), twins where mirrored (T,); NaN where unknown."""
+        known = np.isfinite(rows)
+        low = np.where(known, rows, 0.0).astype(int)
+        owner = np.searchsorted(self.first, low, side="right") - 1
+        high = np.minimum(low + 1, self.first[owner + 1] - 1)
+        weight = (np.where(known, rows, 0.0) - low)[:, None, None]
+        places = self.local[low] * (1.0 - weight) + self.local[high] * weight
+        flip = mirrored != self.mirrored[owner]
+        places[flip] = places[flip][:, list(self.body.mirror)] * np.array([1.0, -1.0, 1.0])
+        places[~known] = np.nan
+        return places
+
+    def used_stances(self, rows: np.ndarray) -> np.ndarray:
+        """Travel (S',) m of the source stances that a take touched; rows (T,) int of the frames it used."""
+        used = np.zeros(self.first[-1] + 1, dtype=int)
+        used[rows + 1] = 1
+        count = np.cumsum(used)
+        return self.travel[count[self.stances[:, 1]] > count[self.stances[:, 0]]]
+
+
+_MADE: WeakKeyDictionary[Library, dict[float, LibraryReference]] = WeakKeyDictionary()
+
+
+def library_reference(library: Library, fps: float) -> LibraryReference:
+    """The library's reference at `fps`, kept in memory as long as the library is."""
+    made = _MADE.setdefault(library, {})
+    if fps not in made:
+        made[fps] = build_reference(library, fps)
+    return made[fps]
+
+
+def build_reference(library: Library, fps: float) -> LibraryReference:
+    """Measures every recording of a library at `fps` frames per second (some 10 us per frame and joint)."""
+    originals, twins = _originals(library.clips)
+    heel_rest = _heel_rest(originals)
+    measured = [measure(clip, fps, heel_rest) for clip in originals]
+    lengths = [len(recording.sway) for recording in measured]
+    first = np.concatenate([[0], np.cumsum(lengths)])
+    windows = [jerk.uncut_windows(recording.jerk, recording.speed) for recording in measured]
+    jerk_p95 = jerk.real_p95(*(np.concatenate(column) for column in zip(*windows)))
+    body = identify(library.skeleton)
+    poses, pose_p95 = _poses(measured, twins, body, fps)
+    joined = {name: _joined(measured, name) for name in _PER_FRAME}
+    return LibraryReference(
+        skeleton=library.skeleton,
+        body=body,
+        fps=fps,
+        index={recording.path: i for i, recording in enumerate(measured)},
+        first=first,
+        rate=np.array([recording.rate for recording in measured]),
+        mirrored=np.array([recording.mirrored for recording in measured]),
+        jerk_above_real=np.concatenate([_above(recording, jerk_p95) for recording in measured]),
+        stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
+        travel=_joined(measured, "travel"),
+        heel_rest=heel_rest,
+        jerk_p95=jerk_p95,
+        poses=poses,
+        pose_p95=pose_p95,
+        fastest=float(joined["speed"].max()),
+        slowest=_slowest_gait(library),
+        **joined,
+    )
+
+
+_PER_FRAME = ("local", "sway", "surge", "speed", "contact_speed", "skating", "support")
+
+
+def _joined(measured: list[Recording], name: str) -> np.ndarray:
+    return np.concatenate([getattr(recording, name) for recording in measured])
+
+
+def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
+    """One clip per path, unmirrored where there is one, and whether its twin is in the library too (C,)."""
+    chosen: dict[str, Clip] = {}
+    count: dict[str, int] = {}
+    for clip in sorted(clips, key=lambda clip: clip.mirrored):
+        chosen.setdefault(clip.path, clip)
+        count[clip.path] = count.get(clip.path, 0) + 1
+    return list(chosen.values()), np.array([count[path] > 1 for path in chosen])
+
+
+def _heel_rest(clips: list[Clip]) -> float:
+    """Height of the heel joint in a flat stance, m, over all clips."""
+    heights = [feet.heel_rest_height(_foot_positions(clip.motion)[clip.contacts.all(axis=1)]) for clip in clips]
+    known = [height for height in heights if np.isfinite(height)]
+    if known:
+        return float(np.median(known))
+    return float(np.median([feet.heel_rest_height(_foot_positions(clip.motion)) for clip in clips]))
+
+
+def _foot_positions(motion) -> np.ndarray:
+    return forward_kinematics(motion)[0][:, feet.foot_joints(motion.skeleton)]
+
+
+def measure(clip: Clip, fps: float, heel_rest: float) -> Recording:
+    """One clip at `fps`, uncut, measured frame by frame. heel_rest: height of the heel joint on a flat foot, m."""
+    motion = resample(clip.motion, fps)
+    skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
+    positions = forward_kinematics(motion)[0]
+    pelvis, planted = positions[:, hips, :2], positions[:, feet.foot_joints(skeleton)]
+    at = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
+    contacts = clip.contacts[at]
+    spans = feet.stances(contacts)
+    return Recording(
+        path=clip.path,
+        mirrored=clip.mirrored,
+        rate=clip.motion.fps,
+        local=realism.local_positions(skeleton, positions, hips),
+        features=realism.pose_features(skeleton, positions, fps, hips),
+        sway=root.sway(pelvis, fps),
+        surge=root.surge(pelvis, fps),
+        speed=root.travel_speed(pelvis, fps),
+        contact_speed=np.concatenate([feet.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
+        skating=np.append(feet.skating_steps(planted[:, :, 1], floor_height(clip.motion), fps), False),
+        support=feet.support_height(planted, contacts, heel_rest),
+        jerk=jerk.jerk(positions, fps),
+        stances=spans,
+        travel=feet.stance_travel(planted[:, :, 1], spans),
+    )
+
+
+def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
+    """Per frame of a recording 1 where the window around it has more jerk than is real, 0 where not, NaN at its ends."""
+    out = np.full(len(recording.sway), np.nan)
+    windows, speed = jerk.uncut_windows(recording.jerk, recording.speed)
+    start = jerk.REACH + jerk.SEAM_TO_JERK
+    out[start : start + len(windows)] = windows > real[root.speed_class(speed)]
+    return out
+
+
+def _poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: float) -> tuple[np.ndarray, np.ndarray]:
+    """Poses to compare with (M, 6 J), and the 95th percentile (5,) of the distance that a clip's own poses have to all
+    other clips' (its twin left out with it), over at most 3000 poses evenly spread."""
+    step = max(int(round(fps / POSES_PER_SECOND)), 1)
+    rows = np.concatenate([recording.features[::step] for recording in measured])
+    owner = np.concatenate([np.full(len(r.features[::step]), i) for i, r in enumerate(measured)])
+    speed = np.concatenate([recording.speed[::step] for recording in measured])
+    again = twins[owner]
+    poses = np.concatenate([rows, realism.mirrored_features(rows[again], body)])
+    owners = np.concatenate([owner, owner[again]])
+    some = np.unique(np.linspace(0, len(rows) - 1, LEFT_OUT_POSES).astype(int))
+    distance = realism.nearest_distance(rows[some], poses, owner[some], owners)
+    return poses, realism.real_p95(distance, speed[some])
+
+
+def _slowest_gait(library: Library) -> float:
+    """Speed of the slowest gait that gets about, m/s; NaN where the library has no locomotion."""
+    try:
+        return min(gait.speed for gait in library.gaits if gait.word != "standing")
+    except InputError:
+        return np.nan

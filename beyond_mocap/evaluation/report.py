@@ -1,0 +1,113 @@
+"""The report: every figure of `../shared/metrics.md` for one player's take, in the form of `../shared/contract.md`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..annotation import Timeline
+from ..library.library import Library
+from ..motion.track import Track
+from ..take import Take
+from . import figures
+from .played import Played, played_from_take
+from .view import View
+
+VERSION = 1
+SECONDS = ("load", "library", "search", "construct", "polish", "total")
+
+
+def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
+    """The report of a take in memory: a dict in the form of the contract's Report JSON, None where nothing is known.
+
+    track: the player's samples as measured, seconds and metres. library: what it was made from; without it there are no
+    scores of the recordings beside ours.
+    """
+    report = evaluate_played(
+        played_from_take(take), track=track, timeline=take.timeline, library=library, warnings=take.warnings
+    )
+    seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
+    return {**report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method}
+
+
+def evaluate_played(
+    played: Played,
+    *,
+    track: Track | None = None,
+    timeline: Timeline | None = None,
+    library: Library | None = None,
+    ik_miss: np.ndarray | None = None,
+    warnings: Sequence[str] = (),
+) -> dict:
+    """The report of anything played, from memory or files (`played_from_take`, `played_from_tables`).
+
+    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. InputError where the
+    library has another skeleton than the motion.
+    """
+    view = View(played, track, timeline, library)
+    report = {
+        "version": VERSION,
+        "seed": None,
+        "fps": played.motion.fps,
+        "frames": len(played.motion),
+        "duration_s": played.motion.duration,
+        "seconds": dict.fromkeys(SECONDS),
+        **figures.place(view),
+        "keys": figures.keys(view),
+        **figures.skate_and_ground(view),
+        **figures.polish(view, ik_miss),
+        **figures.seams_and_loops(view),
+        **figures.poses(view),
+        "annotation_similarity": figures.annotation_similarity(view),
+        "warnings": [*warnings, *figures.coverage_warnings(view)],
+    }
+    return rounded(report)
+
+
+def rounded(value, digits: int = 5):
+    """The same report with floats at `digits` significant digits, NaN and infinity as None, numpy numbers as Python's."""
+    if isinstance(value, Mapping):
+        return {key: rounded(entry, digits) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [rounded(entry, digits) for entry in value]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+    return value
+
+
+def table(reports: Mapping[str, dict]) -> str:
+    """Reports side by side as a Markdown table: one column per report, one row per figure, in the reports' order.
+
+    Nested figures are named with dots, key moments are numbered from 1; texts (warnings) are counted.
+    """
+    flat = {name: _flat(report) for name, report in reports.items()}
+    rows = dict.fromkeys(figure for row in flat.values() for figure in row)
+    lines = ["| figure | " + " | ".join(flat) + " |", "|---|" + "---|" * len(flat)]
+    for row in rows:
+        lines.append(f"| {row} | " + " | ".join(_cell(column.get(row)) for column in flat.values()) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _flat(value, name: str = "") -> dict[str, object]:
+    if name == "warnings":
+        return {name: len(value)}
+    if isinstance(value, Mapping):
+        return {k: v for key, entry in value.items() for k, v in _flat(entry, f"{name}.{key}" if name else key).items()}
+    if isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
+        pairs = [(f"{name} {i}", entry) for i, entry in enumerate(value, 1)]
+        return {k: v for label, entry in pairs for k, v in _flat(entry, label).items()}
+    return {name: value}
+
+
+def _cell(value) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, list):
+        return " ".join(str(entry) for entry in value) or "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value).replace("|", "\\|")

@@ -1,0 +1,84 @@
+"""Poses near and far from a library, and the smoothness curve."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from beyond_mocap.evaluation import realism
+from beyond_mocap.motion.adult import adult_skeleton
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.motion import Motion, forward_kinematics, place
+from beyond_mocap.motion.quaternion import from_rotation_vector
+
+FPS = 30.0
+SKELETON = adult_skeleton()
+BODY = identify(SKELETON)
+
+
+def swinging(count=90, speed=1.5, amount=0.4, seed=0):
+    """A body travelling along +X with swinging joints, (T, J, 3) m and the motion."""
+    random = np.random.default_rng(seed)
+    t = np.arange(count) / FPS
+    phase = random.uniform(0, 6, (len(SKELETON), 3))
+    turns = amount * np.sin(2 * np.pi * t[:, None, None] + phase)
+    turns[:, 0] = 0.0
+    root = np.stack([speed * t, 0 * t, 0 * t + 0.95], axis=-1)
+    motion = Motion(SKELETON, root, from_rotation_vector(turns), FPS)
+    return motion
+
+
+def features(motion):
+    return realism.pose_features(SKELETON, forward_kinematics(motion)[0], FPS, BODY.hips)
+
+
+def test_place_and_heading_on_the_pitch_do_not_matter():
+    motion = swinging()
+    np.testing.assert_allclose(features(place(motion, 2.1, (30.0, -7.0, 0.0))), features(motion), atol=2e-5)
+
+
+def test_speed_does_matter():
+    slow, fast = features(swinging(speed=1.0)), features(swinging(speed=3.0))
+    distance = np.linalg.norm(slow - fast, axis=1)
+    # all joints 2 m/s apart, weighed by 0.12 s
+    np.testing.assert_allclose(distance, 0.24, atol=2e-3)
+
+
+def test_a_copy_is_near_and_a_contortion_is_far():
+    library = features(swinging(seed=1))
+    copied = realism.nearest_distance(features(swinging(seed=1))[10:40], library)
+    assert copied.max() < 2e-3
+    assert realism.nearest_distance(features(swinging(seed=1, amount=1.5))[10:40], library).min() > 0.02
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_nearest_distance_is_the_smallest_of_all(seed):
+    random = np.random.default_rng(seed)
+    a, b = random.normal(size=(7, 12)).astype(np.float32), random.normal(size=(30, 12)).astype(np.float32)
+    owner = random.integers(0, 3, 30)
+    mine = random.integers(0, 3, 7)
+    every = np.linalg.norm(a[:, None] - b, axis=-1)
+    np.testing.assert_allclose(realism.nearest_distance(a, b), every.min(axis=1), atol=1e-3)
+    every[mine[:, None] == owner] = np.inf
+    np.testing.assert_allclose(realism.nearest_distance(a, b, mine, owner), every.min(axis=1), atol=1e-3)
+
+
+def test_the_mirrored_pose_of_a_mirrored_pose_is_the_pose():
+    own = features(swinging())
+    twin = realism.mirrored_features(own, BODY)
+    assert np.abs(twin - own).max() > 0.01
+    np.testing.assert_allclose(realism.mirrored_features(twin, BODY), own, atol=1e-6)
+
+
+def test_unreal_compares_at_the_speed():
+    real = realism.real_p95(np.concatenate([np.full(50, 0.1), np.full(50, 0.3)]), np.repeat([0.5, 3.5], 50))
+    flags = realism.unreal(np.array([0.2, 0.2, 0.4]), np.array([0.5, 3.5, 6.0]), real)
+    np.testing.assert_array_equal(flags, [True, False, True])
+
+
+def test_smoothness_peaks_at_a_cut():
+    joined = np.concatenate([features(swinging(seed=1))[:40], features(swinging(seed=2))[40:80]])
+    curve = realism.smoothness(joined)
+    assert len(curve) == 79 and np.argmax(curve) == 39
+    assert realism.smoothness(np.ones((5, 3), np.float32)) == pytest.approx(np.zeros(4))
