@@ -12,7 +12,7 @@ from .measure import units_per_metre
 LENGTH, WIDTH, LINE = 105.0, 68.0, 0.12  # metres; International Football Association Board, Laws of the Game, Law 1
 NAME = "Stage"
 FOCUS = "Stage focus"
-CAMERA_FROM = (-1.5, -9.5, 3.4)  # metres from the focus: from the touchline, a little above the players' heads
+CAMERA_FROM = (-1.5, -8.5, 1.3)  # metres from the focus: from the touchline, a little above the players' heads
 
 
 def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collection:
@@ -70,30 +70,45 @@ def _ground(stage, units: float) -> None:
 
 
 def _lines(stage, units: float) -> None:
-    """All markings as thin quads a few millimetres above the grass."""
-    x, y = LENGTH / 2, WIDTH / 2
-    strokes = [_box(-x, -y, x, y), [(0, -y), (0, y)], _arc((0, 0), 9.15, 0, 360), _arc((0, 0), 0.12, 0, 360)]
-    for side in (-1, 1):
-        goal = side * x
-        strokes += [[(goal, w), (goal - side * depth, w), (goal - side * depth, -w), (goal, -w)]
-                    for w, depth in ((20.16, 16.5), (9.16, 5.5))]
-        middle = 180 if side > 0 else 0
-        strokes += [_arc((goal - side * 11.0, 0), 9.15, middle - 53, middle + 53), _arc((goal - side * 11, 0), 0.12, 0, 360)]
-        strokes += [_arc((goal, s * y), 1.0, 90 + 45 * (side + 1) if s < 0 else 180 * (side > 0) - 90 * (side < 0),
-                         180 + 45 * (side + 1) if s < 0 else 180 * (side > 0) + 90 - 90 * (side < 0)) for s in (-1, 1)]
+    """All markings as ribbons a few millimetres above the grass, each a little higher so that crossings do not flicker."""
     corners, faces = [], []
-    for stroke in strokes:
-        points = np.array(stroke, float)
-        for a, b in zip(points[:-1], points[1:]):
-            along = (b - a) / np.linalg.norm(b - a) * LINE / 2
-            across = np.array([-along[1], along[0]])
-            first = len(corners)
-            quad = (a - along - across, b + along - across, b + along + across, a - along + across)
-            corners += [(*corner * units, 0.006 * units) for corner in quad]
-            faces.append((first, first + 1, first + 2, first + 3))
-    mesh = _mesh("Lines", corners, faces)
+    for number, stroke in enumerate(_strokes()):
+        height = 0.004 + 0.0004 * number
+        first = len(corners)
+        corners += [((*corner, height)) for corner in _ribbon(np.array(stroke, float))]
+        faces += [(i, i + 1, i + 3, i + 2) for i in range(first, len(corners) - 2, 2)]
+    mesh = _mesh("Lines", np.array(corners) * units, faces)
     mesh.materials.append(colour("Line white", (0.85, 0.85, 0.85), 0.9))
     _place(stage, "Lines", mesh)
+
+
+def _strokes() -> list:
+    """The middles of all lines, each a row of points (x, y) in metres."""
+    x, y, spot = LENGTH / 2, WIDTH / 2, LINE / 2
+    strokes = [_box(-x, -y, x, y), [(0, -y), (0, y)], _arc((0, 0), 9.15, 0, 360), _arc((0, 0), spot, 0, 360)]
+    for side in (-1, 1):
+        goal, mark, inward = side * x, side * (x - 11.0), 180 if side > 0 else 0
+        for half_width, depth in ((20.16, 16.5), (9.16, 5.5)):
+            front = goal - side * depth
+            strokes.append([(goal, half_width), (front, half_width), (front, -half_width), (goal, -half_width)])
+        strokes += [_arc((mark, 0), 9.15, inward - 53, inward + 53), _arc((mark, 0), spot, 0, 360)]
+        for touch in (-1, 1):
+            middle = np.degrees(np.arctan2(-touch, -side))
+            strokes.append(_arc((goal, touch * y), 1.0, middle - 45, middle + 45))
+    return strokes
+
+
+def _ribbon(points: np.ndarray) -> np.ndarray:
+    """Left and right edge, in turn, of a line along points (N, 2), mitred at its corners: (2 N, 2)."""
+    along = np.diff(points, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    closed = np.allclose(points[0], points[-1])
+    before = np.concatenate([along[-1:] if closed else along[:1], along])
+    after = np.concatenate([along, along[:1] if closed else along[-1:]])
+    bisector = before + after
+    across = np.stack([-bisector[:, 1], bisector[:, 0]], axis=1)
+    across /= np.sum(across * np.stack([-before[:, 1], before[:, 0]], axis=1), axis=1, keepdims=True)
+    return np.stack([points + across * LINE / 2, points - across * LINE / 2], axis=1).reshape(-1, 2)
 
 
 def _box(x0, y0, x1, y1):
