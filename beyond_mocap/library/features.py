@@ -75,7 +75,8 @@ def feature_joints(skeleton: Skeleton) -> np.ndarray:
 def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.ndarray:
     """One clip's features before PCA: joint positions (T, K, 3) m with the root first, heading (T,) -> (T, 9 K - 2).
 
-    The root's own position is left out except for its height (Faustino: "the position being the world center").
+    The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided by
+    the root of K, so that a distance is the root mean square over joints.
     """
     velocity = _gradient(positions, fps)
     acceleration = _gradient(velocity, fps)
@@ -88,7 +89,7 @@ def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.n
         quaternion.rotate(turn, acceleration) * (0.5 * HORIZON**2),
     ]
     flat = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
-    return flat[:, 2:]
+    return flat[:, 2:] / np.sqrt(positions.shape[1])
 
 
 def _gradient(values: np.ndarray, fps: float) -> np.ndarray:

@@ -82,7 +82,7 @@ class BlockSearch:
         """Slots of `length` frames that cover the motion; all levels cover a whole number of the longest."""
         return -(-len(self.wanted) // BLOCK_LENGTHS[0]) * (BLOCK_LENGTHS[0] // length)
 
-    def _asked(self, slot: int, length: int):
+    def asked_words(self, slot: int, length: int):
         """The asked words of a slot's frames; beyond the end nothing is asked."""
         words = self.wanted.asked[slot * length : (slot + 1) * length]
         return [*words, *[None] * (length - len(words))]
@@ -149,7 +149,7 @@ class BlockSearch:
     def _cluster_costs(self, clusters, usable: np.ndarray, slot: int) -> np.ndarray:
         """alpha times D of each cluster: the mean over its blocks (eq. 19); a key moment forbids clusters without it."""
         count = len(clusters.medoid)
-        cost = self.annotation.of_blocks(clusters.start, self._asked(slot, clusters.length))
+        cost = self.annotation.of_blocks(clusters.start, self.asked_words(slot, clusters.length))
         members = np.bincount(clusters.label[usable], minlength=count)
         total = np.bincount(clusters.label[usable], cost[usable], minlength=count)
         out = np.where(members > 0, self.alpha * total / np.maximum(members, 1), np.inf)
@@ -189,7 +189,7 @@ class BlockSearch:
                 blocks, which = self._thinned(slot, length, candidates), []
             slots.append(blocks)
             keys.append(which)
-            unary.append(self.alpha * self.annotation.of_blocks(blocks.start, self._asked(slot, length)))
+            unary.append(self.alpha * self.annotation.of_blocks(blocks.start, self.asked_words(slot, length)))
         ends, starts = zip(*(self._ends(blocks, length) for blocks in slots))
         weight = (1.0 - self.alpha) / (self.scale * np.sqrt(length // 2))
         choice, _ = cheapest_path(unary, lambda slot: weight * distances(ends[slot], starts[slot + 1]))
@@ -200,7 +200,7 @@ class BlockSearch:
     def _thinned(self, slot: int, length: int, offered: Candidates) -> Candidates:
         """At most MOST_CANDIDATES blocks, those with the best words first, plus the ones beside key moments."""
         if len(offered) > MOST_CANDIDATES:
-            cost = self.annotation.of_blocks(offered.start, self._asked(slot, length))
+            cost = self.annotation.of_blocks(offered.start, self.asked_words(slot, length))
             offered = offered.at(np.sort(np.argsort(cost, kind="stable")[:MOST_CANDIDATES]))
         beside = self._beside_keys(slot, length)
         return Candidates(np.append(offered.clip, beside.clip), np.append(offered.start, beside.start))

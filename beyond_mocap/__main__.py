@@ -1,0 +1,345 @@
+"""The command line: `python -m beyond_mocap VERB ...`; Blender's command and batch script use the same parser.
+
+Exit status: 0 done; 2 the command line or an input is wrong; 3 asked for something the library cannot do; 130 cancelled.
+What is wrong is told in one line on stderr. See the project's README for examples.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from . import __version__
+from .errors import BeyondMocapError, Cancelled, InputError
+from .plan import METHODS
+
+Writer = Callable[[object, Path], None]
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """A parser whose errors are one line, with status 2."""
+
+    def error(self, message: str):
+        """Raises the message as an InputError."""
+        raise InputError(self.prog, message, "", f"see '{self.prog} --help'")
+
+
+def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
+    """The parser of all verbs."""
+    top = OneLineParser(prog=prog, description="From tracks, a few words and motion capture to moving bodies.")
+    top.add_argument("--version", action="version", version=f"beyond-mocap {__version__}")
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
+    for add in (_add_library, _add_synthesize, _add_mirror, _add_evaluate):
+        verb = add(verbs)
+        verb.add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
+    return top
+
+
+def _add_library(verbs) -> argparse.ArgumentParser:
+    verb = verbs.add_parser("library", help="read a folder of BVH clips and annotations and print what it holds")
+    verb.add_argument("library", type=Path, metavar="LIBRARY")
+    verb.add_argument("--rebuild", action="store_true", help="ignore the cache")
+    _add_library_options(verb)
+    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.set_defaults(run=run_library)
+    return verb
+
+
+def _add_library_options(verb) -> None:
+    verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
+    verb.add_argument("--skeleton", type=Path, metavar="CLIP.bvh", help="whose skeleton the library has")
+    verb.add_argument("--unit", type=_positive, metavar="METRES", help="metres per unit of the BVH files")
+
+
+def _add_synthesize(verbs) -> argparse.ArgumentParser:
+    verb = verbs.add_parser("synthesize", help="one player's motion from a track, annotations and a library")
+    verb.add_argument("--library", type=Path, required=True)
+    verb.add_argument("--track", type=Path, required=True, metavar="T.csv")
+    verb.add_argument("--annotations", type=Path, required=True, metavar="A.txt")
+    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
+    verb.add_argument("--provenance", type=Path, metavar="P.csv")
+    verb.add_argument("--ball", type=Path, metavar="B.csv")
+    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.add_argument("--method", choices=METHODS, default="path")
+    verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
+    verb.add_argument("--fps", type=_positive, default=30.0)
+    verb.add_argument("--seed", type=int, default=0)
+    verb.add_argument("--alpha", type=_share, default=0.2, help="weight of words against continuity, 0 to 1")
+    verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
+    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words where the library lacks some")
+    _add_library_options(verb)
+    verb.set_defaults(run=run_synthesize)
+    return verb
+
+
+def _add_mirror(verbs) -> argparse.ArgumentParser:
+    verb = verbs.add_parser("mirror", help="left becomes right")
+    verb.add_argument("input", type=Path, metavar="IN.bvh")
+    verb.add_argument("output", type=Path, metavar="OUT.bvh")
+    verb.add_argument("--unit", type=_positive, metavar="METRES")
+    verb.set_defaults(run=run_mirror)
+    return verb
+
+
+def _add_evaluate(verbs) -> argparse.ArgumentParser:
+    verb = verbs.add_parser("evaluate", help="every figure of a motion")
+    verb.add_argument("motion", type=Path, metavar="M.bvh")
+    verb.add_argument("--track", type=Path, metavar="T.csv")
+    verb.add_argument("--annotations", type=Path, metavar="A.txt")
+    verb.add_argument("--provenance", type=Path, metavar="P.csv")
+    verb.add_argument("--ball", type=Path, metavar="B.csv")
+    verb.add_argument("--library", type=Path)
+    _add_library_options(verb)
+    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
+    verb.set_defaults(run=run_evaluate)
+    return verb
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
+    return value
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
+    return value
+
+
+def run_library(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+    """`library`: builds it and prints what it holds."""
+    _check_outputs(options.report)
+    library = _library(options, told, rebuild=options.rebuild)
+    summary = summarize(library)
+    told.end()
+    for line in summary["lines"]:
+        print(line)
+    if options.report:
+        from .files.tables import write_report
+
+        write_report(options.report, summary)
+
+
+def summarize(library) -> dict:
+    """What a library holds: clips, minutes, words, speeds, and the sentences that `library` prints."""
+    own = [clip for clip in library.clips if not clip.mirrored]
+    words = sorted(library.words)
+    gaits = [{"word": g.word, "words": list(g.words), "speed_m_s": g.speed} for g in library.gaits]
+    keys = sorted({" ".join(sorted(key.words)) for key in library.keys})
+    lines = [
+        f"{library.folder}: {len(own)} clips (and their mirrors), {library.minutes:.1f} minutes, "
+        f"{len(library.skeleton)} joints",
+        "words: " + " ".join(words),
+        "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
+        f"fastest: {library.frames.speed.max():.1f} m/s",
+        "key moments: " + (", ".join(keys) if keys else "none"),
+        *library.notes,
+    ]
+    return {
+        "version": __version__, "clips": len(own), "minutes": library.minutes, "words": words, "gaits": gaits,
+        "fastest_m_s": float(library.frames.speed.max()), "keys": keys, "notes": list(library.notes), "lines": lines,
+    }
+
+
+def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+    """`synthesize`: one player, and what was asked to be written about it."""
+    from .annotation import read_timeline, validate
+    from .files.tables import write_ball, write_provenance, write_report
+    from .files.tracking import read_track_csv
+    from .motion.track import clean
+    from .plan import Plan
+    from .synthesize import synthesize
+
+    begun = time.perf_counter()
+    write = _writer(options.out, writers)
+    _check_outputs(options.out, options.provenance, options.ball, options.report)
+    track, data = clean(read_track_csv(options.track))
+    timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
+    loaded = time.perf_counter()
+    library = _library(options, told)
+    validate(timeline, library.words, float(track.times[0]), float(track.times[-1]), str(options.annotations))
+    ready = time.perf_counter()
+    plan = Plan(
+        track=track, timeline=timeline, library=str(options.library), method=options.method,
+        catch_up=not options.no_catch_up, fps=options.fps, alpha=options.alpha, mirror=not options.no_mirror,
+        nearest=options.nearest, seed=options.seed,
+    )
+    take = synthesize(library, plan, told.progress, told.cancelled)
+    take.seconds.update(load=loaded - begun, library=ready - loaded, total=time.perf_counter() - begun)
+    write(take, options.out)
+    if options.provenance:
+        write_provenance(options.provenance, take)
+    if options.ball and take.ball is not None:
+        write_ball(options.ball, take.ball)
+    if options.report:
+        from .evaluation.report import evaluate
+
+        report = evaluate(take, track, library)
+        report["warnings"] = [*report.get("warnings", []), *data.lines]
+        write_report(options.report, report)
+    told.end()
+    for warning in take.warnings:
+        print(f"note: {warning}", file=sys.stderr)
+    if options.ball and take.ball is None:
+        print(f"note: {options.track} has no ball, so {options.ball} was not written", file=sys.stderr)
+    print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
+
+
+def run_mirror(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+    """`mirror`: the same file with left and right exchanged."""
+    from .files import bvh
+    from .motion.mirror import mirror
+
+    _check_outputs(options.output)
+    clip = bvh.read(options.input, options.unit)
+    bvh.write(options.output, mirror(clip.motion), clip.form)
+    told.end()
+    print(f"{options.output}: {len(clip.motion)} frames")
+
+
+def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+    """`evaluate`: the report of a motion that was written before. `--unit` is the library's where there is one."""
+    from .annotation import read_timeline
+    from .evaluation.played import played_from_tables
+    from .evaluation.report import evaluate_played
+    from .files import bvh
+    from .files.tables import read_ball, read_provenance, write_report
+    from .files.tracking import read_track_csv
+    from .motion.track import clean
+
+    _check_outputs(options.report)
+    motion = bvh.read(options.motion, None if options.library else options.unit).motion
+    track = clean(read_track_csv(options.track))[0] if options.track else None
+    start = float(track.times[0]) if track else 0.0
+    timeline = read_timeline(options.annotations, motion.fps, start) if options.annotations else None
+    provenance = read_provenance(options.provenance) if options.provenance else None
+    ball = read_ball(options.ball) if options.ball else None
+    played = played_from_tables(motion, provenance, ball, start, str(options.provenance))
+    library = _library(options, told) if options.library else None
+    write_report(options.report, evaluate_played(played, track=track, timeline=timeline, library=library))
+    told.end()
+    print(options.report)
+
+
+def _library(options, told: "Told", rebuild: bool = False):
+    from .library.library import build
+
+    return build(
+        options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
+        progress=told.progress, cancelled=told.cancelled,
+    )
+
+
+def _writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
+    known = {".bvh": write_bvh, **writers}
+    if out.suffix.lower() not in known:
+        raise InputError(
+            out, f"cannot write '{out.suffix or 'no suffix'}' here", f"one of {', '.join(sorted(known))}",
+            "inside Blender .blend, .fbx, .glb and .usdc can be written too",
+        )
+    return known[out.suffix.lower()]
+
+
+def write_bvh(take, out: Path) -> None:
+    """The take's motion as BVH."""
+    from .files import bvh
+
+    bvh.write(out, take.motion)
+
+
+def _check_outputs(*paths: Path | None) -> None:
+    """Every output's folder has to exist before work begins."""
+    for path in paths:
+        if path is not None and not path.absolute().parent.is_dir():
+            raise InputError(path, "its folder does not exist", "an existing folder", "make the folder first")
+        if path is not None and path.is_dir():
+            raise InputError(path, "is a folder", "a file name", "add a file name")
+
+
+class Told:
+    """What the user sees of the progress, and whether Ctrl-C was pressed."""
+
+    def __init__(self, as_json: bool, stream=None):
+        """as_json: JSON lines; otherwise a bar where `stream` (default stderr) is a terminal."""
+        self._stream = stream or sys.stderr
+        self._json = as_json
+        self._bar = not as_json and self._stream.isatty()
+        self._stop = threading.Event()
+        self._last = ""
+
+    def progress(self, fraction: float, text: str) -> None:
+        """Shows how far the work is."""
+        if self._json:
+            print(json.dumps({"progress": round(fraction, 4), "text": text}), file=self._stream, flush=True)
+        elif self._bar:
+            done = int(round(30 * fraction))
+            line = f"\r[{'#' * done}{'.' * (30 - done)}] {fraction:4.0%} {text[:40]:40s}"
+            if line != self._last:
+                print(line, end="", file=self._stream, flush=True)
+                self._last = line
+
+    def end(self) -> None:
+        """Clears the bar."""
+        if self._last:
+            print("\r" + " " * 80 + "\r", end="", file=self._stream, flush=True)
+            self._last = ""
+
+    def cancel(self, *_) -> None:
+        """A signal handler: asks the work to stop."""
+        self._stop.set()
+
+    def cancelled(self) -> bool:
+        """Whether the user wants out."""
+        return self._stop.is_set()
+
+
+def main(argv: list[str] | None = None, writers: Mapping[str, Writer] | None = None, prog: str = "beyond-mocap") -> int:
+    """Runs one command and returns its exit status. `writers`: by suffix, further kinds of `--out` (Blender's)."""
+    told = None
+    try:
+        options = parser(prog).parse_args(sys.argv[1:] if argv is None else argv)
+        told = Told(options.json)
+        with _interrupts(told):
+            options.run(options, told, writers or {})
+        return 0
+    except BeyondMocapError as error:
+        status, text = error.exit_status, str(error)
+    except KeyboardInterrupt:
+        status, text = Cancelled.exit_status, "cancelled"
+    except OSError as error:
+        place = error.filename or prog
+        status, text = 2, f"{place}: {error.strerror or error}; check that the file can be read and its folder written"
+    except SystemExit as done:  # --help and --version
+        return int(done.code or 0)
+    if told is not None:
+        told.end()
+    print(f"{prog}: {text}", file=sys.stderr)
+    return status
+
+
+class _interrupts:
+    """While it lasts, Ctrl-C asks the work to stop instead of breaking it off; outside the main thread nothing changes."""
+
+    def __init__(self, told: Told):
+        self._told, self._before = told, None
+
+    def __enter__(self):
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.signal(signal.SIGINT, self._told.cancel)
+
+    def __exit__(self, *_):
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

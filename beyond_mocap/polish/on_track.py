@@ -1,0 +1,62 @@
+"""A motion laid on the ground: which way the body faces, and where its root goes, at every frame.
+
+The body's own sway about its path is kept: the root is the track plus the sway, turned with the body. Facing is not the
+direction of travel; what is kept is the angle between the two that the recording had.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from ..motion.track import zero_phase_hann
+
+TURN_WEIGHT = 12.0
+ROOT_WINDOW = 1.5
+
+
+def facing(direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """(T,) facing in radians, unwrapped: the least squares compromise between travel and the recording's own turning.
+
+    direction (T,) of travel on the track and speed (T,) m/s there; velocity (T, 2) m/s of the recording in its facing
+    frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle to
+    the direction of travel; where either stands still there is no such angle and the recording's turning decides alone.
+    Every term is quadratic, so the whole is one tridiagonal system.
+    """
+    count = len(direction)
+    own_speed = np.linalg.norm(velocity, axis=1)
+    offset = np.arctan2(velocity[:, 1], velocity[:, 0])
+    goal = _unwrapped(direction - offset, turn)
+    trust = np.minimum(1.0, speed) ** 2 * np.minimum(1.0, own_speed) ** 2 + 1e-4
+    diagonal = trust.copy()
+    diagonal[1:] += TURN_WEIGHT
+    diagonal[:-1] += TURN_WEIGHT
+    right = trust * goal
+    right[1:] += TURN_WEIGHT * turn[1:]
+    right[:-1] -= TURN_WEIGHT * turn[1:]
+    band = np.zeros((2, count))
+    band[0] = diagonal
+    band[1, :-1] = -TURN_WEIGHT
+    return solveh_banded(band, right, lower=True) if count > 1 else goal
+
+
+def _unwrapped(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Angles without jumps of a full turn relative to what the recording's own turning leads one to expect."""
+    expected = np.cumsum(turn)
+    return np.unwrap(goal - expected) + expected
+
+
+def root_with_sway(place: np.ndarray, sway: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """(T, 2) root on the ground: `place` (T, 2) plus sway (T, 2, in the facing frame) turned by facing `angle` (T,)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return place + np.stack([cosine * sway[:, 0] - sine * sway[:, 1], sine * sway[:, 0] + cosine * sway[:, 1]], axis=1)
+
+
+def pulled_to_track(root: np.ndarray, track: np.ndarray, fps: float, rounds: int = 4) -> np.ndarray:
+    """(T, 2) root without what drifts slowly from the track (T, 2): the difference of the two, both seen through a 1.5 s
+    Hann window (../shared/metrics.md, root error), is removed `rounds` times; once would leave a third of it, since the
+    window is not sharp."""
+    smooth = zero_phase_hann(track, fps, ROOT_WINDOW)
+    for _ in range(rounds):
+        root = root - (zero_phase_hann(root, fps, ROOT_WINDOW) - smooth)
+    return root

@@ -1,0 +1,128 @@
+"""Sections of blocks turned into what each output frame shows and how far it has travelled (Faustino §3.2.4, §3.3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..library.library import Library
+from ..polish.time_warp import catch_up, warp
+from .blocks import FINEST, BlockSearch, Candidates
+from .edit_list import EditList, PlacedKey
+from .joints import edit_list
+from .locomotion import Section, travelled_distance
+
+CATCH_UP_FRAMES = 60
+
+
+def placed_keys(search: BlockSearch) -> tuple[PlacedKey, ...]:
+    """The key moments that the search's blocks show."""
+    return tuple(
+        PlacedKey(number, key.clip, key.frame) for _, (number, key) in sorted(search.key_in_slot.items())
+    )
+
+
+def frames_of(blocks: Candidates) -> tuple[np.ndarray, np.ndarray]:
+    """Clip and library frame of every frame of the blocks, (8 K,) each."""
+    frame = blocks.start[:, None] + np.arange(FINEST)
+    return np.repeat(blocks.clip, FINEST), frame.ravel()
+
+
+def straight_edit(search: BlockSearch, blocks: Candidates) -> EditList:
+    """The blocks one after the other, cut to the order's length, seams moved to where clips agree best."""
+    clip, frame = frames_of(blocks)
+    count = len(search.wanted)
+    fixed = [int(round(key.frame)) for key in search.wanted.keys if key.choices]
+    return edit_list(search.library, clip[:count], frame[:count], placed_keys(search), fixed)
+
+
+def warped_edit(search: BlockSearch, sections: list[Section], catching_up: bool) -> tuple[EditList, np.ndarray]:
+    """The sections played so that locomotion goes at the track's speed, and (T,) metres travelled by each output frame.
+
+    Other sections are played as recorded and travel what the recording did; what they lose or gain against the track is
+    regained in the locomotion that follows (`catching_up`), or stays.
+    """
+    clip, frame = frames_of(_joined(sections))
+    source = edit_list(search.library, clip, frame, (), _fixed(search, sections))
+    piece = np.zeros(len(source), int)
+    piece[source.seams] = 1
+    piece = np.cumsum(piece)
+    asked, own = travelled_distance(search.wanted), _own_distance(search.library, source)
+    shown, travelled, low = [], [], 0
+    for section in sections:
+        high = low + FINEST * len(section.blocks)
+        out = _section_frames(section, len(asked))
+        so_far = travelled[-1][-1] if travelled else 0.0
+        at, metres = _played(section, own[low:high] - own[low], asked[out], so_far, catching_up)
+        shown.append(low + at)
+        travelled.append(so_far + metres)
+        low = high
+    place = np.concatenate(shown)
+    return _read_through(source, piece, place, placed_keys(search)), np.concatenate(travelled)
+
+
+def _joined(sections: list[Section]) -> Candidates:
+    return Candidates(
+        np.concatenate([s.blocks.clip for s in sections]), np.concatenate([s.blocks.start for s in sections])
+    )
+
+
+def _section_frames(section: Section, count: int) -> slice:
+    return slice(section.first * FINEST, min(section.end * FINEST, count))
+
+
+def _fixed(search: BlockSearch, sections: list[Section]) -> list[int]:
+    """Frames of the joined sections that show a key moment."""
+    out, low = [], 0
+    for section in sections:
+        for key in search.wanted.keys:
+            inside = int(round(key.frame)) - section.first * FINEST
+            if key.choices and not section.locomotion and 0 <= inside < FINEST * len(section.blocks):
+                out.append(low + inside)
+        low += FINEST * len(section.blocks)
+    return out
+
+
+def _own_distance(library: Library, source: EditList) -> np.ndarray:
+    """(M,) metres that the clips travel up to each frame of `source`; nothing is travelled across a seam but what the frame
+    before it would have gone on to do."""
+    frames = library.frames
+    first, last = frames.first[source.clip], frames.first[source.clip] + frames.count[source.clip] - 1
+    at = np.clip(np.round(source.frame).astype(int), first, last)
+    step = np.linalg.norm(frames.velocity[at], axis=1) / library.fps
+    return np.concatenate([[0.0], np.cumsum(step[:-1])])
+
+
+def _played(section: Section, own: np.ndarray, asked: np.ndarray, so_far: float, catching_up: bool):
+    """Source frames (F,) within the section and metres (F,) travelled from its start, for its F output frames."""
+    count = len(asked)
+    if not count:
+        return np.zeros(0), np.zeros(0)
+    if not section.locomotion:
+        return np.arange(count, dtype=float), own[:count]
+    goal = asked - asked[0]
+    if catching_up:
+        goal = goal + catch_up(float(asked[0]) - so_far, count, CATCH_UP_FRAMES)
+    goal = np.maximum.accumulate(goal - goal[0])
+    return warp(own, goal), goal
+
+
+def _read_through(source: EditList, piece: np.ndarray, place: np.ndarray, keys) -> EditList:
+    """What is shown when frames `place` (T,) of `source` are played; pieces stay apart."""
+    nearest = np.clip(np.floor(place + 1e-6).astype(int), 0, len(source) - 1)
+    frame = source.frame[nearest] + (place - nearest)
+    seams = np.flatnonzero(np.diff(piece[nearest]) != 0) + 1
+    return EditList(source.clip[nearest], frame, seams, keys)
+
+
+def exact_keys(library: Library, edit: EditList, wanted) -> EditList:
+    """The edit list with each key's piece shifted by the part of a frame that the search's grid left over."""
+    frame = edit.frame.copy()
+    for key in edit.keys:
+        at = wanted.keys[key.wanted].frame
+        low = next(piece for piece in edit.pieces if piece[0] <= int(round(at)) < piece[1])
+        index = np.arange(*low)
+        shown = np.interp(at, index, frame[index]) if len(index) > 1 else frame[index][0]
+        goal = library.frames.first[key.clip] + key.clip_frame * library.fps / library.clips[key.clip].motion.fps
+        if np.all(edit.clip[index] == key.clip) and abs(goal - shown) < 2.0:
+            frame[index] += goal - shown
+    return EditList(edit.clip, frame, edit.seams, edit.keys)

@@ -1,0 +1,107 @@
+"""The frames of an edit list, fetched from their clips and taken off the ground: poses in their own facing frame.
+
+What is left of a clip's place in the world are differences: how the body sways about its path, how fast it goes in which
+direction as seen from its facing, and how it turns. Whoever lays the motion on the ground decides the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..library.library import Library
+from ..motion import quaternion
+from ..motion.motion import at_frames
+from .edit_list import EditList, at_times
+
+
+@dataclass(frozen=True, eq=False)
+class Footage:
+    """T output frames.
+
+    clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's own rate, piece (T,).
+    pose (T, J, 4) local rotations, the root's relative to its facing; height (T,) m of the root; sway (T, 2) m from the
+    clip's path to the root, in the facing frame; velocity (T, 2) m/s of the path as played, in the facing frame; turn (T,)
+    radians of facing since the frame before, 0 at a seam; contacts (T, 2) bool. ahead_*: the same for the frame that the
+    piece before would have shown at each seam, (S, ...).
+    """
+
+    clip: np.ndarray
+    frame: np.ndarray
+    clip_frame: np.ndarray
+    piece: np.ndarray
+    pose: np.ndarray
+    height: np.ndarray
+    sway: np.ndarray
+    velocity: np.ndarray
+    turn: np.ndarray
+    contacts: np.ndarray
+    seams: np.ndarray
+    ahead_pose: np.ndarray
+    ahead_height: np.ndarray
+    ahead_sway: np.ndarray
+
+
+def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> Footage:
+    """Footage at fractional output frames `index` (T,) of the library's rate; `rate`: output frames per second."""
+    clip, frame, piece = at_times(edit, index)
+    pose, height, sway, heading = _poses(library, clip, frame)
+    seams = np.flatnonzero(np.diff(piece)) + 1
+    played = np.gradient(frame) if len(frame) > 1 else np.ones(len(frame))
+    for edge in seams:  # the difference across a seam says nothing about speed
+        played[edge - 1] = frame[edge - 1] - frame[edge - 2] if edge > 1 and edge - 1 not in seams else 1.0
+        played[edge] = frame[edge + 1] - frame[edge] if edge + 1 < len(frame) and edge + 1 not in seams else 1.0
+    velocity = _interpolated(library, clip, frame, library.frames.velocity) * (played * rate / library.fps)[:, None]
+    turn = np.diff(heading, prepend=heading[:1])
+    turn[seams] = 0.0
+    before = seams - 1
+    ahead_frame = frame[before] + played[before]
+    ahead = _poses(library, clip[before], ahead_frame)
+    return Footage(
+        clip, frame, _clip_frames(library, clip, frame), piece, pose, height, sway, velocity, turn,
+        _contacts(library, clip, frame), seams, *ahead[:3],
+    )
+
+
+def _clip_frames(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """Fractional frames in the clips' own rates, held at the clips' ends."""
+    rates = np.array([c.motion.fps for c in library.clips]) / library.fps
+    lengths = np.array([len(c.motion) for c in library.clips])
+    return np.clip((frame - library.frames.first[clip]) * rates[clip], 0, lengths[clip] - 1)
+
+
+def _poses(library: Library, clip: np.ndarray, frame: np.ndarray):
+    """Pose, height, sway and heading at library frames; each clip is read once."""
+    count, joints = len(clip), len(library.skeleton)
+    pose, root = np.empty((count, joints, 4)), np.empty((count, 3))
+    own = _clip_frames(library, clip, frame)
+    for number in np.unique(clip):
+        at = np.flatnonzero(clip == number)
+        root[at], pose[at] = at_frames(library.clips[number].motion, own[at])
+    heading = _interpolated(library, clip, frame, library.frames.heading)
+    path = _interpolated(library, clip, frame, library.frames.path)
+    back = quaternion.about_up(-heading)
+    pose[:, 0] = quaternion.multiply(back, pose[:, 0])
+    away = np.concatenate([root[:, :2] - path, np.zeros((count, 1))], axis=1)
+    return pose, root[:, 2], quaternion.rotate(back, away)[:, :2], heading
+
+
+def _interpolated(library: Library, clip: np.ndarray, frame: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Linear interpolation of per-frame `values` (N, ...) within clips, held at their ends."""
+    first = library.frames.first[clip]
+    at = np.clip(frame, first, first + library.frames.count[clip] - 1)
+    low = np.minimum(np.floor(at).astype(int), np.maximum(first + library.frames.count[clip] - 2, first))
+    high = np.minimum(low + 1, first + library.frames.count[clip] - 1)
+    weight = (at - low).reshape(-1, *[1] * (values.ndim - 1))
+    return values[low] * (1.0 - weight) + values[high] * weight
+
+
+def _contacts(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """(T, 2) bool, from the nearest frame of each clip."""
+    own = np.round(_clip_frames(library, clip, frame)).astype(int)
+    out = np.zeros((len(clip), 2), bool)
+    for number in np.unique(clip):
+        at = clip == number
+        out[at] = library.clips[number].contacts[own[at]]
+    return out

@@ -1,0 +1,267 @@
+"""A search that looks at speed, turning and words together with continuity, over the whole track.
+
+Faustino searches for words first and repairs distance afterwards; his §6.1 and §6.2 wish for position, distance and
+orientation inside the main search. Here every slot of about eight frames offers every frame of the library at five rates;
+its cost is how far speed, turn, facing and words are from what the track asks, plus what the change of pose costs. A beam
+keeps the best states of every slot. Key moments are slots of their own, as long as the clips that serve them need, and the
+beam has to pass through one of these clips at exactly the asked time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import Cancelled
+from ..library.keys import Key
+from ..library.library import Library
+from .annotation_cost import AnnotationCost
+from .edit_list import EditList, PlacedKey, find_seams
+from .wanted import Wanted, needed, pool_frame
+
+SLOT = 8
+RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
+BEAM = 64
+CANDIDATES = 1500
+MEMORY_SLOTS = 15
+BUCKET = 40
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What a unit of each misfit costs. speed per m/s; turn per radian and slot; facing per radian off the direction of
+    travel; words for lacking all of the asked ones; rate per unit of warp; switch for any cut; pose per metre of joint
+    distance; rate_change per unit; replay for a stretch shown less than 4 s ago."""
+
+    speed: float = 1.0
+    turn: float = 0.5
+    facing: float = 0.1
+    words: float = 0.3
+    rate: float = 0.24
+    switch: float = 0.1
+    pose: float = 1.0
+    rate_change: float = 0.16
+    replay: float = 0.5
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Output frames first .. end at the library's rate; keys: (number of the wanted key, its choices) or None."""
+
+    first: int
+    end: int
+    key: tuple[int, tuple[Key, ...]] | None = None
+
+    def __len__(self) -> int:
+        return self.end - self.first
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """B ways to fill a slot: clip (B,), start (B,) library frame, rate (B,), cost (B,) of the best way here, back (B,)
+    state of the slot before, choice (B,) of a key's clips or -1, recent (B, M) buckets shown lately."""
+
+    clip: np.ndarray
+    start: np.ndarray
+    rate: np.ndarray
+    cost: np.ndarray
+    back: np.ndarray
+    choice: np.ndarray
+    recent: np.ndarray
+
+
+class PathSearch:
+    """One search; `run()` gives the edit list."""
+
+    def __init__(
+        self,
+        library: Library,
+        wanted: Wanted,
+        weights: Weights = Weights(),
+        progress: Callable[[float, str], None] | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ):
+        self.library, self.wanted, self.weights = library, wanted, weights
+        self.frames = library.frames
+        self.annotation = AnnotationCost(library.frames)
+        self.usable = wanted.allowed[library.frames.clip]
+        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
+        self.played = [played_speed_and_turn(library, rate) for rate in RATES]
+        self.off_travel = np.abs(np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]))
+        self._report = progress or (lambda fraction, text: None)
+        self._cancelled = cancelled or (lambda: False)
+        self._missing: dict[frozenset[str], np.ndarray] = {}
+
+    def run(self) -> EditList:
+        """The cheapest way through all slots that the beam finds."""
+        slots = slots_between_keys(self.library, self.wanted)
+        layers: list[States] = []
+        for number, slot in enumerate(slots):
+            if self._cancelled():
+                raise Cancelled("synthesis: cancelled")
+            self._report(number / len(slots), "Searching")
+            layers.append(self._layer(slot, layers[-1] if layers else None, slots[number - 1]))
+        return self._read(slots, layers)
+
+    def _layer(self, slot: Slot, before: States | None, last: Slot) -> States:
+        """The best states of one slot, given those of the slot before."""
+        table = None if slot.key else np.stack([self._unary(slot, number) for number in range(len(RATES))])
+        clip, start, rate, unary, choice = self._key_states(slot) if slot.key else self._free_states(table)
+        if before is None:
+            return self._first(clip, start, rate, unary, choice)
+        ends = before.start + before.rate * len(last)
+        through = before.cost[:, None] + self._switch_costs(before, ends, start, rate)
+        back = np.argmin(through, axis=0)
+        cost = through[back, np.arange(len(start))] + unary
+        options = [(clip, start, rate, cost, back, choice)]
+        if slot.key is None:
+            options.append(self._continued(slot, table, before, ends))
+        return self._kept(before, *(np.concatenate(parts) for parts in zip(*options)))
+
+    def _first(self, clip, start, rate, unary, choice) -> States:
+        best = np.argsort(unary, kind="stable")[:BEAM]
+        recent = np.full((len(best), MEMORY_SLOTS), -1)
+        recent[:, -1] = self.bucket[self._inside(start[best])]
+        back = np.zeros(len(best), int)
+        return States(clip[best], start[best], rate[best], unary[best], back, choice[best], recent)
+
+    def _kept(self, before: States, clip, start, rate, cost, back, choice) -> States:
+        """The BEAM cheapest, with their memory moved on by one slot."""
+        best = np.argsort(cost, kind="stable")[:BEAM]
+        start, back = start[best], back[best]
+        recent = np.roll(before.recent[back], -1, axis=1)
+        recent[:, -1] = self.bucket[self._inside(start)]
+        return States(clip[best], start, rate[best], cost[best], back, choice[best], recent)
+
+    def _inside(self, frame: np.ndarray) -> np.ndarray:
+        return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
+
+    def _free_states(self, table: np.ndarray):
+        """The CANDIDATES cheapest pairs of library frame and rate of a slot's misfits `table` (rates, N)."""
+        flat = table.ravel()
+        best = np.argpartition(flat, CANDIDATES)[:CANDIDATES] if len(flat) > CANDIDATES else np.arange(len(flat))
+        best = np.sort(best[np.isfinite(flat[best])])
+        number, start = np.divmod(best, table.shape[1])
+        return self.frames.clip[start], start.astype(float), RATES[number], flat[best], np.full(len(best), -1)
+
+    def _unary(self, slot: Slot, number: int) -> np.ndarray:
+        """(N,) misfit of every library frame, played at RATES[number], to what a slot asks."""
+        speed, turn, valid = self.played[number]
+        wanted_speed, wanted_turn = self._asked(slot)
+        w, moving = self.weights, min(1.0, wanted_speed)
+        cost = w.speed * np.abs(speed - wanted_speed)
+        cost += w.turn * (0.3 + 0.7 * moving) * np.abs(turn * (len(slot) / SLOT) - wanted_turn)
+        cost += w.facing * moving * self.off_travel + w.rate * abs(RATES[number] - 1.0)
+        words = self.wanted.asked[(slot.first + slot.end) // 2]
+        if words:
+            cost += w.words * self._missing_share(words)
+        return np.where(valid & self.usable, cost, np.inf)
+
+    def _missing_share(self, words: frozenset[str]) -> np.ndarray:
+        if words not in self._missing:
+            self._missing[words] = self.annotation.missing_share(words)
+        return self._missing[words]
+
+    def _asked(self, slot: Slot) -> tuple[float, float]:
+        """Mean speed in m/s and change of direction in radians that the track asks over a slot."""
+        track = self.wanted.track
+        last = min(slot.end, len(track.times) - 1)
+        speed = float(track.speed[slot.first : last + 1].mean())
+        return speed, float(track.direction[last] - track.direction[slot.first]) * min(1.0, speed)
+
+    def _key_states(self, slot: Slot):
+        """One state per clip that can serve the slot's key moment at the asked time."""
+        number, choices = slot.key
+        wanted_speed, _ = self._asked(slot)
+        offset = self.wanted.keys[number].frame - slot.first
+        start = np.array([pool_frame(self.library, key) - offset for key in choices])
+        clip = np.array([key.clip for key in choices])
+        first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
+        held = np.maximum(first - start, 0) + np.maximum(start + len(slot) - last, 0)
+        span = np.clip(np.round(start[:, None] + np.arange(len(slot))).astype(int), first[:, None], last[:, None])
+        misfit = np.abs(self.frames.speed[span].mean(axis=1) - wanted_speed)
+        unary = (self.weights.speed * misfit + 0.1 * held) * (len(slot) / SLOT)
+        return clip, start, np.ones(len(start)), unary, np.arange(len(start))
+
+    def _switch_costs(self, before: States, ends: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """(B, K) cost of cutting from each kept state to each candidate."""
+        a, b = self.frames.features[self._inside(ends)], self.frames.features[self._inside(start)]
+        square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
+        cost = self.weights.switch + self.weights.pose * np.sqrt(np.maximum(square, 0.0))
+        cost += self.weights.rate_change * np.abs(before.rate[:, None] - rate[None, :])
+        return cost + self.weights.replay * self._seen(before)[:, self.bucket[self._inside(start)]]
+
+    def _seen(self, before: States) -> np.ndarray:
+        """(B, buckets) whether a state has lately shown a bucket of frames or its neighbours."""
+        seen = np.zeros((len(before.start), self.bucket[-1] + 3), bool)
+        row = np.arange(len(before.start))[:, None]
+        for shift in (0, 1, 2):
+            seen[row, np.maximum(before.recent + shift, 0)] = True
+        return seen[:, 1:-1]
+
+    def _continued(self, slot: Slot, table: np.ndarray, before: States, ends: np.ndarray):
+        """Going on without a cut, at each rate; a slot a little longer than the table's must still end inside the clip."""
+        back = np.repeat(np.arange(len(ends)), len(RATES))
+        number = np.tile(np.arange(len(RATES)), len(ends))
+        clip, start, rate = before.clip[back], ends[back], RATES[number]
+        first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
+        inside = (start >= first) & (start + rate * len(slot) <= last)
+        unary = np.where(inside, table[number, self._inside(start)], np.inf)
+        cost = before.cost[back] + unary + self.weights.rate_change * np.abs(rate - before.rate[back])
+        return clip, start, rate, cost, back, np.full(len(back), -1)
+
+    def _read(self, slots: list[Slot], layers: list[States]) -> EditList:
+        """Follows the cheapest last state back to the first."""
+        state = int(np.argmin(layers[-1].cost))
+        clip, frame = np.empty(len(self.wanted), int), np.empty(len(self.wanted))
+        keys = []
+        for slot, states in zip(slots[::-1], layers[::-1]):
+            frame[slot.first : slot.end] = states.start[state] + states.rate[state] * np.arange(len(slot))
+            clip[slot.first : slot.end] = states.clip[state]
+            if slot.key:
+                key = slot.key[1][states.choice[state]]
+                keys.append(PlacedKey(slot.key[0], key.clip, key.frame))
+            state = int(states.back[state])
+        return EditList(clip, frame, find_seams(clip, frame), tuple(keys[::-1]))
+
+
+def slots_between_keys(library: Library, wanted: Wanted) -> list[Slot]:
+    """The output cut into slots: one per served key moment, as long as its clips' entry and exit, and slots of about
+    eight frames between. Key moments that crowd each other share the frames between them."""
+    served = [(number, key) for number, key in enumerate(wanted.keys) if key.choices]
+    edges = [0.0, *[(a[1].frame + b[1].frame) / 2 for a, b in zip(served, served[1:])], float(len(wanted))]
+    slots: list[Slot] = []
+    reached = 0
+    for (number, key), low, high in zip(served, edges, edges[1:]):
+        entry, leave = np.mean([needed(library, choice) for choice in key.choices], axis=0)
+        at = int(round(key.frame))
+        first = max(reached, min(at, int(np.ceil(max(low, key.frame - entry)))))
+        end = min(len(wanted), max(at + 1, int(min(high, key.frame + leave))))
+        slots += _evenly(reached, first) + [Slot(first, end, (number, key.choices))]
+        reached = end
+    return slots + _evenly(reached, len(wanted))
+
+
+def _evenly(first: int, end: int) -> list[Slot]:
+    """Slots of about SLOT frames between two frames."""
+    count = max(1, round((end - first) / SLOT)) if end > first else 0
+    edges = [first + round(i * (end - first) / count) for i in range(count + 1)] if count else []
+    return [Slot(low, high) for low, high in zip(edges, edges[1:])]
+
+
+def played_speed_and_turn(library: Library, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Per library frame, if a slot starts there at `rate`: (N,) mean speed in m/s, (N,) turn of the body in radians, (N,)
+    whether the clip lasts that long."""
+    frames = library.frames
+    after = np.arange(len(frames)) + SLOT * rate
+    valid = frames.left_in_clip >= SLOT * rate
+    low = np.minimum(np.floor(after).astype(int), len(frames) - 2)
+    weight = after - low
+    weight[~valid] = 0.0
+    low[~valid] = np.minimum(np.arange(len(frames))[~valid], len(frames) - 2)
+    path = frames.path[low] * (1 - weight)[:, None] + frames.path[low + 1] * weight[:, None]
+    heading = frames.heading[low] * (1 - weight) + frames.heading[low + 1] * weight
+    speed = np.linalg.norm(path - frames.path, axis=1) * library.fps / SLOT
+    return speed, heading - frames.heading, valid

@@ -1,0 +1,217 @@
+"""The recipe: from a library and a plan to a take.
+
+    library = build("clips")
+    track, report = clean(read_track_csv("player.csv"))
+    take = synthesize(library, Plan(track=track, timeline=read_timeline("player.txt", 30.0)))
+
+The plan is put into frames (`synthesis.wanted`), a search picks what is shown (`synthesis.path_search`, or
+`synthesis.blocks` with `synthesis.locomotion`), the frames are fetched (`synthesis.footage`), seams are smoothed
+(`polish.smoothing`) and the motion is laid on the ground (`polish.on_track`, or `polish.joining` without a track).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .errors import InputError
+from .library.library import Library
+from .motion import quaternion
+from .motion.humanoid import identify
+from .motion.motion import Motion, pose_kinematics
+from .motion.track import SampledTrack, sample
+from .plan import METHODS, Plan
+from .polish.joining import chained_facing, chained_root, torso_corrections
+from .polish.on_track import facing, pulled_to_track, root_with_sway
+from .polish.smoothing import spread_rotations, spread_values
+from .synthesis.blocks import BlockSearch
+from .synthesis.distance import exact_keys, straight_edit, warped_edit
+from .synthesis.edit_list import EditList
+from .synthesis.footage import Footage, fetch
+from .synthesis.locomotion import match_distance
+from .synthesis.path_search import PathSearch
+from .synthesis.wanted import Wanted, wanted
+from .take import BallPath, KeyResult, Take
+
+Progress = Callable[[float, str], None]
+COVERAGE = 1.15
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search ends in: the edit list at the library's rate, and (T,) metres travelled where the method decides it."""
+
+    edit: EditList
+    travelled: np.ndarray | None = None
+
+
+def synthesize(
+    library: Library,
+    plan: Plan,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Take:
+    """A player's motion for `plan` out of `library`.
+
+    progress(fraction, text) is called now and then. Raises NotInLibrary for a key moment that no clip can serve (unless
+    plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. The same library, plan and numpy
+    give the same bits: linear algebra is held to one thread, since more add up in another order.
+    """
+    if plan.method not in METHODS:
+        raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled)
+
+
+def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Take:
+    clock = [time.perf_counter()]
+    order = wanted(library, plan)
+    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled)
+    clock.append(time.perf_counter())
+    report(0.8, "Constructing")
+    track = sample(plan.track, plan.fps)
+    edit = exact_keys(library, found.edit, order)
+    index = np.minimum(np.arange(len(track.times)) * (library.fps / plan.fps), len(edit) - 1)
+    footage = fetch(library, edit, index, plan.fps)
+    clock.append(time.perf_counter())
+    report(0.9, "Polishing")
+    motion = _polished(library, plan, track, footage, found, index)
+    clock.append(time.perf_counter())
+    seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
+    report(1.0, "Done")
+    return _take(library, plan, order, track, edit, footage, motion, seconds)
+
+
+def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cancelled) -> Found:
+    if plan.method == "path":
+        return Found(PathSearch(library, order, progress=report, cancelled=cancelled).run())
+    search = BlockSearch(library, order, plan.alpha, report, cancelled)
+    blocks = search.run()
+    if plan.method == "blocks":
+        return Found(straight_edit(search, blocks))
+    return Found(*warped_edit(search, match_distance(search, blocks, plan.delta), plan.catch_up))
+
+
+def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index) -> Motion:
+    """Seams smoothed, then laid on the ground."""
+    pose = spread_rotations(footage.pose, footage.seams, footage.ahead_pose)
+    height = spread_values(footage.height, footage.seams, footage.ahead_height)
+    sway = spread_values(footage.sway, footage.seams, footage.ahead_sway)
+    smooth = replace(footage, pose=pose, height=height, sway=sway)
+    if plan.method == "blocks":
+        angle, ground = _chained(library, footage, smooth, track, plan.fps)
+    else:
+        angle, ground = _on_track(plan, track, smooth, found, index)
+    pose[:, 0] = quaternion.multiply(quaternion.about_up(angle), pose[:, 0])
+    return Motion(library.skeleton, np.concatenate([ground, height[:, None]], axis=1), pose, plan.fps)
+
+
+def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, index):
+    """Facing (T,) and root (T, 2): at the track's place at every time, or, by distance, where the track has come as far."""
+    if found.travelled is None:
+        angle = facing(track.direction, track.speed, footage.velocity, footage.turn)
+        root = root_with_sway(track.positions, footage.sway, angle)
+        return angle, pulled_to_track(root, track.raw, plan.fps)
+    travelled = np.interp(index, np.arange(len(found.travelled)), found.travelled)
+    place, direction = along(track, travelled)
+    speed = np.abs(np.gradient(travelled)) * plan.fps if len(travelled) > 1 else np.zeros(1)
+    angle = facing(direction, speed, footage.velocity, footage.turn)
+    return angle, root_with_sway(place, footage.sway, angle)
+
+
+def along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (T, 2) on the track's path after `travelled` (T,) metres, and the direction (T,) of the path there in radians.
+
+    Faustino eq. 29 steps from the present place towards the track's place at the next travelled distance; since both lie on
+    the same path, the steps add up to the path itself. (As printed the difference points backwards.) Beyond the track's end
+    the last direction is kept.
+    """
+    step = np.linalg.norm(np.diff(track.positions, axis=0), axis=1)
+    way = np.concatenate([[0.0], np.cumsum(step)]) + 1e-6 * np.arange(len(track.times))
+    place = np.stack([np.interp(travelled, way, track.positions[:, axis]) for axis in (0, 1)], axis=1)
+    direction = np.interp(travelled, way, track.direction)
+    beyond = np.maximum(travelled - way[-1], 0.0)[:, None]
+    return place + beyond * np.stack([np.cos(direction), np.sin(direction)], axis=1), direction
+
+
+def _chained(library: Library, footage: Footage, smooth: Footage, track: SampledTrack, fps: float):
+    """Facing and root for `blocks`: from the track's first place and direction on, wherever the clips lead."""
+    turn = footage.turn.copy()
+    torso, expected = _torso(library, footage.pose), _torso(library, footage.ahead_pose)
+    turn[footage.seams] += torso_corrections(torso, footage.seams, expected)
+    angle = chained_facing(float(track.direction[0]), turn)
+    return angle, chained_root(track.positions[0], smooth.velocity, smooth.sway, angle, fps)
+
+
+def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
+    """(T, 3) unit vector from hips to chest or neck in the facing frame."""
+    body = identify(library.skeleton)
+    top = body.neck if body.neck is not None else body.chest
+    places, _ = pose_kinematics(library.skeleton, np.zeros((len(pose), 3)), pose)
+    torso = places[:, top] - places[:, body.hips]
+    return torso / np.maximum(np.linalg.norm(torso, axis=1, keepdims=True), 1e-9)
+
+
+def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage, motion, seconds) -> Take:
+    clips = library.clips
+    names = tuple(dict.fromkeys(clip.path for clip in clips))
+    number = {name: i for i, name in enumerate(names)}
+    words = tuple(
+        tuple(sorted(clips[clip].words_at(frame))) for clip, frame in zip(footage.clip, np.round(footage.clip_frame, 6))
+    )
+    ball = None
+    if np.any(np.isfinite(track.ball[:, :2])):
+        ball = BallPath(track.times, track.ball, track.ball_measured)
+    return Take(
+        motion=motion,
+        start_time=float(track.times[0]),
+        clips=names,
+        clip=np.array([number[clips[clip].path] for clip in footage.clip]),
+        clip_frame=footage.clip_frame,
+        mirrored=np.array([clips[clip].mirrored for clip in footage.clip]),
+        words=words,
+        contacts=footage.contacts,
+        seams=footage.seams,
+        timeline=order.timeline,
+        keys=tuple(_key_result(library, plan, order, edit, footage, i) for i in range(len(order.keys))),
+        ball=ball,
+        method=plan.method,
+        seed=plan.seed,
+        seconds=seconds,
+        warnings=(*library.notes, *order.warnings, *_coverage(library, track)),
+    )
+
+
+def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, footage: Footage, number: int) -> KeyResult:
+    """How key moment `number` came out: where its clip's key frame is played, or what stands in for it."""
+    key = order.keys[number]
+    at = key.frame * plan.fps / library.fps
+    near = int(np.clip(round(at), 0, len(footage.clip) - 1))
+    clip, shown = int(footage.clip[near]), float(footage.clip_frame[near])
+    placed = next((p for p in edit.keys if p.wanted == number and p.clip == clip), None)
+    words = tuple(sorted(library.clips[clip].words_at(placed.clip_frame if placed else shown)))
+    if placed is not None:
+        inside = np.flatnonzero(footage.piece == footage.piece[near])
+        if len(inside) > 1 and np.all(np.diff(footage.clip_frame[inside]) > 0):
+            at = float(np.interp(placed.clip_frame, footage.clip_frame[inside], inside))
+        shown = placed.clip_frame
+    source = library.clips[clip]
+    return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, key.used_instead)
+
+
+def _coverage(library: Library, track: SampledTrack) -> list[str]:
+    """A warning where the track is faster than anything recorded (../shared/metrics.md, speed coverage)."""
+    fastest = float(library.frames.speed.max())
+    above = np.flatnonzero(track.speed > COVERAGE * fastest)
+    if not len(above):
+        return []
+    share = len(above) / len(track.times)
+    return [
+        f"{len(above) / track.fps:.1f} s ({share:.0%}) ask for more than the library's fastest {fastest:.1f} m/s, first at "
+        f"{track.times[above[0]]:.1f} s: strides are stretched there"
+    ]
