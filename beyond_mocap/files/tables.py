@@ -1,0 +1,243 @@
+"""The tables that leave and come back: provenance, ball and path CSVs, and the JSON report.
+
+Every writer writes beside its target and renames, so that nobody ever sees half a file.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion.skeleton import frozen_array
+from ..take import BallPath, Take
+
+BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
+PROVENANCE_COLUMNS = (
+    "frame", "time_s", "clip", "clip_frame", "mirrored", "labels", "contact_left", "contact_right",
+)  # fmt: skip
+_FARTHEST = 1e4  # metres
+
+
+@dataclass(frozen=True, eq=False)
+class Provenance:
+    """Where each of T output frames came from: times (T,) s; clip, T paths as below the library; clip_frame (T,) fractional,
+    in the clip's own rate; mirrored (T,) bool; words, T tuples; contacts (T, 2) bool, left and right foot on the ground."""
+
+    times: np.ndarray
+    clip: tuple[str, ...]
+    clip_frame: np.ndarray
+    mirrored: np.ndarray
+    words: tuple[tuple[str, ...], ...]
+    contacts: np.ndarray
+
+    def __post_init__(self):
+        for name, kind in (("times", float), ("clip_frame", float), ("mirrored", bool), ("contacts", bool)):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), kind))
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+
+def provenance_of(take: Take) -> Provenance:
+    """The provenance that a take carries."""
+    return Provenance(
+        times=take.start_time + np.arange(len(take.motion)) / take.motion.fps,
+        clip=tuple(take.clips[index] for index in take.clip),
+        clip_frame=take.clip_frame,
+        mirrored=take.mirrored,
+        words=tuple(map(tuple, take.words)),
+        contacts=take.contacts,
+    )
+
+
+def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
+    """Writes `frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right`, one row per output frame."""
+    table = provenance_of(take) if isinstance(take, Take) else take
+    columns = zip(
+        (f"{time:.6f}" for time in table.times),
+        table.clip,
+        (f"{frame:.4f}" for frame in table.clip_frame),
+        table.mirrored.astype(int),
+        (" ".join(words) for words in table.words),
+        *table.contacts.astype(int).T,
+    )
+    atomic_write(path, _csv_text(PROVENANCE_COLUMNS, ((i, *row) for i, row in enumerate(columns))))
+
+
+def read_provenance(path: str | os.PathLike) -> Provenance:
+    """The table that `write_provenance` wrote; InputError with the line of a row that is not of that form."""
+    rows = list(read_rows(path, PROVENANCE_COLUMNS))
+    return Provenance(
+        times=_column(rows, "time_s"),
+        clip=tuple(row["clip"] for _, row in rows),
+        clip_frame=_column(rows, "clip_frame"),
+        mirrored=_flags(rows, "mirrored"),
+        words=tuple(tuple(row["labels"].split()) for _, row in rows),
+        contacts=np.column_stack([_flags(rows, "contact_left"), _flags(rows, "contact_right")]),
+    )
+
+
+def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
+    """Writes `time_s,x_m,y_m,z_m,measured`; a position that is not known leaves its cells empty."""
+    rows = zip(ball.times, *np.asarray(ball.positions).T, np.asarray(ball.measured).astype(int))
+    text = _csv_text(BALL_COLUMNS, ((f"{t:.6f}", _metres(x), _metres(y), _metres(z), m) for t, x, y, z, m in rows))
+    atomic_write(path, text)
+
+
+def read_ball(path: str | os.PathLike) -> BallPath:
+    """The table that `write_ball` wrote; InputError with the line of a row that is not of that form."""
+    rows = list(read_rows(path, BALL_COLUMNS))
+    positions = np.column_stack([_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
+    return BallPath(frozen_array(_column(rows, "time_s")), frozen_array(positions), frozen_array(_flags(rows, "measured"), bool))
+
+
+def write_report(path: str | os.PathLike, report: dict) -> None:
+    """Writes a report as JSON. Numbers that are not finite become null; numpy arrays become lists, tuples too."""
+    atomic_write(path, json.dumps(plain(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_curve(path: str | os.PathLike) -> np.ndarray:
+    """(N, 3) metres: the points of a path, columns `x_m,y_m[,z_m]`, z 0 where the column is missing.
+
+    InputError where fewer than two points are given, or a cell is no number.
+    """
+    rows = list(read_rows(path, ("x_m", "y_m")))
+    columns = [_column(rows, "x_m"), _column(rows, "y_m")]
+    columns.append(_column(rows, "z_m") if rows and "z_m" in rows[0][1] else np.zeros(len(rows)))
+    if len(rows) < 2:
+        raise InputError(path, f"{len(rows)} points", "at least two rows under x_m,y_m[,z_m]")
+    return np.column_stack(columns)
+
+
+def atomic_write(path: str | os.PathLike, content: str | bytes) -> None:
+    """Writes a file whole or not at all: beside its place first, then renamed. Text as UTF-8 with line ends as given.
+
+    InputError where the folder is missing or cannot be written.
+    """
+    path = Path(path)
+    try:
+        handle, beside = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    except OSError as error:
+        raise InputError(path, error.strerror or "cannot be written", "a folder that can be written") from None
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content.encode("utf-8") if isinstance(content, str) else content)
+        os.chmod(beside, 0o666 & ~_umask())
+        os.replace(beside, path)
+    except OSError as error:
+        raise InputError(path, error.strerror or "cannot be written", "a file that can be replaced") from None
+    finally:
+        Path(beside).unlink(missing_ok=True)
+
+
+def plain(value):
+    """`value` in JSON's own types: arrays and tuples as lists, numpy numbers as numbers, what is not finite as None."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(item) for item in (sorted(value) if isinstance(value, (set, frozenset)) else value)]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
+
+
+def read_rows(path: str | os.PathLike, required: Sequence[str]) -> Iterable[tuple[str, dict[str, str]]]:
+    """(place, row) for every row of a CSV file that is not empty; place is `file:line`, names and cells are stripped.
+
+    InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells.
+    """
+    reader = csv.reader(io.StringIO(_text(path), newline=""))
+    try:
+        names = [name.strip() for name in next(reader, [])]
+        _check_header(names, required, path)
+        for cells in reader:
+            place = f"{path}:{reader.line_num}"
+            if not any(cell.strip() for cell in cells):
+                continue
+            if len(cells) < len(names):
+                raise InputError(place, f"{len(cells)} cells", f"{len(names)} as in the header")
+            yield place, dict(zip(names, (cell.strip() for cell in cells)))
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
+
+
+def number(text: str, name: str, place: str, blank: bool = False) -> float:
+    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names the column and the place."""
+    if blank and text.lower() in ("", "nan"):
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(place, f"{name} {text!r}", "a number", "correct the cell" + " or leave it empty" * blank)
+    if name.endswith("_m") and abs(value) > _FARTHEST:
+        raise InputError(place, f"{name} {text}", "metres from the pitch's centre", "check the unit")
+    return value
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _text(path: str | os.PathLike) -> str:
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(path, error.strerror or "cannot be read", "a CSV file", "check the path") from None
+    if not data.strip():
+        raise InputError(path, "an empty file", "a CSV file with a header")
+    try:
+        if b"\0" in data:
+            raise ValueError
+        return data.decode("utf-8-sig")
+    except ValueError:
+        raise InputError(path, "binary content", "a CSV file", "export it as UTF-8 text") from None
+
+
+def _check_header(names: list[str], required: Sequence[str], path) -> None:
+    missing = [name for name in required if name not in names]
+    if missing:
+        shown = ",".join(names)[:80]
+        raise InputError(f"{path}:1", f"no column {', '.join(missing)} in {shown!r}", f"a header with {','.join(required)}")
+    if len(set(names)) != len(names) and any(names.count(name) > 1 for name in required):
+        raise InputError(f"{path}:1", "a column twice", "each column once")
+
+
+def _column(rows, name: str, blank: bool = False) -> np.ndarray:
+    return np.array([number(row[name], name, place, blank) for place, row in rows], dtype=float)
+
+
+def _flags(rows, name: str) -> np.ndarray:
+    for place, row in rows:
+        if row[name] not in ("0", "1"):
+            raise InputError(place, f"{name} {row[name]!r}", "0 or 1")
+    return np.array([row[name] == "1" for _, row in rows], dtype=bool)
+
+
+def _metres(value: float) -> str:
+    return f"{value:.4f}" if math.isfinite(value) else ""
+
+
+def _csv_text(header: Sequence[str], rows: Iterable[Sequence]) -> str:
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return out.getvalue()
