@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -94,37 +93,31 @@ def played_from_take(take: Take) -> Played:
 
 
 def played_from_tables(
-    motion: Motion,
-    start_time: float = 0.0,
-    provenance: Mapping[str, Sequence] | None = None,
-    ball: BallPath | None = None,
-    where: str = "provenance",
+    motion: Motion, provenance=None, ball: BallPath | None = None, start_time: float = 0.0, where: str = "provenance"
 ) -> Played:
-    """What a motion plays, with its provenance where it is known.
+    """What a motion read from a file plays, with its provenance and ball where they are known.
 
-    provenance: columns of the contract's table, one value per frame: clip (path below the library), clip_frame, mirrored,
-    labels (a string of words or a tuple), contact_left, contact_right, and time_s, whose first entry then is the start.
-    Without provenance the contacts are detected on the motion itself. InputError where the table has another length.
+    provenance: `files.tables.Provenance`, or anything with its arrays: times (T,) s, clip (T paths), clip_frame (T,),
+    mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at `start_time` and contacts
+    are detected on the motion itself. where: the table's file, for messages. InputError where it has another length.
     """
-    count = len(motion)
     if provenance is None:
-        unknown = np.full(count, -1)
+        count = len(motion)
         contacts = foot_contacts.detect(motion)
-        nowhere = np.full(count, np.nan)
-        return Played(motion, start_time, (), unknown, nowhere, unknown > 0, None, contacts, ball)
-    if len(provenance["clip"]) != count:
-        raise InputError(where, f"{len(provenance['clip'])} rows", f"one per frame of the motion, {count}")
-    clips, index = np.unique(np.asarray(provenance["clip"], dtype=str), return_inverse=True)
-    contacts = np.stack([np.asarray(provenance[f"contact_{side}"], dtype=float) > 0.5 for side in ("left", "right")], -1)
-    played = Played(
+        return Played(
+            motion, start_time, (), np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool), None, contacts, ball
+        )
+    if len(provenance.clip) != len(motion):
+        raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {len(motion)}")
+    clips, index = np.unique(np.asarray(provenance.clip, dtype=str), return_inverse=True)
+    return Played(
         motion=motion,
-        start_time=start_time,
+        start_time=float(provenance.times[0]),
         clips=tuple(str(clip) for clip in clips),
         clip=index.reshape(-1),
-        clip_frame=np.asarray(provenance["clip_frame"], dtype=float),
-        mirrored=np.asarray(provenance["mirrored"], dtype=float) > 0.5,
-        words=tuple(tuple(w.split()) if isinstance(w, str) else tuple(w) for w in provenance["labels"]),
-        contacts=contacts,
+        clip_frame=np.asarray(provenance.clip_frame, dtype=float),
+        mirrored=np.asarray(provenance.mirrored, dtype=bool),
+        words=tuple(map(tuple, provenance.words)),
+        contacts=np.asarray(provenance.contacts, dtype=bool),
         ball=ball,
     )
-    return replace(played, start_time=float(provenance["time_s"][0])) if "time_s" in provenance else played

@@ -1,0 +1,259 @@
+"""The whole report on takes whose figures are known: an uncut clip, a shifted track, a jolt, a warp, a loop, a key moment."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation import KeyMoment, Span, Timeline
+from beyond_mocap.errors import InputError
+from beyond_mocap.evaluation import evaluate, evaluate_played, played_from_tables, played_from_take, table
+from beyond_mocap.files import bvh, tables
+from beyond_mocap.motion.motion import at_frames
+from beyond_mocap.motion.track import Track
+
+FPS = 30.0
+KEY_FRAME = 300
+CONTRACT = {
+    "seconds": "load library search construct polish total",
+    "root_error_m": "mean p95 max",
+    "pelvis_error_m": "mean own",
+    "skate": "contact_cm_s source_contact_cm_s stance_mm_median stances_over_21mm gmd_ratio source_gmd_ratio",
+    "seam_jerk_ratio": "median p95 max share_above_real",
+    "foot_correction_m": "p95",
+    "speed_coverage": "above below",
+    "annotation_similarity": "all keys eq18_all eq18_keys",
+    "warp_rate": "min max",
+    "ground_mm": "min support_max",
+}
+PLAIN = "version seed fps frames duration_s keys ik_miss_share pelvis_drop_m pelvis_surge_ratio pose_realism loop_share warnings"
+KEY = (
+    "time_s solved_time_s labels clip clip_frame time_error_s position_error_m pelvis_error_m contact_gap_m ball_shift_m "
+    "used_instead"
+)
+
+
+@pytest.fixture(scope="session")
+def uncut(cut):
+    return cut(("jog.bvh", 30, 300))
+
+
+def test_the_report_has_the_contract_s_keys_and_is_json(uncut, track_of, library):
+    asked = replace(uncut, timeline=Timeline(keys=(KeyMoment(14.5, ("kick", "right")),)))
+    report = evaluate(asked, track_of(uncut), library)
+    assert set(PLAIN.split()) | set(CONTRACT) <= set(report)
+    for name, keys in CONTRACT.items():
+        assert set(keys.split()) <= set(report[name])
+    assert set(KEY.split()) <= set(report["keys"][0])
+    assert json.loads(json.dumps(report, allow_nan=False)) == report
+
+
+def test_an_uncut_clip_scores_what_its_recording_scores(uncut, track_of, library):
+    report = evaluate(uncut, track_of(uncut), library)
+    assert report["seams"] == 0 and report["loop_share"] == 0.0
+    assert report["warp_rate"] == {"min": 1.0, "max": 1.0}
+    assert report["pose_realism"] == 0.0
+    # the window is pinned at both ends, where the sway stays in
+    assert report["root_error_m"]["mean"] < 0.002 and report["root_error_m"]["max"] < 0.02
+    skate = report["skate"]
+    assert skate["contact_cm_s"] == pytest.approx(skate["source_contact_cm_s"], abs=0.2)
+    assert skate["gmd_ratio"] == pytest.approx(skate["source_gmd_ratio"], abs=0.01)
+    assert report["pelvis_error_m"]["mean"] == pytest.approx(report["pelvis_error_m"]["own"], abs=0.002)
+    assert report["pelvis_surge_ratio"] == pytest.approx(1.0, abs=0.1)
+    assert report["foot_correction_m"]["p95"] < 1e-3 and report["pelvis_drop_m"] < 1e-3
+    assert report["bone_change_m"] < 1e-6
+    assert report["speed_coverage"] == {"above": 0.0, "below": 0.0}
+    assert report["seam_jerk_ratio"]["median"] is None
+    assert report["seam_jerk_ratio"]["rest_share_above_real"] < 0.3
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_twin_scores_as_the_recording(cut, track_of, library, mirrored):
+    take = cut(("run.bvh", 30, 200,  1.0, mirrored))
+    report = evaluate(take, track_of(take), library)
+    assert report["foot_correction_m"]["p95"] < 1e-3
+    assert report["pose_realism"] == 0.0
+    assert report["skate"]["contact_cm_s"] == pytest.approx(report["skate"]["source_contact_cm_s"], abs=0.5)
+
+
+def test_a_shifted_track_is_the_root_error(uncut, track_of, library):
+    report = evaluate(uncut, track_of(uncut, shift=(0.03, 0.04)), library)
+    for name in ("mean", "p95", "max"):
+        assert report["root_error_m"][name] == pytest.approx(0.05, abs=0.002)
+    assert report["pelvis_error_m"]["mean"] > 0.04
+
+
+def test_a_sliding_body_skates_by_what_it_slides(uncut, track_of, library):
+    slide = np.stack([0.1 * np.arange(len(uncut.motion)) / FPS, 0 * np.arange(300), 0 * np.arange(300)], axis=-1)
+    moved = replace(uncut, motion=replace(uncut.motion, root_positions=uncut.motion.root_positions + slide))
+    report = evaluate(moved, track_of(uncut), library)
+    still = evaluate(uncut, track_of(uncut), library)
+    assert report["skate"]["contact_cm_s"] == pytest.approx(still["skate"]["contact_cm_s"] + 10.0, abs=2.0)
+    assert report["skate"]["stance_mm_median"] > still["skate"]["stance_mm_median"] + 5.0
+    assert report["skate"]["source_contact_cm_s"] == still["skate"]["source_contact_cm_s"]
+
+
+def test_a_lowered_pelvis_and_moved_feet_are_told(uncut, track_of, library):
+    lowered = replace(uncut.motion, root_positions=uncut.motion.root_positions - [0.0, 0.0, 0.03])
+    report = evaluate(replace(uncut, motion=lowered), track_of(uncut), library)
+    assert report["pelvis_drop_m"] == pytest.approx(0.03, abs=1e-3)
+    assert report["foot_correction_m"]["p95"] == pytest.approx(0.03, abs=1e-3)
+    assert report["ground_mm"]["min"] < -25
+    told = replace(uncut, correction=np.full((len(uncut.motion), 2), 0.07))
+    assert evaluate(told, track_of(uncut), library)["foot_correction_m"]["p95"] == 0.07
+
+
+def test_a_jolt_at_a_seam_is_beyond_what_is_real(cut, track_of, library):
+    smooth = cut(("jog.bvh", 0, 120), ("jog.bvh", 240, 120))
+    rough = cut(("jog.bvh", 0, 120), ("walk.bvh", 13, 120))
+    assert evaluate(smooth, track_of(smooth), library)["seams"] == 0
+    report = evaluate(rough, track_of(rough), library)
+    assert report["seams"] == 1
+    assert report["seam_jerk_ratio"]["max"] > 1.5 and report["seam_jerk_ratio"]["share_above_real"] == 1.0
+
+
+def test_a_planted_warp_is_the_warp_rate(cut, track_of, library):
+    take = cut(("jog.bvh", 0, 90, 1.2), ("run.bvh", 100, 90, 0.9))
+    rate = evaluate(take, track_of(take), library)["warp_rate"]
+    assert (rate["min"], rate["max"]) == (pytest.approx(0.9, abs=1e-6), pytest.approx(1.2, abs=1e-6))
+
+
+def test_a_stride_played_five_times_is_a_loop(cut, track_of, library):
+    take = cut(*[("run.bvh", 60, 20)] * 5)
+    assert evaluate(take, track_of(take), library)["loop_share"] == pytest.approx(0.8)
+
+
+def test_a_track_too_fast_is_covered_nowhere_and_told(uncut, library):
+    times = np.arange(10.0, 20.0, 0.04)
+    report = evaluate(uncut, Track(times, np.stack([8.0 * (times - 10.0), 0 * times], axis=-1)), library)
+    assert report["speed_coverage"]["above"] == 1.0
+    assert any("faster than the library" in warning for warning in report["warnings"])
+
+
+@pytest.mark.parametrize("late", [0.0, 0.05, -0.1])
+def test_a_key_played_late_has_that_time_error(cut, track_of, library, late):
+    # source frame 300 of a 60 fps clip, begun at 150, is played 2.5 s after the start at 10 s
+    key = KeyMoment(12.5 - late, ("kick", "right"))
+    take = cut(("jog.bvh", 150, 200), asked=(key,))
+    for given in (take, replace(take, keys=())):
+        told = evaluate(given, track_of(take, shift=(0.0, 0.2)), library)["keys"][0]
+        assert told["time_error_s"] == pytest.approx(late, abs=1e-6)
+        assert (told["clip"], told["clip_frame"]) == ("jog.bvh", KEY_FRAME)
+        assert told["position_error_m"] == pytest.approx(0.2, abs=0.01)
+        assert told["labels"] == ["kick", "right"] and told["used_instead"] is None
+
+
+def test_a_key_whose_words_are_lacking_says_what_was_used(cut, track_of, library):
+    take = replace(cut(("jog.bvh", 150, 200), asked=(KeyMoment(12.5, ("header",)),)), keys=())
+    report = evaluate(take, track_of(take), library)
+    assert report["keys"][0]["used_instead"] == ["front", "jogging", "kick", "right"]
+    assert report["annotation_similarity"]["keys"] == 1.0
+
+
+def test_a_key_that_no_clip_plays_has_no_clip(cut, track_of, library):
+    take = cut(("walk.bvh", 0, 200), timeline=Timeline(keys=(KeyMoment(12.0, ("kick",)),)))
+    told = evaluate(take, track_of(take), library)["keys"][0]
+    assert told["clip"] is None and told["time_error_s"] is None
+
+
+def test_the_gap_to_the_ball_as_written_out(cut, track_of, still_ball, library):
+    take = cut(("jog.bvh", 150, 200), asked=(KeyMoment(12.5, ("kick", "right")),))
+    played = played_from_take(take)
+    foot, toe = played.feet[75, 1]
+    side = np.cross(toe - foot, [0.0, 0.0, 1.0])
+    place = 0.5 * (foot + toe) + side / np.linalg.norm(side) * (0.05 + 0.11 + 0.02)
+    ball = np.append(place[:2] + [0.3, 0.4], 0.11)
+    told = evaluate(replace(take, ball=still_ball(take, place)), track_of(take, ball=ball), library)["keys"][0]
+    assert told["contact_gap_m"] == pytest.approx(0.02, abs=1e-5)
+    assert told["ball_shift_m"] == pytest.approx(0.5, abs=1e-5)
+    assert evaluate(take, track_of(take), library)["keys"][0]["contact_gap_m"] is None
+
+
+def test_similarity_counts_asked_words_and_leaves_entry_and_exit_out(cut, track_of, library):
+    # 10 .. 13 asked running but played jogging, except for the kick's own row 4.5 .. 5.6 s of the clip (12.0 .. 13.1)
+    timeline = Timeline((Span(10.0, 20.0, ("running",)),), (KeyMoment(12.5, ("kick", "right")),))
+    take = cut(("jog.bvh", 150, 91), ("run.bvh", 0, 210), asked=timeline.keys, timeline=timeline)
+    report = evaluate(take, track_of(take), library)
+    similarity = report["annotation_similarity"]
+    wrong, right = 60, 210
+    assert similarity["all"] == pytest.approx((wrong - right) / (wrong + right), abs=0.02)
+    assert similarity["keys"] == -1.0
+    # as printed: jogging front for running are three words apart, running front for running one of two
+    assert similarity["eq18_all"] == pytest.approx(wrong / (wrong + right), abs=0.02)
+    assert similarity["eq18_keys"] == 0.0
+
+
+def test_automatic_locomotion_is_asked_by_speed(cut, track_of, library):
+    take = cut(("run.bvh", 60, 200))
+    assert evaluate(take, track_of(take), library)["annotation_similarity"]["all"] == -1.0
+
+
+def test_files_score_as_the_take_in_memory(cut, track_of, still_ball, library, tmp_path):
+    key = KeyMoment(12.5, ("kick", "right"))
+    take = cut(("jog.bvh", 150, 120), ("run.bvh", 40, 120), asked=(key,))
+    take = replace(take, ball=still_ball(take, (3.0, 0.0, 0.11)))
+    bvh.write(tmp_path / "m.bvh", take.motion)
+    tables.write_provenance(tmp_path / "p.csv", take)
+    tables.write_ball(tmp_path / "b.csv", take.ball)
+    motion = bvh.read(tmp_path / "m.bvh", 0.01).motion
+    played = played_from_tables(motion, tables.read_provenance(tmp_path / "p.csv"), tables.read_ball(tmp_path / "b.csv"))
+    track = track_of(take)
+    read = evaluate_played(played, track=track, timeline=take.timeline, library=library)
+    made = evaluate(take, track, library)
+    for name in (*CONTRACT, "keys", "loop_share", "pose_realism", "pelvis_surge_ratio"):
+        if name != "seconds":
+            _same(read[name], made[name])
+
+
+def _same(a, b):
+    if isinstance(a, dict):
+        assert set(a) == set(b)
+        for key in a:
+            _same(a[key], b[key])
+    elif isinstance(a, list) and a and isinstance(a[0], dict):
+        for left, right in zip(a, b, strict=True):
+            _same(left, right)
+    elif isinstance(a, float):
+        assert a == pytest.approx(b, rel=0.02, abs=2e-3)
+    else:
+        assert a == b
+
+
+def test_a_motion_alone_still_has_what_needs_nothing_else(uncut):
+    report = evaluate_played(played_from_tables(uncut.motion))
+    assert report["root_error_m"]["mean"] is None and report["keys"] == []
+    assert report["skate"]["gmd_ratio"] is not None and report["skate"]["source_gmd_ratio"] is None
+    assert report["warp_rate"]["max"] is None and report["loop_share"] is None
+    json.dumps(report, allow_nan=False)
+
+
+def test_a_standing_body_stays_still(cut, track_of, library):
+    take = cut(("stand.bvh", 0, 200))
+    root, rotations = at_frames(take.motion, np.zeros(200))
+    frozen = replace(take, motion=replace(take.motion, root_positions=root, rotations=rotations))
+    report = evaluate(frozen, track_of(frozen), library)
+    assert report["root_error_m"]["max"] < 1e-6
+    assert report["skate"]["contact_cm_s"] == 0.0 and report["skate"]["stance_mm_median"] == 0.0
+    assert report["skate"]["gmd_ratio"] == 0.0 and report["pelvis_surge_m_s"]["mean"] == 0.0
+    assert report["seam_jerk_ratio"]["rest_max"] == 0.0 and report["smoothness_m"]["max"] == 0.0
+
+
+def test_wrong_provenance_and_wrong_skeleton_are_told(uncut, library):
+    provenance = tables.provenance_of(uncut)
+    with pytest.raises(InputError, match="300 rows"):
+        played_from_tables(uncut.motion.frames(0, 10), provenance)
+    skeleton = replace(uncut.motion.skeleton, offsets=uncut.motion.skeleton.offsets * 1.1)
+    taller = replace(uncut.motion, skeleton=skeleton)
+    with pytest.raises(InputError, match="another skeleton"):
+        evaluate_played(played_from_tables(taller, provenance), library=library)
+
+
+def test_table_puts_reports_side_by_side(uncut, track_of, library):
+    report = evaluate(replace(uncut, timeline=Timeline(keys=(KeyMoment(14.5, ("kick",)),))), track_of(uncut), library)
+    lines = table({"path": report, "blocks": {**report, "seed": 7, "loop_share": None}}).splitlines()
+    assert lines[0] == "| figure | path | blocks |"
+    assert "| seed | 0 | 7 |" in lines and "| loop_share | 0 | - |" in lines
+    assert any(line.startswith("| root_error_m.mean |") for line in lines)
+    assert any(line.startswith("| keys 1.labels | kick |") for line in lines)
+    assert all(line.count("|") == 4 for line in lines)
