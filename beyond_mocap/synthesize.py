@@ -24,6 +24,7 @@ from .motion.humanoid import identify
 from .motion.motion import Motion, pose_kinematics
 from .motion.track import SampledTrack, sample
 from .plan import METHODS, Plan
+from .polish.foot_plant import Planted, plant
 from .polish.joining import chained_facing, chained_root, torso_corrections
 from .polish.on_track import facing, pulled_to_track, root_with_sway
 from .polish.smoothing import spread_rotations, spread_values
@@ -80,11 +81,13 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Ta
     footage = fetch(library, edit, index, plan.fps)
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
-    motion = _polished(library, plan, track, footage, found, index)
+    planted = _polished(library, plan, track, footage, found, index)
+    motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     clock.append(time.perf_counter())
     seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
     report(1.0, "Done")
-    return _take(library, plan, order, track, edit, footage, motion, seconds)
+    take = _take(library, plan, order, track, edit, footage, motion, seconds)
+    return replace(take, correction=planted.correction, ik_miss=planted.miss)
 
 
 def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cancelled) -> Found:
@@ -97,8 +100,8 @@ def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cance
     return Found(*warped_edit(search, match_distance(search, blocks, plan.delta), plan.catch_up))
 
 
-def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index) -> Motion:
-    """Seams smoothed, then laid on the ground."""
+def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index) -> Planted:
+    """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand."""
     pose = spread_rotations(footage.pose, footage.seams, footage.ahead_pose)
     height = spread_values(footage.height, footage.seams, footage.ahead_height)
     sway = spread_values(footage.sway, footage.seams, footage.ahead_sway)
@@ -108,7 +111,11 @@ def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footag
     else:
         angle, ground = _on_track(plan, track, smooth, found, index)
     pose[:, 0] = quaternion.multiply(quaternion.about_up(angle), pose[:, 0])
-    return Motion(library.skeleton, np.concatenate([ground, height[:, None]], axis=1), pose, plan.fps)
+    root = np.concatenate([ground, height[:, None]], axis=1)
+    if plan.method == "path":
+        return plant(library.skeleton, root, pose, footage.contacts, plan.fps)
+    none = np.zeros((len(root), 2))
+    return Planted(root, pose, none, none)
 
 
 def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, index):

@@ -45,7 +45,8 @@ class Take:
     clock. clips: table of clip paths below the library; clip (T,) index into it, clip_frame (T,) fractional frame in that
     clip's own rate, mirrored (T,) bool. words: per frame the source frame's words, sides after mirroring. contacts (T, 2)
     bool, left and right, carried from the source. seams: output frames that start a new piece of clip.
-    correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it.
+    correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it. ik_miss:
+    (T, 2) metres that each leg was short of where its foot should stand.
     """
 
     motion: Motion
@@ -65,3 +66,4 @@ class Take:
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     correction: np.ndarray | None = None
+    ik_miss: np.ndarray | None = None

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -192,9 +193,12 @@ def _choose_skeleton(paths, read, chosen: Path | None, unit) -> Skeleton:
 
 
 def _unit_notes(read) -> list[str]:
-    """What the reader decided, each sentence once with the number of clips it holds for."""
-    told = Counter(note for source in read for note in source.notes)
-    return [f"{note} ({count} clips)" if count > 1 else note for note, count in told.items()]
+    """What the reader decided: each kind of sentence once (numbers apart), with the number of clips it holds for."""
+    kinds: dict[str, list[str]] = {}
+    for source in read:
+        for note in source.notes:
+            kinds.setdefault(re.sub(r"(?<=hips )[\d.]+", "", note), []).append(note)
+    return [f"{told[0]} (so, or nearly so, {len(told)} clips)" if len(told) > 1 else told[0] for told in kinds.values()]
 
 
 def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
