@@ -92,8 +92,7 @@ def read(path, unit: float | None = None) -> BvhClip:
     root, root_rotations, above = _folded(channels, hips)
     skeleton, drift = _skeleton(channels, kept)
     rotations = np.stack([root_rotations.T] + [channels.rotation(joint) for joint in kept[1:]])
-    if not max(np.abs(root).max(), np.abs(skeleton.offsets).max()) < _LARGEST_METRES:
-        raise InputError(path, "positions beyond 1000 km", "a person's motion", "give the unit, or export the file again")
+    _check_size(text, root, skeleton)
     motion = Motion(skeleton, root, rotations.transpose(2, 0, 1), _rate(text.frame_time))
     form = BvhForm({text.names[j]: text.channels[j] for j in kept}, _headings(channels, above, motion), scale.unit, scale.up)
     return BvhClip(motion, form, (*scale.notes, *_notes(text, kept, above, drift)))
@@ -202,6 +201,14 @@ def _skeleton(channels: _Channels, kept: list[int]) -> tuple[Skeleton, dict[str,
     end_offsets = bvh_scale.to_ours(np.array([offset for _, offset in ends]).reshape(-1, 3), channels.scale.up)
     names = tuple(text.names[joint] for joint in kept)
     return Skeleton(names, parents, offsets, [p for p, _ in ends], end_offsets * channels.scale.unit), drift
+
+
+def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:
+    """InputError where the body or its way is larger than the Earth's surface allows."""
+    too_far = np.flatnonzero(~(np.abs(root).max(axis=1) < _LARGEST_METRES))
+    where = f"{text.path}:{text.first_row + too_far[0]}" if len(too_far) else text.path
+    if len(too_far) or not np.abs(skeleton.offsets).max() < _LARGEST_METRES:
+        raise InputError(where, "a position beyond 1000 km", "a person's motion", "give the unit, or export the file again")
 
 
 def _headings(channels: _Channels, above: tuple[RootAbove, ...], motion: Motion) -> tuple[RootAbove, ...]:

@@ -30,7 +30,7 @@ class BvhText:
 
     names: J unique names. parents: J indices, -1 for joint 0. offsets: (J, 3). channels: J tuples of channel names.
     end_parents (E,), end_offsets (E, 3): End Sites. frame_time: seconds. values: (T, C), joints' channels in file order.
-    renamed: names that stood twice, with what they became.
+    first_row: line of the first frame. renamed: names that stood twice, with what they became.
     """
 
     path: Path
@@ -42,6 +42,7 @@ class BvhText:
     end_offsets: np.ndarray
     frame_time: float
     values: np.ndarray
+    first_row: int
     renamed: tuple[tuple[str, str], ...]
 
 
@@ -58,14 +59,14 @@ def parse(path) -> BvhText:
     columns = sum(len(c) for c in joints.channels)
     if columns == 0:
         raise InputError(path, "no joint has channels", "a CHANNELS line per joint", _EXPORT_AGAIN)
-    values = _rows(path, data[body:], columns, line)
+    values = _rows(path, data[body - 1 :], columns, line)  # from the line's end before: blanks around
     if len(values) != frames:
         raise InputError(
             f"{path}:{line}", f"{len(values)} rows of motion", f"{frames} as Frames says",
             f"the file is {'cut off' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)
-    return joints.finish(frame_time, values)
+    return joints.finish(frame_time, values, line)
 
 
 def _content(path: Path) -> bytes:
@@ -78,7 +79,7 @@ def _content(path: Path) -> bytes:
         raise InputError(path, "a folder", "a BVH file", "name a file in it") from None
     except (OSError, ValueError) as error:
         raise InputError(path, f"cannot be read ({error})", "a readable BVH file") from None
-    if not data.strip():
+    if not data or data.isspace():
         raise InputError(path, "empty file", "a BVH file", _EXPORT_AGAIN)
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
@@ -124,13 +125,13 @@ class _Hierarchy:
                 raise InputError(self.path, f"joint {self.names[joint]!r} has no OFFSET", "OFFSET x y z", _EXPORT_AGAIN)
         return self
 
-    def finish(self, frame_time: float, values: np.ndarray) -> BvhText:
+    def finish(self, frame_time: float, values: np.ndarray, first_row: int) -> BvhText:
         """The joints together with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
             self.path, tuple(self.names), tuple(self.parents), np.array(self.offsets), tuple(self.channels),
             tuple(joint for joint, _ in ends), np.array([offset for _, offset in ends]).reshape(-1, 3),
-            frame_time, values, tuple(self.renamed),
+            frame_time, values, first_row, tuple(self.renamed),
         )
 
     def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:
@@ -249,11 +250,11 @@ def _labelled(path: Path, data: bytes, start: int, line: int, label: bytes, expe
 
 def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
     """The motion's numbers (T, columns); InputError with the first bad line."""
-    if not text.strip():
+    if not text or text.isspace():
         raise InputError(f"{path}:{line}", "no rows of motion", f"rows of {columns} numbers", f"the file is cut off; {_EXPORT_AGAIN}")
     try:
         values = read_table(text)
-        if values.shape[1] == columns and np.all(np.abs(values) < 1e300):
+        if values.shape[1] == columns and -1e300 < values.min() and values.max() < 1e300:
             return values
     except ValueError:
         pass
@@ -261,7 +262,7 @@ def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
 
 
 def _check_angles(path: Path, joints: _Hierarchy, values: np.ndarray, line: int) -> None:
-    if np.abs(values).max() <= _LARGEST_ANGLE:
+    if max(values.max(), -values.min()) <= _LARGEST_ANGLE:
         return
     names = [f"{name} {c}" for name, channels in zip(joints.names, joints.channels) for c in channels]
     for row, column in np.argwhere(np.abs(values) > _LARGEST_ANGLE):
@@ -271,7 +272,7 @@ def _check_angles(path: Path, joints: _Hierarchy, values: np.ndarray, line: int)
 
 
 def _row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:
-    for line, row in enumerate(_decoded(text).split("\n"), line):
+    for line, row in enumerate(_decoded(text).split("\n"), line - 1):
         words = row.split()
         bad = next((word for word in words if _number(word) is None or abs(float(word)) >= 1e300), None)
         if bad is not None:

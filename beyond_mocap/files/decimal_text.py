@@ -15,8 +15,9 @@ import warnings
 import numpy as np
 
 _SPACE, _PLUS, _MINUS, _POINT = 32, 43, 45, 46
-_EXACT_POWERS = 10.0 ** np.arange(23)
-_LARGEST_EXACT = 2**53
+_LARGEST_POWER = 22
+_EXACT_POWERS = 10.0 ** np.arange(_LARGEST_POWER + 1)
+_LARGEST = 2**53
 
 
 def read_table(text: bytes) -> np.ndarray:
@@ -24,36 +25,34 @@ def read_table(text: bytes) -> np.ndarray:
 
     Raises ValueError where rows differ in length or something is no number; the caller says where.
     """
-    values = _read_fast(b"\n" + text + b"\n" * 4)  # room to look behind a last letter
+    spaced = text if text[:1].isspace() and text[-1:].isspace() else b"\n" + text + b"\n"
+    values = _read_fast(spaced)
     if values is None:
         return np.loadtxt(io.BytesIO(text), comments=None, ndmin=2)
     return values
 
 
 def _read_fast(text: bytes) -> np.ndarray | None:
-    """The table, or None where its form is not plain enough for the fast way."""
+    """The table, or None where its form is not plain enough for the fast way; blanks on both ends of `text`."""
     unusual = text.translate(None, b"0123456789.+- \t\n")
     if unusual.translate(None, b"eE"):
         return None
     characters = np.frombuffer(text, np.uint8)
-    edges = np.flatnonzero((characters[1:] <= _SPACE) != (characters[:-1] <= _SPACE)) + 1
-    starts, ends = edges[0::2], edges[1::2]
-    exponents = _cut_exponents(text, characters, starts, ends) if unusual else (text, ends, 0)
-    if not len(starts) or exponents is None:
+    blank = characters <= _SPACE
+    ends = np.flatnonzero(blank[1:] > blank[:-1]) + 1
+    powers = _cut_exponents(characters, ends) if unusual else (text, ends, 0)
+    if not len(ends) or powers is None:
         return None
-    text, mantissa_ends, exponent = exponents
-    decimals = _decimals(characters, starts, mantissa_ends)
-    if decimals is None or not _signs_lead(characters, unusual):
-        return None
-    digits = _integers(text.translate(None, b"."), len(starts))
-    if digits is None:
+    plain, mantissa_ends, exponent = powers
+    decimals = _decimals(characters, ends, mantissa_ends)
+    digits = _integers(plain.translate(None, b"."), len(ends))
+    if decimals is None or digits is None:
         return None
     power = decimals - exponent
     values = _scaled(digits, power)
-    odd = (np.abs(power) >= len(_EXACT_POWERS)) | (digits > _LARGEST_EXACT) | (digits < -_LARGEST_EXACT)
-    for i in np.flatnonzero(odd):
-        values[i] = float(characters[starts[i] : ends[i]].tobytes())
-    return _shaped(values, characters, starts)
+    for i in np.flatnonzero((np.abs(power) > _LARGEST_POWER) | (digits > _LARGEST) | (digits < -_LARGEST)):
+        values[i] = float(text[ends[i - 1] if i else 0 : ends[i]])
+    return _shaped(values, characters, ends)
 
 
 def _integers(text: bytes, count: int) -> np.ndarray | None:
@@ -67,35 +66,32 @@ def _integers(text: bytes, count: int) -> np.ndarray | None:
     return digits if len(digits) == count else None
 
 
-def _signs_lead(characters: np.ndarray, unusual: bytes) -> bool:
-    """Whether a sign stands only before a number or behind an exponent's letter."""
-    before = characters[:-1][(characters[1:] == _MINUS) | (characters[1:] == _PLUS)]
-    after_letter = np.count_nonzero((before == ord("e")) | (before == ord("E")))
-    return np.count_nonzero(before <= _SPACE) + after_letter == len(before) and after_letter <= len(unusual)
-
-
-def _decimals(characters: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray | None:
-    """How many digits stand behind each number's point: (numbers,); None where a number has two points."""
+def _decimals(characters: np.ndarray, ends: np.ndarray, mantissa_ends: np.ndarray) -> np.ndarray | None:
+    """How many digits stand behind each number's point: (numbers,); None where it has two, or a sign behind it."""
     points = np.flatnonzero(characters == _POINT)
-    if len(points) == len(starts) and np.all((points >= starts) & (points < ends)):
-        return ends - points - 1
-    owner = np.searchsorted(starts, points, side="right") - 1
-    if np.any(np.diff(owner) == 0) or np.any(points >= ends[owner]):
+    behind = characters[points + 1]
+    if np.any((behind == _MINUS) | (behind == _PLUS)):
         return None
-    decimals = np.zeros(len(starts), dtype=np.int64)
-    decimals[owner] = ends[owner] - points - 1
+    if len(points) == len(ends) and np.all(points < ends) and np.all(points[1:] > ends[:-1]):
+        return mantissa_ends - points - 1
+    owner = np.searchsorted(ends, points)
+    if np.any(np.diff(owner) == 0) or np.any(points >= mantissa_ends[owner]):
+        return None
+    decimals = np.zeros(len(ends), dtype=np.int64)
+    decimals[owner] = mantissa_ends[owner] - points - 1
     return decimals
 
 
-def _cut_exponents(text: bytes, characters: np.ndarray, starts: np.ndarray, ends: np.ndarray):
+def _cut_exponents(characters: np.ndarray, ends: np.ndarray):
     """The text with exponents blanked, where each number's mantissa ends, and its exponent; None unless all are e+dd."""
     letters = np.flatnonzero((characters | 32) == ord("e"))
-    owner = np.searchsorted(starts, letters, side="right") - 1
-    sign, digits = characters[letters + 1], characters[letters[:, None] + (2, 3)] - np.uint8(48)
-    plain = (letters > starts[owner]) & (ends[owner] == letters + 4) & np.isin(sign, (_MINUS, _PLUS))
+    owner = np.searchsorted(ends, letters)
+    behind = characters[np.minimum(letters[:, None] + (1, 2, 3), len(characters) - 1)]
+    sign, digits = behind[:, 0], behind[:, 1:] - np.uint8(ord("0"))
+    plain = (characters[letters - 1] > _SPACE) & (ends[owner] == letters + 4) & np.isin(sign, (_MINUS, _PLUS))
     if not (np.all(plain) and np.all(digits < 10)):
         return None
-    exponent = np.zeros(len(starts), dtype=np.int64)
+    exponent = np.zeros(len(ends), dtype=np.int64)
     exponent[owner] = np.where(sign == _MINUS, -1, 1) * (digits @ np.array([10, 1]))
     mantissa_ends = ends.copy()
     mantissa_ends[owner] = letters
@@ -107,16 +103,16 @@ def _cut_exponents(text: bytes, characters: np.ndarray, starts: np.ndarray, ends
 def _scaled(digits: np.ndarray, power: np.ndarray) -> np.ndarray:
     """digits / 10^power, correctly rounded where both are exact: (numbers,)."""
     low, high = int(power.min()), int(power.max())
-    if low == high and 0 <= low < len(_EXACT_POWERS):
+    if low == high and 0 <= low <= _LARGEST_POWER:
         return digits / _EXACT_POWERS[low]
-    values = digits / _EXACT_POWERS[np.clip(power, 0, 22)]
-    return values * _EXACT_POWERS[np.clip(-power, 0, 22)] if low < 0 else values
+    values = digits / _EXACT_POWERS[np.clip(power, 0, _LARGEST_POWER)]
+    return values * _EXACT_POWERS[np.clip(-power, 0, _LARGEST_POWER)] if low < 0 else values
 
 
-def _shaped(values: np.ndarray, characters: np.ndarray, starts: np.ndarray) -> np.ndarray:
+def _shaped(values: np.ndarray, characters: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """The numbers as rows; ValueError where lines do not hold equally many."""
     breaks = np.flatnonzero(characters == ord("\n"))
-    counts = np.diff(np.searchsorted(starts, breaks))
+    counts = np.diff(np.searchsorted(ends, breaks, side="right"))
     counts = counts[counts > 0]
     if np.any(counts != counts[0]):
         raise ValueError("rows of different lengths")

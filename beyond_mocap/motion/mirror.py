@@ -1,0 +1,130 @@
+"""Mirroring: left becomes right, so that each recording serves twice (Faustino §3.1.2).
+
+Faustino mirrors joint by joint in the world: a bone points where the mirrored child lies (his X axis, eq. in A), and a second
+axis takes the mirrored direction of the body's facing (his Y or Z axis, B). That fits the one skeleton he had, whose X axes
+all point along the bones; CMU's, LAFAN1's and Bandai-Namco's axes lie otherwise, and differ from joint to joint and from left
+to right. The same idea without axes: a body segment is a rigid thing, and its mirror image is the partner's segment.
+
+Let M = diag(1, -1, 1) mirror the world, R_p the world rotation of joint j's partner p (itself on the centre line), and C_j the
+orthogonal matrix of determinant -1 that takes a point of segment j, in j's axes, to the matching point of segment p, in p's.
+Then the mirrored body has, for every joint,
+
+    R'_j = M R_p C_j,     root' = M root,
+
+two improper matrices and a rotation, hence a rotation. C_j follows from the skeleton: it takes the bones that start in j to
+those that start in p (orthogonal Procrustes; left and right may differ in length and, by some degrees, in direction; lengths
+stay those of the skeleton). One bone leaves the turn about itself open, so C_j is pulled slightly towards a usual matrix D_j.
+Where the rest pose is its own mirror image (nearly all rigs), D is that mirror for all joints. Where it is not (Bandai-Namco's
+limbs have axes of mirrored behaviour, left bones along +X, right ones along -X), D_j is a mirror along an axis or the
+inversion -1: the one that carries bones to bones and makes the joint's mean rotation relative to its parent come out alike
+left and right; the candidates differ by half turns, far more than left and right do in any movement.
+
+C_p is the inverse of C_j, therefore mirroring twice gives back the motion, on any skeleton, to rounding.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import quaternion
+from .humanoid import Humanoid, identify
+from .motion import Motion, pose_kinematics
+from .skeleton import Skeleton
+
+_FLIPS = np.stack([np.diag(signs) for signs in ((-1.0, 1, 1), (1.0, -1, 1), (1.0, 1, -1), (-1.0, -1, -1))])
+_WORLD = _FLIPS[1]
+_PULL = 1e-3  # of D_j against the bones: decides what bones leave open, and moves them by less than 0.01 degrees
+_SYMMETRIC = 0.1  # squared misfit of the rest pose with its mirror image, over its bones' squared lengths
+_GEOMETRY_WEIGHT = 4.0
+_CHANGE = 3.0  # by how much another D than the parent's has to be better
+_FRAMES = 256
+
+
+def mirror(motion: Motion) -> Motion:
+    """The same skeleton doing with its left what `motion` does with its right, mirrored at the plane y = 0.
+
+    Travel along X and heights stay, Y turns its sign. Bones keep their lengths; where left and right ones differ, feet and
+    hands end up off the exact mirror image by that difference. Raises InputError where the skeleton has no legs.
+    """
+    body = identify(motion.skeleton)
+    corrections = quaternion.from_matrix(_WORLD @ _correspondence(motion, body))
+    _, world = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    # M R M keeps the angle; its axis, a pseudovector, keeps its y and turns the others
+    turned = world[:, list(body.mirror)] * (1.0, -1.0, 1.0, -1.0)
+    world = quaternion.multiply(turned, corrections)
+    local = world.copy()
+    parents = list(motion.skeleton.parents[1:])
+    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents]), world[:, 1:])
+    return Motion(motion.skeleton, motion.root_positions * np.diag(_WORLD), local, motion.fps)
+
+
+def _correspondence(motion: Motion, body: Humanoid) -> np.ndarray:
+    """C_j for all joints: (J, 3, 3), orthogonal, determinant -1."""
+    pairs = [_bone_pairs(motion.skeleton, body, joint) for joint in range(len(motion.skeleton))]
+    rest = _rest_mirror(motion.skeleton, body)
+    bones, images = (np.concatenate(side) for side in zip(*pairs))
+    if np.sum((bones @ rest - images) ** 2) <= _SYMMETRIC * np.sum(bones**2):
+        chosen = [rest] * len(pairs)
+    else:
+        chosen = _chosen(motion, body, rest, pairs)
+    return np.stack([_procrustes(*pair, usual) for pair, usual in zip(pairs, chosen)])
+
+
+def _rest_mirror(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
+    """The mirror (3, 3) of the rest pose: across the line from hip to hip."""
+    rest, _ = pose_kinematics(skeleton, np.zeros(3), quaternion.identity(len(skeleton)))
+    across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
+    across = across / max(np.linalg.norm(across), 1e-9)
+    return np.eye(3) - 2.0 * np.outer(across, across)
+
+
+def _chosen(motion: Motion, body: Humanoid, rest: np.ndarray, pairs) -> list[np.ndarray]:
+    """D_j (3, 3) for all joints where the rest pose does not tell; `pairs` as of `_bone_pairs`."""
+    usual = np.stack([rest, *_FLIPS])
+    frames = np.unique(np.linspace(0, len(motion) - 1, _FRAMES).astype(int))
+    mean = quaternion.to_matrix(motion.rotations[frames]).mean(axis=0)
+    chosen: list[np.ndarray] = []
+    for joint, partner in enumerate(body.mirror):
+        if partner < joint:
+            chosen.append(chosen[partner])
+            continue
+        before = chosen[motion.skeleton.parents[joint]] if joint else None
+        chosen.append(_choose(usual, *pairs[joint], before, mean[joint], mean[partner]))
+    return chosen
+
+
+def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets (B, 3) in metres of the bones that start in `joint`, and of the matching ones of its partner."""
+    partner = body.mirror[joint]
+    pairs = [
+        (skeleton.offsets[child], skeleton.offsets[body.mirror[child]])
+        for child in skeleton.children(joint)
+        if skeleton.parents[body.mirror[child]] == partner
+    ]
+    tips = [skeleton.end_offsets[[p == j for p in skeleton.end_parents]] for j in (joint, partner)]
+    pairs += list(zip(*tips))
+    bones = np.array(pairs).reshape(-1, 2, 3)
+    return bones[:, 0], bones[:, 1]
+
+
+def _choose(usual, bones, images, before, mean, partner_mean) -> np.ndarray:
+    """The D (3, 3) of a joint from `usual` (D, 3, 3): how well it carries bones to bones, and the mean local rotations.
+
+    In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average. `before`: the
+    parent's D, None at the root, whose rotation has no parent to be compared with.
+    """
+    length = max(np.sum(bones**2), 1e-12)
+    misfit = np.sum((bones @ usual.transpose(0, 2, 1) - images) ** 2, axis=(1, 2)) / length
+    cost = _GEOMETRY_WEIGHT * misfit
+    if before is not None:
+        cost = cost + np.sum((before.T @ partner_mean @ usual - mean) ** 2, axis=(1, 2))
+        cost = cost - _CHANGE * np.all(usual == before, axis=(1, 2))
+    return usual[np.argmin(cost)]
+
+
+def _procrustes(bones: np.ndarray, images: np.ndarray, pull: np.ndarray) -> np.ndarray:
+    """The orthogonal matrix of determinant -1 that carries `bones` (B, 3) to `images` best; `pull` decides what is open."""
+    # the same scale for joint and partner, so that theirs are inverse to each other
+    scale = np.sqrt(np.sum(bones**2) * np.sum(images**2)) or 1.0
+    u, _, v = np.linalg.svd(images.T @ bones / scale + _PULL * pull)
+    return u @ np.diag([1.0, 1.0, -np.linalg.det(u) * np.linalg.det(v)]) @ v
