@@ -1,7 +1,7 @@
 """Where the body strikes the ball: the distance from the striking part's surface to the ball's, at a key moment.
 
-Parts are bodies of revolution, because a skeleton has no skin: the foot a capsule from its ankle to its toe tip, the head a
-ball around the middle from its joint to its tip, the chest and the hands balls around their joints.
+Parts are bodies of revolution, because a skeleton has no skin: the foot a capsule from its ankle to its toe tip, the
+head a ball around the middle from its joint to its tip, the chest and the hands balls around their joints.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Feet: skate on carried contacts, slide per stance, GMD's skating ratio, the ground, and how far the lock moved a foot.
+"""Feet: skate on carried contacts, slide per stance, GMD's skating ratio, the ground, and how far the lock moved a
+foot.
 
-Feet are (T, 2, 2, 3) metres: frame, side (left, right), joint (heel, toe), world position with Z up. The heel is the foot
-(ankle) joint; a skeleton without a toe joint repeats it. Contacts are (T, 2) bool, labelled on the source clip and carried
-along, so that moving a foot cannot change what is counted (`../shared/peers.md` §3a, trap iv).
+Feet are (T, 2, 2, 3) metres: frame, side (left, right), joint (heel, toe), world position with Z up. The heel is the
+foot (ankle) joint; a skeleton without a toe joint repeats it. Contacts are (T, 2) bool, labelled on the source clip and
+carried along, so that moving a foot cannot change what is counted (`../shared/peers.md` §3a, trap iv).
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ def stance_travel(toes: np.ndarray, spans: np.ndarray) -> np.ndarray:
 def skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
     """GMD's skating frames: (T-1,) bool, either foot.
 
-    toes (T, 2, 3) m. Toe lower than 5 cm above the floor at t and t+1, faster than 0.5 m/s, and its 0.25 s mean speed too
-    (Karunratanakul et al. 2023, Guided Motion Diffusion, `calculate_skating_ratio`; their code works at 20 fps).
+    toes (T, 2, 3) m. Toe lower than 5 cm above the floor at t and t+1, faster than 0.5 m/s, and its 0.25 s mean speed
+    too (Karunratanakul et al. 2023, Guided Motion Diffusion, `calculate_skating_ratio`; their code works at 20 fps).
     """
     speed = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1) * fps
     width = 2 * int(GMD_SECONDS * fps / 2) + 1
@@ -76,8 +77,8 @@ def skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
 def support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> np.ndarray:
     """Height above the ground of each planted foot's lower part: (T, 2) m, NaN where there is no contact.
 
-    feet (T, 2, 2, 3) m; `heel_rest`: height of the heel joint while the sole is flat, m. A foot on its heel counts by the
-    heel, a foot on its toes by the toe, so neither rolling raises the figure.
+    feet (T, 2, 2, 3) m; `heel_rest`: height of the heel joint while the sole is flat, m. A foot on its heel counts by
+    the heel, a foot on its toes by the toe, so neither rolling raises the figure.
     """
     lower = np.minimum(feet[..., 1, 2], feet[..., 0, 2] - heel_rest)
     return np.where(contacts, lower, np.nan)

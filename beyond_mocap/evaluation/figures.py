@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..motion.contacts import floor_height
 from . import feet, jerk, pieces, realism, root, words
 from .moments import Moment, ball_gap, ball_shift
+from .reference import source_poses
 from .view import View
 
 
@@ -113,20 +114,20 @@ def polish(view: View, ik_miss: np.ndarray | None) -> dict:
 
 
 def _against_source(view: View) -> tuple[np.ndarray, float]:
-    """Planted feet's distance (N,) m from the source pose set at the output's pelvis and heading, and how far the pelvis
-    sinks below the source's at most, m; away from seams, where two clips are mixed."""
-    if view.reference is None or not len(view.used):
-        return np.zeros(0), np.nan
-    played = view.played
-    pure = np.isfinite(view.rows)
+    """Planted feet's distance (N,) m from the source pose set at the output's pelvis and heading, and how far the
+    pelvis sinks below the source's at most, m; away from seams, where two clips are mixed."""
+    if view.library is None or not len(view.used):
+        return np.zeros(0), math.nan
+    played, hips = view.played, view.played.body.hips
+    joints = feet.foot_joints(played.motion.skeleton)
+    local = realism.local_positions(played.motion.skeleton, played.positions, hips)
+    source = source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
+    pure = np.isfinite(source[:, 0, 0])
     for seam in view.seams:
         pure[max(seam - jerk.REACH, 0) : seam + jerk.REACH] = False
-    joints = feet.foot_joints(played.motion.skeleton)
-    local = realism.local_positions(played.motion.skeleton, played.positions, played.body.hips)
-    source = view.reference.source_poses(view.rows, played.mirrored)
     shift = feet.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
-    drop = (source[:, played.body.hips, 2] - local[:, played.body.hips, 2])[pure]
-    return shift, float(max(drop.max(), 0.0)) if len(drop) else np.nan
+    drop = (source[:, hips, 2] - local[:, hips, 2])[pure]
+    return shift, float(max(drop.max(), 0.0)) if len(drop) else math.nan
 
 
 def _bone_change(view: View) -> float:

@@ -1,7 +1,7 @@
 """How hard a seam hits: the third difference around it against what uncut recordings of the same speed show.
 
-Jerk index t stands for frames t .. t+3, so its middle is frame t + 1.5. A seam at frame s (the first of the new piece) has
-its middle at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
+Jerk index t stands for frames t .. t+3, so its middle is frame t + 1.5. A seam at frame s (the first of the new piece)
+has its middle at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ SEAM_TO_JERK = 2
 
 
 def jerk(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Largest third difference of any joint: positions (T, J, 3) m -> (T-3,) m/s^3, empty for fewer than four frames."""
+    """Largest third difference of any joint: positions (T, J, 3) m -> (T-3,) m/s^3, empty for fewer than four
+    frames."""
     if len(positions) < 4:
         return np.zeros(0)
     third = positions[3:] - positions[:-3] + 3.0 * (positions[1:-2] - positions[2:-1])
@@ -43,8 +44,8 @@ def uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np
 def real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
     """95th percentile (5,) m/s^3 of uncut windows (M,) in each speed class of speed (M,) m/s.
 
-    A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare); NaN where
-    none has.
+    A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare); NaN
+    where none has.
     """
     classes = speed_class(speed)
     values = [windows[classes == k] for k in range(5)]
@@ -63,7 +64,8 @@ def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
 
 
 def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """The same ratio in the middle of every window that touches no seam's window: (M,). A locked knee can pop anywhere."""
+    """The same ratio in the middle of every window that touches no seam's window: (M,). A locked knee can pop
+    anywhere."""
     if not len(values):
         return np.zeros(0)
     free = np.ones(len(values), dtype=bool)

@@ -18,11 +18,11 @@ from .played import Played
 class Moment:
     """How one key moment was served.
 
-    asked: the timeline's line. frame: output frame nearest to the asked time. clip, clip_frame (the clip's key frame, in its
-    own rate), None where no key of a clip is played there. played_at: seconds on the track's clock at which that key frame
-    is played, NaN where it is not. words: those that the source carries at `frame`. run: output frames (R,) that play the
-    clip without a seam around it; entry, exit: first and last of them that the clip's annotated row covers. used_instead:
-    words in place of the asked ones, None where the asked ones were had.
+    asked: the timeline's line. frame: output frame nearest to the asked time. clip, clip_frame (the clip's key frame,
+    in its own rate), None where no key of a clip is played there. played_at: seconds on the track's clock at which that
+    key frame is played, NaN where it is not. words: those that the source carries at `frame`. entry, exit: first and
+    last output frame, without a seam between, that the clip's annotated row covers. used_instead: words in place of the
+    asked ones, None where the asked ones were had.
     """
 
     asked: KeyMoment
@@ -51,21 +51,29 @@ def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library:
     run = np.flatnonzero(number == number[centre])
     words = () if played.words is None else tuple(played.words[frame])
     found = _clip_key(played, centre, key, library)
-    if result is not None:
-        clip, clip_frame = result.clip, result.clip_frame
-        instead = result.used_instead
-    else:
-        clip, clip_frame = (None, None) if found is None else (played.clips[played.clip[centre]], found.frame)
-        lacking = found is None or not set(key.words) <= set(found.words)
-        instead = tuple(sorted(found.words)) if found is not None and lacking else None
+    clip, clip_frame, instead = _served(played, centre, key, found, result, library)
     at = np.nan if clip_frame is None else crossing(played.clip_frame[run], played.times[run], clip_frame)
     covered = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)] if found else run[:0]
     entry, leave = (covered[0], covered[-1]) if len(covered) else (centre, centre)
     return Moment(key, frame, clip, clip_frame, at, words, int(entry), int(leave), instead)
 
 
+def _served(played: Played, frame: int, key: KeyMoment, found, result, library: Library | None):
+    """Clip, its key frame and the words used instead, by the library where there is one: a take only says what it
+    meant."""
+    instead = None if result is None else result.used_instead
+    if library is None:
+        return (None, None, None) if result is None else (result.clip, result.clip_frame, instead)
+    if found is None:
+        return None, None, instead
+    if instead is None and not set(key.words) <= set(found.words):
+        instead = tuple(sorted(found.words))
+    return played.clips[played.clip[frame]], found.frame, instead
+
+
 def _clip_key(played: Played, frame: int, key: KeyMoment, library: Library | None):
-    """The library's key that is played at `frame`: of that clip and side, carrying the asked words if any does, nearest."""
+    """The library's key that is played at `frame`: of that clip and side, carrying the asked words if any does,
+    nearest."""
     if library is None or played.clip[frame] < 0:
         return None
     path, side = played.clips[played.clip[frame]], bool(played.mirrored[frame])
@@ -77,7 +85,8 @@ def _clip_key(played: Played, frame: int, key: KeyMoment, library: Library | Non
 def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> float:
     """Seconds at which a run plays `key_frame`: clip_frames (R,) ascending, times (R,) s.
 
-    Up to one output frame before or after the run the rate is taken to go on; NaN farther out, where it is never played.
+    Up to one output frame before or after the run the rate is taken to go on; NaN farther out, where it is never
+    played.
     """
     if len(times) < 2 or not np.all(np.diff(clip_frames) > 0):
         hit = np.flatnonzero(np.abs(clip_frames - key_frame) < 0.5)

@@ -1,7 +1,7 @@
 """Pieces of clips that a take is made of, read off its provenance: runs, seams, warp rate and replayed loops.
 
-Per output frame: clip (T,) an integer per clip (negative where unknown), mirrored (T,) bool, clip_frame (T,) fractional in
-the clip's own rate, and per frame the source frames that pass in one output frame at recorded speed, `stride` (T,) =
+Per output frame: clip (T,) an integer per clip (negative where unknown), mirrored (T,) bool, clip_frame (T,) fractional
+in the clip's own rate, and per frame the source frames that pass in one output frame at recorded speed, `stride` (T,) =
 clip's fps / output fps.
 """
 
@@ -23,8 +23,8 @@ def played_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, 
 def seams(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
     """Output frames (S,) that start a new piece: the clip (or its mirroring) changes, or clip_frame jumps.
 
-    A jump is a step of more than 1.5 frames times the warp there, in frames of the output's rate, or of less than half of
-    it (a step back, a repeated stretch). The warp is the median rate of up to four steps on either side.
+    A jump is a step of more than 1.5 frames times the warp there, in frames of the output's rate, or of less than half
+    of it (a step back, a repeated stretch). The warp is the median rate of up to four steps on either side.
     """
     rate = played_rate(clip, mirrored, clip_frame, stride)
     known = (clip[1:] >= 0) | (clip[:-1] >= 0)
@@ -71,7 +71,8 @@ def replayed(
 
 
 def _neighbours_median(rate: np.ndarray, reach: int = 4) -> np.ndarray:
-    """Median of the finite rates up to `reach` steps away on either side, the step itself left out; 1 where there are none."""
+    """Median of the finite rates up to `reach` steps away on either side, the step itself left out; 1 where there are
+    none."""
     padded = np.pad(rate, reach, constant_values=np.nan)
     around = np.stack([padded[reach + k : reach + k + len(rate)] for k in range(-reach, reach + 1) if k])
     around[~np.isfinite(around)] = np.nan

@@ -20,11 +20,11 @@ from .feet import foot_joints
 class Played:
     """One player's take as evaluation sees it.
 
-    motion: T frames on the pitch; frame 0 is at `start_time` s on the track's clock. clips: table of clip paths below the
-    library; clip (T,) int index into it, -1 where the source is not known; clip_frame (T,) fractional frame in that clip's
-    own rate, NaN where not known; mirrored (T,) bool. words: T word tuples of the source frames, sides after mirroring, or
-    None. contacts (T, 2) bool, left and right. ball: as written out, or None. correction (T, 2) m each foot was moved by
-    polish, or None. keys: how key moments were served, empty where only files tell.
+    motion: T frames on the pitch; frame 0 is at `start_time` s on the track's clock. clips: table of clip paths below
+    the library; clip (T,) int index into it, -1 where the source is not known; clip_frame (T,) fractional frame in that
+    clip's own rate, NaN where not known; mirrored (T,) bool. words: T word tuples of the source frames, sides after
+    mirroring, or None. contacts (T, 2) bool, left and right. ball: as written out, or None. correction (T, 2) m each
+    foot was moved by polish, or None. keys: how key moments were served, empty where only files tell.
     """
 
     motion: Motion
@@ -98,17 +98,16 @@ def played_from_tables(
     """What a motion read from a file plays, with its provenance and ball where they are known.
 
     provenance: `files.tables.Provenance`, or anything with its arrays: times (T,) s, clip (T paths), clip_frame (T,),
-    mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at `start_time` and contacts
-    are detected on the motion itself. where: the table's file, for messages. InputError where it has another length.
+    mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at `start_time` and
+    contacts are detected on the motion itself. where: the table's file, for messages. InputError where it has another
+    length.
     """
+    count = len(motion)
     if provenance is None:
-        count = len(motion)
-        contacts = foot_contacts.detect(motion)
-        return Played(
-            motion, start_time, (), np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool), None, contacts, ball
-        )
-    if len(provenance.clip) != len(motion):
-        raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {len(motion)}")
+        unknown, nowhere, plain = np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool)
+        return Played(motion, start_time, (), unknown, nowhere, plain, None, foot_contacts.detect(motion), ball)
+    if len(provenance.clip) != count:
+        raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {count}")
     clips, index = np.unique(np.asarray(provenance.clip, dtype=str), return_inverse=True)
     return Played(
         motion=motion,

@@ -1,7 +1,7 @@
 """How near each pose is to some recorded pose, and how smooth the motion is.
 
-A pose is its joints' places and 0.12 s of their velocity, in the frame of the body's heading with its origin on the ground
-below the hips (as the search sees it); distances are root mean squares over joints, in metres.
+A pose is its joints' places and 0.12 s of their velocity, in the frame of the body's heading with its origin on the
+ground below the hips (as the search sees it); distances are root mean squares over joints, in metres.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ _ROWS_AT_ONCE = 512
 
 
 def local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
-    """World positions (T, J, 3) m seen from the body: X ahead, Y left, Z up, origin below the hips on the ground; float32."""
+    """World positions (T, J, 3) m seen from the body: X ahead, Y left, Z up, origin below the hips on the ground;
+    float32."""
     return turned(positions - ground_point(positions, hips), -heading_from_positions(skeleton, positions))
 
 
@@ -34,10 +35,11 @@ def turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: int) -> np.ndarray:
-    """Features (T, 6 J) float32 in metres of world positions (T, J, 3): places, then 0.12 s of velocity, both per sqrt(J).
+    """Features (T, 6 J) float32 in metres of world positions (T, J, 3): places, then 0.12 s of velocity, both per
+    sqrt(J).
 
-    Velocities are the world's, turned into the heading frame, so travel counts. The Euclidean distance of two rows is then
-    the root mean square over joints.
+    Velocities are the world's, turned into the heading frame, so travel counts. The Euclidean distance of two rows is
+    then the root mean square over joints.
     """
     places = local_positions(skeleton, positions, hips)
     moves = turned(velocity(positions, fps), -heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
@@ -56,8 +58,9 @@ def nearest_distance(
 ) -> np.ndarray:
     """Distance (T,) m from each row of features (T, D) to the nearest row of library (N, D).
 
-    left_out (T,), owner (N,): where given, library rows whose owner equals a feature row's left_out do not count; infinite
-    where none is left. Exhaustive, in chunks; |a-b|^2 = |a|^2 - 2ab + |b|^2 loses about 1e-3 m in float32 near zero.
+    left_out (T,), owner (N,): where given, library rows whose owner equals a feature row's left_out do not count;
+    infinite where none is left. Exhaustive, in chunks; |a-b|^2 = |a|^2 - 2ab + |b|^2 loses about 1e-3 m in float32 near
+    zero.
     """
     squares = np.einsum("nd,nd->n", library, library)
     out = np.empty(len(features))
@@ -81,7 +84,8 @@ def real_p95(distance: np.ndarray, speed: np.ndarray, least: int = 30) -> np.nda
 
 
 def unreal(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Frames (T,) bool whose nearest library pose is farther (T,) m than the real p95 (5,) m at their speed (T,) m/s."""
+    """Frames (T,) bool whose nearest library pose is farther (T,) m than the real p95 (5,) m at their speed (T,)
+    m/s."""
     return distance > real[speed_class(speed)]
 
 

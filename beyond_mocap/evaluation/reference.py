@@ -1,7 +1,7 @@
 """What a library's uncut recordings score themselves, worked out once per library and output rate.
 
-Every recording is resampled to the output's rate and measured frame by frame; a take's own score is then a look-up of the
-frames it used. Twins are not measured again: all figures here are the same for left and right.
+Every recording is resampled to the output's rate and measured frame by frame; a take's own score is then a look-up of
+the frames it used. Twins are not measured again: all figures here are the same for left and right.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from ..errors import InputError
 from ..library.library import Clip, Library
 from ..motion.contacts import floor_height
 from ..motion.humanoid import Humanoid, identify
-from ..motion.motion import forward_kinematics, resample
-from ..motion.skeleton import Skeleton
+from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
 from . import feet, jerk, realism, root
 
 POSES_PER_SECOND = 10.0
@@ -27,15 +26,13 @@ LEFT_OUT_POSES = 3000
 class Recording:
     """One uncut clip at the output's rate, T frames, measured.
 
-    local (T, J, 3) float32 m: joints seen from the body (`realism.local_positions`). features (T, 6 J) float32 m. sway,
-    surge, speed (T,): m, m/s, m/s. contact_speed (T, 2) m/s, NaN without contact. skating (T,) bool. support (T, 2) m.
-    jerk (T-3,) m/s^3. stances (S, 3) of its own frames and their travel (S,) m.
+    features (T, 6 J) float32 m, of `realism.pose_features`. sway, surge, speed (T,): m, m/s, m/s. contact_speed (T, 2)
+    m/s, NaN without contact. skating (T,) bool. support (T, 2) m. jerk (T-3,) m/s^3. stances (S, 3) of its own frames
+    and their travel (S,) m.
     """
 
     path: str
-    mirrored: bool
     rate: float
-    local: np.ndarray
     features: np.ndarray
     sway: np.ndarray
     surge: np.ndarray
@@ -52,20 +49,17 @@ class Recording:
 class LibraryReference:
     """A library's recordings at `fps`, one after the other (N frames), and what is real for them.
 
-    first (C + 1,): each recording's first row; rate (C,): its own frames per second; mirrored (C,): whether the row is the
-    twin; the per-frame arrays are Recording's, joined. speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, pose_p95
-    (5,) m. poses (M, 6 J): some ten poses a second of all clips, twins included. fastest: highest 1 s mean speed of a root,
-    slowest: the slowest gait, m/s.
+    index: path -> recording; first (C + 1,): each recording's first row; rate (C,): its own frames per second; the
+    per-frame arrays are Recording's, joined; jerk_above_real (N,): 1 where the window around a frame is above jerk_p95,
+    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, pose_p95 (5,) m. poses (M, 6 J):
+    some ten a second of all clips, twins included. heel_rest: height of the heel joint on a flat foot, m. fastest:
+    highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
     """
 
-    skeleton: Skeleton
-    body: Humanoid
     fps: float
     index: dict[str, int]
     first: np.ndarray
     rate: np.ndarray
-    mirrored: np.ndarray
-    local: np.ndarray
     sway: np.ndarray
     surge: np.ndarray
     speed: np.ndarray
@@ -92,19 +86,6 @@ class LibraryReference:
         frame = np.clip(clip_frame * self.fps / self.rate[own], 0, np.diff(self.first)[own] - 1)
         return np.where((own >= 0) & (clip >= 0), self.first[own] + frame, np.nan)
 
-    def source_poses(self, rows: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
-        """Joints (T, J, 3) m seen from the body at fractional rows (T,), twins where mirrored (T,); NaN where unknown."""
-        known = np.isfinite(rows)
-        low = np.where(known, rows, 0.0).astype(int)
-        owner = np.searchsorted(self.first, low, side="right") - 1
-        high = np.minimum(low + 1, self.first[owner + 1] - 1)
-        weight = (np.where(known, rows, 0.0) - low)[:, None, None]
-        places = self.local[low] * (1.0 - weight) + self.local[high] * weight
-        flip = mirrored != self.mirrored[owner]
-        places[flip] = places[flip][:, list(self.body.mirror)] * np.array([1.0, -1.0, 1.0])
-        places[~known] = np.nan
-        return places
-
     def used_stances(self, rows: np.ndarray) -> np.ndarray:
         """Travel (S',) m of the source stances that a take touched; rows (T,) int of the frames it used."""
         used = np.zeros(self.first[-1] + 1, dtype=int)
@@ -125,7 +106,7 @@ def library_reference(library: Library, fps: float) -> LibraryReference:
 
 
 def build_reference(library: Library, fps: float) -> LibraryReference:
-    """Measures every recording of a library at `fps` frames per second (some 10 us per frame and joint)."""
+    """Measures every recording of a library at `fps` frames per second."""
     originals, twins = _originals(library.clips)
     heel_rest = _heel_rest(originals)
     measured = [measure(clip, fps, heel_rest) for clip in originals]
@@ -133,17 +114,13 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     first = np.concatenate([[0], np.cumsum(lengths)])
     windows = [jerk.uncut_windows(recording.jerk, recording.speed) for recording in measured]
     jerk_p95 = jerk.real_p95(*(np.concatenate(column) for column in zip(*windows)))
-    body = identify(library.skeleton)
-    poses, pose_p95 = _poses(measured, twins, body, fps)
+    poses, pose_p95 = _poses(measured, twins, identify(library.skeleton), fps)
     joined = {name: _joined(measured, name) for name in _PER_FRAME}
     return LibraryReference(
-        skeleton=library.skeleton,
-        body=body,
         fps=fps,
         index={recording.path: i for i, recording in enumerate(measured)},
         first=first,
         rate=np.array([recording.rate for recording in measured]),
-        mirrored=np.array([recording.mirrored for recording in measured]),
         jerk_above_real=np.concatenate([_above(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
         travel=_joined(measured, "travel"),
@@ -157,7 +134,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     )
 
 
-_PER_FRAME = ("local", "sway", "surge", "speed", "contact_speed", "skating", "support")
+_PER_FRAME = ("sway", "surge", "speed", "contact_speed", "skating", "support")
 
 
 def _joined(measured: list[Recording], name: str) -> np.ndarray:
@@ -198,9 +175,7 @@ def measure(clip: Clip, fps: float, heel_rest: float) -> Recording:
     spans = feet.stances(contacts)
     return Recording(
         path=clip.path,
-        mirrored=clip.mirrored,
         rate=clip.motion.fps,
-        local=realism.local_positions(skeleton, positions, hips),
         features=realism.pose_features(skeleton, positions, fps, hips),
         sway=root.sway(pelvis, fps),
         surge=root.surge(pelvis, fps),
@@ -215,7 +190,8 @@ def measure(clip: Clip, fps: float, heel_rest: float) -> Recording:
 
 
 def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
-    """Per frame of a recording 1 where the window around it has more jerk than is real, 0 where not, NaN at its ends."""
+    """Per frame of a recording 1 where the window around it has more jerk than is real, 0 where not, NaN at its
+    ends."""
     out = np.full(len(recording.sway), np.nan)
     windows, speed = jerk.uncut_windows(recording.jerk, recording.speed)
     start = jerk.REACH + jerk.SEAM_TO_JERK
@@ -236,6 +212,24 @@ def _poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: fl
     some = np.unique(np.linspace(0, len(rows) - 1, LEFT_OUT_POSES).astype(int))
     distance = realism.nearest_distance(rows[some], poses, owner[some], owners)
     return poses, realism.real_p95(distance, speed[some])
+
+
+def source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_frame) -> np.ndarray:
+    """Joints (T, J, 3) m of each output frame's source as recorded, seen from the body; NaN where it is not known.
+
+    clips: table of paths; clip (T,) int index into it, -1 unknown; mirrored (T,) bool; clip_frame (T,) in the clip's
+    rate.
+    """
+    table = {(source.path, source.mirrored): source.motion for source in library.clips}
+    out = np.full((len(clip), len(library.skeleton), 3), np.nan)
+    for number, side in set(zip(clip.tolist(), mirrored.tolist())):
+        motion = table.get((clips[number], side)) if number >= 0 else None
+        if motion is None:
+            continue
+        mine = (clip == number) & (mirrored == side)
+        positions = pose_kinematics(motion.skeleton, *at_frames(motion, clip_frame[mine]))[0]
+        out[mine] = realism.local_positions(motion.skeleton, positions, identify(motion.skeleton).hips)
+    return out
 
 
 def _slowest_gait(library: Library) -> float:

@@ -43,8 +43,8 @@ def evaluate_played(
 ) -> dict:
     """The report of anything played, from memory or files (`played_from_take`, `played_from_tables`).
 
-    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. InputError where the
-    library has another skeleton than the motion.
+    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. InputError where
+    the library has another skeleton than the motion.
     """
     view = View(played, track, timeline, library)
     report = {
@@ -67,7 +67,8 @@ def evaluate_played(
 
 
 def rounded(value, digits: int = 5):
-    """The same report with floats at `digits` significant digits, NaN and infinity as None, numpy numbers as Python's."""
+    """The same report with floats at `digits` significant digits, NaN and infinity as None, numpy numbers as
+    Python's."""
     if isinstance(value, Mapping):
         return {key: rounded(entry, digits) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,8 +1,8 @@
 """How well the body is where the track says: root and pelvis error, the body's own sway, surge, speeds and coverage.
 
 Everything here is on the ground plane: pelvis (T, 2) and track (T, 2) in metres on the pitch, one row per output frame.
-The *root* of `../shared/metrics.md` is the pelvis behind a 1.5 s window, which takes out the sway that a body must keep;
-the track goes through the same window.
+The *root* of `../shared/metrics.md` is the pelvis behind a 1.5 s window, which takes out the sway that a body must
+keep; the track goes through the same window.
 """
 
 from __future__ import annotations

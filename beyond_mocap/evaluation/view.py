@@ -1,4 +1,5 @@
-"""What all figures of one report share: the take, the frames of the library it used, its seams, its speed, what was asked."""
+"""What all figures of one report share: the take, the frames of the library it used, its seams, its speed, what was
+asked."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""How well the words were met: Faustino's annotation similarity (§3.2.2 eq. 18), as printed and over the asked words only.
+"""How well the words were met: Faustino's annotation similarity (§3.2.2 eq. 18), as printed and over the asked words
+only.
 
-Words are sets per frame; sides are those after mirroring. A frame whose asked words are None (transition, or nothing known
-to be asked) is left out.
+Words are sets per frame; sides are those after mirroring. A frame whose asked words are None (transition, or nothing
+known to be asked) is left out.
 """
 
 from __future__ import annotations

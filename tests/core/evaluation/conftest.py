@@ -17,8 +17,12 @@ from beyond_mocap.take import BallPath, KeyResult, Take
 FPS = 30.0
 SOURCE_FPS = 60.0
 KEY_FRAME = 300
-CLIPS = {"walk.bvh": (1.3, "0 12 walking front\n"), "jog.bvh": (2.8, "0 12 jogging front\n4.5 5.6 kick right\n5.0 kick right\n"),
-         "run.bvh": (4.2, "0 12 running front\n"), "stand.bvh": (0.0, "0 12 standing\n")}  # fmt: skip
+CLIPS = {
+    "walk.bvh": (1.3, "0 12 walking front\n"),
+    "jog.bvh": (2.8, "0 12 jogging front\n4.5 5.6 kick right\n5.0 kick right\n"),
+    "run.bvh": (4.2, "0 12 running front\n"),
+    "stand.bvh": (0.0, "0 12 standing\n"),
+}
 
 
 @pytest.fixture(scope="session")
@@ -42,7 +46,8 @@ class Part(NamedTuple):
 
 @pytest.fixture(scope="session")
 def cut(library):
-    """cut((path, first, count[, rate[, mirrored]]), ..., asked=(KeyMoment, ...), timeline=None, ball=None) -> Take: the parts, each begun where the last ended."""
+    """cut((path, first, count[, rate[, mirrored]]), ..., asked=(KeyMoment, ...), timeline=None, ball=None) -> Take: the
+    parts, each begun where the last ended."""
 
     def make(*parts, asked=(), timeline=None, ball=None, start_time=10.0) -> Take:
         pieces, end = [], None
@@ -50,7 +55,7 @@ def cut(library):
             motion, frames = _piece(library, part)
             if end is not None:
                 motion = place(motion, 0.0, (*(end - motion.root_positions[0])[:2], 0.0))
-            end = 2 * motion.root_positions[-1] - motion.root_positions[-2] if len(motion) > 1 else motion.root_positions[-1]
+            end = 2 * motion.root_positions[-1] - motion.root_positions[-2]
             pieces.append((part, motion, frames))
         return _take(library, pieces, asked, timeline, ball, start_time)
 
@@ -100,7 +105,8 @@ def _result(key, pieces, frames, start_time) -> KeyResult:
 
 @pytest.fixture(scope="session")
 def track_of():
-    """track_of(take, shift=(0, 0), ball=None) -> Track: samples at 25 Hz of the take's pelvis behind a 1.5 s window, moved."""
+    """track_of(take, shift=(0, 0), ball=None) -> Track: samples at 25 Hz of the take's pelvis behind a 1.5 s window,
+    moved."""
     def make(take, shift=(0.0, 0.0), ball=None) -> Track:
         played = played_from_take(take)
         path = zero_phase_hann(played.pelvis, FPS, 1.5)

@@ -10,8 +10,9 @@ FPS = 30.0
 STANCE, SWING = 12, 8
 
 
-def walk(steps=12, slide=0.0, toe_height=0.0):
-    """A walk of alternating stances: feet (T, 2, 2, 3) m and contacts (T, 2). Planted feet slide `slide` m/s along +X."""
+def walk(steps=12, slide=0.0):
+    """A walk of alternating stances: feet (T, 2, 2, 3) m and contacts (T, 2). Planted feet slide `slide` m/s along
+    +X."""
     cycle = STANCE + SWING
     count = steps * cycle
     frames = np.arange(count)
@@ -27,7 +28,8 @@ def walk(steps=12, slide=0.0, toe_height=0.0):
         x = np.where(phase < STANCE, start + slide * phase / FPS, end + (1.2 * (stride + 1) - end) * swing)
         planted[:, side, :, 0] = x[:, None] + [0.0, 0.15]
         planted[:, side, :, 1] = 0.1 if side == 0 else -0.1
-        planted[:, side, :, 2] = np.where(phase < STANCE, 0.0, 0.12 * np.sin(np.pi * swing))[:, None] + [0.08, toe_height]
+        lift = np.where(phase < STANCE, 0.0, 0.12 * np.sin(np.pi * swing))
+        planted[:, side, :, 2] = lift[:, None] + [0.08, 0.0]
     return planted, contacts
 
 

@@ -1,4 +1,5 @@
-"""The whole report on takes whose figures are known: an uncut clip, a shifted track, a jolt, a warp, a loop, a key moment."""
+"""The whole report on takes whose figures are known: an uncut clip, a shifted track, a jolt, a warp, a loop, a key
+moment."""
 
 import json
 from dataclasses import replace
@@ -27,10 +28,13 @@ CONTRACT = {
     "warp_rate": "min max",
     "ground_mm": "min support_max",
 }
-PLAIN = "version seed fps frames duration_s keys ik_miss_share pelvis_drop_m pelvis_surge_ratio pose_realism loop_share warnings"
+PLAIN = (
+    "version seed fps frames duration_s keys ik_miss_share pelvis_drop_m pelvis_surge_ratio pose_realism loop_share "
+    "warnings"
+)
 KEY = (
-    "time_s solved_time_s labels clip clip_frame time_error_s position_error_m pelvis_error_m contact_gap_m ball_shift_m "
-    "used_instead"
+    "time_s solved_time_s labels clip clip_frame time_error_s position_error_m pelvis_error_m contact_gap_m "
+    "ball_shift_m used_instead"
 )
 
 
@@ -196,8 +200,8 @@ def test_files_score_as_the_take_in_memory(cut, track_of, still_ball, library, t
     bvh.write(tmp_path / "m.bvh", take.motion)
     tables.write_provenance(tmp_path / "p.csv", take)
     tables.write_ball(tmp_path / "b.csv", take.ball)
-    motion = bvh.read(tmp_path / "m.bvh", 0.01).motion
-    played = played_from_tables(motion, tables.read_provenance(tmp_path / "p.csv"), tables.read_ball(tmp_path / "b.csv"))
+    motion, provenance = bvh.read(tmp_path / "m.bvh", 0.01).motion, tables.read_provenance(tmp_path / "p.csv")
+    played = played_from_tables(motion, provenance, tables.read_ball(tmp_path / "b.csv"))
     track = track_of(take)
     read = evaluate_played(played, track=track, timeline=take.timeline, library=library)
     made = evaluate(take, track, library)
