@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..annotation import DISCRETE
 from ..errors import Cancelled
 from ..library.keys import Key
 from ..library.library import Library
@@ -32,13 +33,15 @@ BUCKET = 40
 @dataclass(frozen=True)
 class Weights:
     """What a unit of each misfit costs. speed per m/s; turn per radian and slot; facing per radian off the direction of
-    travel; words for lacking all of the asked ones; rate per unit of warp; switch for any cut; pose per metre of joint
-    distance; rate_change per unit; replay for a stretch shown less than 4 s ago."""
+    travel; words for lacking all of the asked ones; unasked for frames of an action that nobody asked for, or that carry no
+    word; rate per unit of warp; switch for any cut; pose per metre of joint distance; rate_change per unit; replay for a
+    stretch shown less than 4 s ago."""
 
     speed: float = 1.0
     turn: float = 0.5
     facing: float = 0.1
     words: float = 0.3
+    unasked: float = 0.5
     rate: float = 0.24
     switch: float = 0.1
     pose: float = 1.0
@@ -93,6 +96,7 @@ class PathSearch:
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
         self._missing: dict[frozenset[str], np.ndarray] = {}
+        self._other: dict[frozenset[str], np.ndarray] = {}
 
     def run(self) -> EditList:
         """The cheapest way through all slots that the beam finds."""
@@ -157,12 +161,21 @@ class PathSearch:
         words = self.wanted.asked[(slot.first + slot.end) // 2]
         if words:
             cost += w.words * self._missing_share(words)
+        cost += w.unasked * self._unasked(words or frozenset())
         return np.where(valid & self.usable, cost, np.inf)
 
     def _missing_share(self, words: frozenset[str]) -> np.ndarray:
         if words not in self._missing:
             self._missing[words] = self.annotation.missing_share(words)
         return self._missing[words]
+
+    def _unasked(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) bool: frames that show an action (a kick, a jump) nobody asked for, or nothing that is annotated."""
+        if words not in self._other:
+            names = self.frames.vocabulary
+            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
+            self._other[words] = self.frames.words[:, actions].any(axis=1) | ~self.frames.words.any(axis=1)
+        return self._other[words]
 
     def _asked(self, slot: Slot) -> tuple[float, float]:
         """Mean speed in m/s and change of direction in radians that the track asks over a slot."""
