@@ -1,0 +1,105 @@
+"""When a foot stands on the ground, seen from its joints alone.
+
+A point of the foot (ankle, toe) stands where it is low and slow, both judged by the clip itself. *Low* is near the lower
+envelope of the point's own height, because floors drift in real recordings: by centimetres in optical ones (a tilted volume),
+by decimetres in inertial suits, which integrate height. *Slow* is a share of how fast the foot swings around that moment,
+because a planted foot slides 2 cm/s in a good walk, 0.5 m/s in a suit, and the ankle of a sprinter never falls below 1 m/s.
+Two thresholds each (enter, leave) and shortest durations keep the labels from flickering.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import grey_opening, maximum_filter1d
+
+from .humanoid import Humanoid, identify, leg_length
+from .motion import Motion, forward_kinematics
+
+_ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once within it
+_SWING_SECONDS = 1.2
+_DIFFERENCE_SECONDS = 1.0 / 60.0
+_LOW = (0.03, 0.055)  # metres above the envelope: to enter, to leave
+_SLOW = (0.25, 0.45)  # metres per second: to enter, to leave, where the foot hardly moves
+_SLOW_SHARE = (0.10, 0.18)  # of the swing's speed: to enter, to leave
+_HELD_UP = 0.10  # metres above the other foot's envelope: this foot does not stand at all
+_UPRIGHT = 0.45  # of the leg's length: hips above the foot
+_SHORTEST = 0.04  # seconds of contact
+_SHORTEST_GAP = 0.05
+
+
+def floor_height(motion: Motion) -> float:
+    """The clip's floor in metres: 2nd percentile of its toes' heights, of the ankles' where it has no toes."""
+    body = identify(motion.skeleton)
+    positions, _ = forward_kinematics(motion)
+    return float(np.percentile(positions[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2], 2))
+
+
+def detect(motion: Motion) -> np.ndarray:
+    """Which foot is on the ground, by its ankle or its toe: (T, 2) bool, left and right; any rate from 25 fps up."""
+    body = identify(motion.skeleton)
+    positions, _ = forward_kinematics(motion)
+    kinds = [(body.left.foot, body.right.foot)]
+    if body.left.toe is not None and body.right.toe is not None:
+        kinds.append((body.left.toe, body.right.toe))
+    points = [_points_down(positions, joints, body, leg_length(motion.skeleton), motion.fps) for joints in kinds]
+    feet = np.any(points, axis=0)
+    for side in (0, 1):
+        feet[:, side] = ~_without_short(~feet[:, side], _SHORTEST_GAP * motion.fps)
+        feet[:, side] = _without_short(feet[:, side], _SHORTEST * motion.fps)
+    return feet
+
+
+def _points_down(positions: np.ndarray, joints: tuple[int, int], body: Humanoid, leg: float, fps: float) -> np.ndarray:
+    """Contact (T, 2) of the left and right joint of one kind; positions (T, J, 3) metres, leg length in metres."""
+    heights = positions[:, joints, 2]
+    above = heights - _standing_heights(heights, positions[:, body.hips, 2], leg, fps)
+    speed = _horizontal_speed(positions[:, joints, :2], fps)
+    swing = maximum_filter1d(speed, _window(_SWING_SECONDS, fps), axis=0, mode="nearest")
+    enter, leave = (
+        (above < low) & (speed < np.maximum(slow, share * swing)) for low, slow, share in zip(_LOW, _SLOW, _SLOW_SHARE)
+    )
+    return np.stack([_hysteresis(enter[:, side], leave[:, side]) for side in (0, 1)], axis=1)
+
+
+def _standing_heights(heights: np.ndarray, hips: np.ndarray, leg: float, fps: float) -> np.ndarray:
+    """How high each point is when it stands, around each moment: (T, 2) metres from heights (T, 2) and hip heights (T,).
+
+    Upright: the lower envelope, a morphological opening, which follows a drifting floor without lag. Where the hips are
+    low (lying, getting up) a resting foot need not stand, so there it is the clip's own standing height.
+    """
+    envelope = grey_opening(heights, size=(_window(_ENVELOPE_SECONDS, fps), 1), mode="nearest")
+    other = envelope[:, ::-1]
+    envelope = np.where(envelope - other > _HELD_UP, other, envelope)
+    upright = hips[:, None] - heights > _UPRIGHT * leg
+    lowest = [np.percentile(h[u] if u.any() else h, 5) for h, u in zip(heights.T, upright.T)]
+    return np.where(upright, envelope, np.minimum(envelope, lowest))
+
+
+def _window(seconds: float, fps: float) -> int:
+    """An odd number of frames."""
+    return 2 * round(seconds * fps / 2) + 1
+
+
+def _horizontal_speed(places: np.ndarray, fps: float) -> np.ndarray:
+    """Speed (T, 2) in m/s of points (T, 2, 2), by central differences over a time that hardly depends on the rate."""
+    reach = max(1, round(_DIFFERENCE_SECONDS * fps))
+    frames = np.arange(len(places))
+    after, before = np.minimum(frames + reach, len(places) - 1), np.maximum(frames - reach, 0)
+    seconds = np.maximum(after - before, 1) / fps
+    return np.linalg.norm(places[after] - places[before], axis=-1) / seconds[:, None]
+
+
+def _hysteresis(enter: np.ndarray, leave: np.ndarray) -> np.ndarray:
+    """Runs of `leave` (T,) that hold at least one frame of `enter` (T,)."""
+    labels = np.cumsum(np.diff(leave, prepend=False)) * leave
+    return leave & np.isin(labels, labels[enter & leave])
+
+
+def _without_short(flags: np.ndarray, frames: float) -> np.ndarray:
+    """`flags` (T,) without runs shorter than `frames`; runs that touch an end of the clip stay, they may go on."""
+    edges = np.flatnonzero(np.diff(flags, prepend=~flags[0], append=~flags[-1]))
+    out = flags.copy()
+    for start, stop in zip(edges[:-1], edges[1:]):
+        if flags[start] and stop - start < frames and start > 0 and stop < len(flags):
+            out[start:stop] = False
+    return out
