@@ -2,7 +2,7 @@
 
 import shutil
 
-PARTS = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "beyond_mocap", "scene", "operators", "panels")
+PARTS = ("__init__.py", "batch.py", "LICENSE", "README.md", "CHANGELOG.md", "beyond_mocap", "scene", "operators", "panels")
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc")
 
 

@@ -28,9 +28,9 @@ ROOMS = {
     "annotation": ["motion"],
     "plan": ["motion", "annotation"],
     "take": ["motion", "annotation"],
-    "files": ["motion"],
+    "files": ["motion", "take"],
     "library": ["motion", "annotation", "files"],
-    "synthesis": ["motion", "annotation", "plan", "library", "polish.reach"],
+    "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "polish": ["motion"],
     "ball": ["motion", "library", "polish"],
     "evaluation": ["motion", "annotation", "plan", "take", "ball", "library"],
@@ -40,7 +40,7 @@ LAZY = {
     "library": ["sklearn", "threadpoolctl"],
     "files": ["kloppy"],
     "evaluation": ["matplotlib"],
-    "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn"],
+    "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn", "threadpoolctl"],
 }
 # A room of the extension -> what it may import of ours.
 EXTENSION = {

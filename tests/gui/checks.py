@@ -16,7 +16,7 @@ import addon_utils
 import bpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from window import Output, Window, talk  # noqa: E402
+from window import Output, Window, talk, unfold  # noqa: E402
 
 EXTENSION = "bl_ext.user_default.beyond_mocap"
 TAB = "Beyond Mocap"
@@ -29,12 +29,18 @@ window = Window()
 
 def trouble(text):
     """The lines of printed text that only an error prints."""
-    return re.findall(r"^(?:Traceback \(most recent call last\):.*|/.*\.py:\d+|.*rna_uiItem\w*:.*|.*unknown operator.*)$", text, re.M)
+    return re.findall(r"^(?:Traceback \(most recent call last\):.*|/.*\.py:\d+|.*rna_uiItem\w*:.*|UILayout\..*)$", text, re.M)
 
 
 def printed_since(mark):
     """What was printed after the first `mark` characters."""
     return output.text()[mark:]
+
+
+def assert_no_trouble_since(mark):
+    """Fail with what was printed, each line once, where an error is in it."""
+    printed = printed_since(mark)
+    assert not trouble(printed), "printed:\n" + "\n".join(list(dict.fromkeys(printed.splitlines()))[:40])
 
 
 def check_it_is_enabled():
@@ -121,12 +127,12 @@ def check_the_eye_and_the_hand():
     planted = (BEYOND_MOCAP_OT_planted, BEYOND_MOCAP_PT_planted)
     for cls in planted:
         bpy.utils.register_class(cls)
-    yield from press_all({"bpy.ops.beyond_mocap.planted()"})
+    yield from press_all({"bpy.ops.beyond_mocap.planted"})
     for cls in planted:
         bpy.utils.unregister_class(cls)
     yield 0.5
     seen = printed_since(mark)
-    assert pressed == ["VIEW_3D"], pressed
+    assert pressed == ["VIEW_3D"], f"pressed in {pressed}"
     assert "ValueError: planted" in seen, seen
     assert len(set(trouble(seen))) >= 2, seen
 
@@ -137,19 +143,26 @@ def check_the_tab_draws():
     yield from window.open_tab(area, TAB)
     assert window.sidebar(area).active_panel_category == TAB
     window.picture(PICTURES / "panel.png")
-    assert not trouble(printed_since(mark)), printed_since(mark)
+    assert_no_trouble_since(mark)
 
 
 def check_every_button():
     """Press each operator's button of the tab once; whatever it opens is closed, whatever it starts is cancelled."""
     mark = len(output.text())
+    fold_again = [unfold(panel) for panel in bpy.types.Panel.__subclasses__() if panel.__module__.startswith(EXTENSION)]
     pressed = yield from press_all()
+    window.picture(PICTURES / "unfolded.png")
+    for fold in fold_again:
+        fold()
     assert pressed, "the tab has no button"
-    assert not trouble(printed_since(mark)), printed_since(mark)
+    assert_no_trouble_since(mark)
 
 
-def press_all(wanted=None):
-    """Press each button of the tab (or only the wanted calls), page by page; return the calls that were pressed."""
+def press_all(wanted=None, then=None):
+    """Press each button of the tab (or only the wanted operators'), page by page; return the calls that were pressed.
+
+    `then` is what to do after each press; without it, whatever began is ended by Escape.
+    """
     area = window.area("VIEW_3D")
     yield from window.open_tab(area, TAB)
     region = window.sidebar(area)
@@ -157,21 +170,21 @@ def press_all(wanted=None):
     more = True
     while more:
         found = yield from window.buttons(area, region)
-        while new := [call for call in found if call not in pressed and (wanted is None or call in wanted)]:
+        while new := [call for call in found if call not in pressed and (wanted is None or call.split("(")[0] in wanted)]:
             for call in new:  # a press may move the others: then they are looked for again
                 if (yield from window.points_at(area, region, found[call])) == call:
                     pressed.add(call)
-                    yield from press_one(call, found[call])
+                    yield from press_one(call, found[call], then or end_what_began)
             found = yield from window.buttons(area, region)
         more = yield from window.scroll(region)
     return pressed
 
 
-def press_one(call, place):
+def press_one(call, place, then):
     """Press the button that stood there, and tell what came of it."""
     yield from window.click(*place)
     yield 0.3
-    reaction = yield from end_what_began()
+    reaction = yield from then()
     output.say(f"     pressed {call}: {reaction}")
 
 
@@ -185,9 +198,43 @@ def end_what_began():
         if browser is None and not running:
             return reaction
         reaction = "opened the file browser" if browser else f"ran {running}"
-        yield from window.press("ESC", browser)
+        yield from window.escape_from(browser or window.window)
         yield 0.5
     raise AssertionError(f"{reaction} and did not end by Escape")
+
+
+def wait_for_work(limit=120):
+    """Wait until no operator is running any more; say how long it took."""
+    start = time.monotonic()
+    while window.window.modal_operators:
+        assert time.monotonic() - start < limit, f"still running after {limit} s"
+        yield 0.2
+    return f"took {time.monotonic() - start:.1f} s"
+
+
+def check_the_quickstart():
+    """Open the sample as an animator does and press its three buttons: bodies move at the end."""
+    mark = len(output.text())
+    bpy.ops.wm.open_mainfile(filepath=str((PICTURES / "sample" / "quickstart.blend").resolve()))
+    yield 1.5
+    for verb in ("build_library", "synthesize", "bake"):
+        pressed = yield from press_all({f"bpy.ops.beyond_mocap.{verb}"}, then=wait_for_work)
+        assert pressed, f"no button for {verb}"
+    window.picture(PICTURES / "quickstart.png")
+    moving = [body.name for body in bpy.data.objects if body.type == "ARMATURE" and moves(body)]
+    output.say(f"     moving: {', '.join(moving)}")
+    assert moving, "no armature moves"
+    assert_no_trouble_since(mark)
+
+
+def moves(body):
+    """Whether an armature's bones stand differently at two frames of the scene."""
+    scene = bpy.context.scene
+    poses = []
+    for frame in (scene.frame_start, (scene.frame_start + scene.frame_end) // 2):
+        scene.frame_set(frame)
+        poses.append([tuple(bone.matrix.translation) for bone in body.pose.bones])
+    return poses[0] != poses[1]
 
 
 def all_checks():

@@ -4,6 +4,7 @@ Blender answers events only between two steps of a timer, so everything that tak
 conversation is a generator: each `yield` gives the seconds to wait before it goes on.
 """
 
+import ctypes
 import os
 import subprocess
 import sys
@@ -30,9 +31,10 @@ class Output:
         os.dup2(self.kept.fileno(), 2)
 
     def text(self):
-        """Everything printed so far."""
+        """Everything printed so far, what C code still holds back included."""
         sys.stdout.flush()
         sys.stderr.flush()
+        ctypes.CDLL(None).fflush(None)
         return os.pread(self.kept.fileno(), os.fstat(self.kept.fileno()).st_size, 0).decode("utf-8", "replace")
 
     def say(self, line):
@@ -43,9 +45,12 @@ class Output:
 class Window:
     """Blender's first window, with one pointer."""
 
-    def __init__(self):
-        self.window = bpy.context.window_manager.windows[0]
-        self.pointer = (0, 0)
+    pointer = (0, 0)
+
+    @property
+    def window(self):
+        """Looked up each time, because loading a file replaces it."""
+        return bpy.context.window_manager.windows[0]
 
     def area(self, kind):
         """The first editor of this type."""
@@ -55,10 +60,10 @@ class Window:
         """The editor's right-hand region, where the tabs are."""
         return next(region for region in area.regions if region.type == "UI")
 
-    def event(self, kind, value, window=None, **keys):
+    def event(self, kind, value):
         """One event at the pointer."""
         x, y = self.pointer
-        (window or self.window).event_simulate(type=kind, value=value, x=x, y=y, **keys)
+        self.window.event_simulate(type=kind, value=value, x=x, y=y)
 
     def move(self, x, y):
         """Put the pointer there."""
@@ -66,12 +71,23 @@ class Window:
         self.event("MOUSEMOVE", "NOTHING")
         yield 0.015
 
-    def press(self, key, window=None):
+    def press(self, key):
         """A key or mouse button, down and up."""
-        self.event(key, "PRESS", window)
+        self.event(key, "PRESS")
         yield 0.05
-        self.event(key, "RELEASE", window)
+        self.event(key, "RELEASE")
         yield 0.15
+
+    def escape_from(self, window):
+        """Press Escape with the pointer in the middle of one of Blender's windows, which may be gone after that."""
+        middle = {"x": window.width // 2, "y": window.height // 2}
+        window.event_simulate(type="MOUSEMOVE", value="NOTHING", **middle)
+        yield 0.2
+        window.event_simulate(type="ESC", value="PRESS", **middle)
+        yield 0.2
+        if window in bpy.context.window_manager.windows.values():
+            window.event_simulate(type="ESC", value="RELEASE", **middle)
+            yield 0.1
 
     def click(self, x, y):
         """Click there with the left button."""
@@ -122,6 +138,31 @@ class Window:
     def picture(self, path):
         """Save the whole screen; by X itself, because Blender's own screenshot is black on a software renderer."""
         subprocess.run(["import", "-window", "root", path], check=True)
+
+
+class Stand:
+    """Stands in for an object; what it does not define itself is the object's own."""
+
+    def __init__(self, object, **own):
+        vars(self).update(own, _object=object)
+
+    def __getattr__(self, name):
+        return getattr(self._object, name)
+
+    def __setattr__(self, name, value):
+        setattr(self._object, name, value)
+
+
+def unfold(panel):
+    """Draw a panel class with all its collapsible sections open; return what undoes it."""
+    folded = panel.draw
+
+    def draw(self, context):
+        layout = Stand(self.layout, panel=lambda name, **_: self.layout.panel(name + "_unfolded"))
+        folded(Stand(self, layout=layout), context)
+
+    panel.draw = draw
+    return lambda: setattr(panel, "draw", folded)
 
 
 def talk(script, output, limit):
