@@ -10,6 +10,7 @@ import numpy as np
 from ..annotation import Timeline, automatic_gaits, fill, words_per_frame
 from ..errors import InputError
 from ..motion.contacts import floor_height
+from ..motion.track import sample
 from . import feet, jerk, pieces, realism, root, words
 from .moments import Moment, ball_gap, ball_shift
 from .reference import source_poses
@@ -184,15 +185,16 @@ def asked_words(
 
 
 def filled_timeline(view: View) -> Timeline:
-    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet."""
-    if view.library is None or view.wanted is None:
+    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet (Faustino §3.1.1)."""
+    if view.library is None or view.track is None:
         return view.timeline
     try:
         gaits = view.library.gaits
     except InputError:
         return view.timeline
-    chosen = automatic_gaits(root.travel_speed(view.wanted, view.fps), view.fps, [gait.speed for gait in gaits])
-    return fill(view.timeline, view.played.times, [(gaits[index].word,) for index in chosen])
+    sampled = sample(view.track, view.library.fps)
+    chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits])
+    return fill(view.timeline, sampled.times, [gaits[index].words for index in chosen])
 
 
 def annotation_similarity(view: View) -> dict:

@@ -45,41 +45,42 @@ def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, lib
 
 
 def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> Moment:
-    count = len(played.motion)
-    frame = int(np.clip(np.rint((key.time - played.start_time) * played.motion.fps), 0, count - 1))
-    centre = frame if result is None else int(np.clip(np.rint(result.frame), 0, count - 1))
-    run = np.flatnonzero(number == number[centre])
+    frame = _frame_at(played, (key.time - played.start_time) * played.motion.fps)
+    run = np.flatnonzero(number == number[frame if result is None else _frame_at(played, result.frame)])
     words = () if played.words is None else tuple(played.words[frame])
-    found = _clip_key(played, centre, key, library)
-    clip, clip_frame, instead = _served(played, centre, key, found, result, library)
-    at = np.nan if clip_frame is None else crossing(played.clip_frame[run], played.times[run], clip_frame)
-    covered = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)] if found else run[:0]
-    entry, leave = (covered[0], covered[-1]) if len(covered) else (centre, centre)
-    return Moment(key, frame, clip, clip_frame, at, words, int(entry), int(leave), instead)
-
-
-def _served(played: Played, frame: int, key: KeyMoment, found, result, library: Library | None):
-    """Clip, its key frame and the words used instead, by the library where there is one: a take only says what it
-    meant."""
-    instead = None if result is None else result.used_instead
-    if library is None:
-        return (None, None, None) if result is None else (result.clip, result.clip_frame, instead)
+    found = _key_in_run(played, run, frame, key, library)
+    instead = _instead(key, words if found is None else found.words, result)
     if found is None:
-        return None, None, instead
-    if instead is None and not set(key.words) <= set(found.words):
-        instead = tuple(sorted(found.words))
-    return played.clips[played.clip[frame]], found.frame, instead
+        known = played.clip[frame] >= 0
+        shown = (played.clips[played.clip[frame]], float(played.clip_frame[frame])) if known else (None, None)
+        return Moment(key, frame, *shown, np.nan, words, frame, frame, instead)
+    inside = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)]
+    entry, leave = (inside[0], inside[-1]) if len(inside) else (frame, frame)
+    at = crossing(played.clip_frame[run], played.times[run], found.frame)
+    clip = played.clips[played.clip[run[0]]]
+    return Moment(key, frame, clip, found.frame, at, words, int(entry), int(leave), instead)
 
 
-def _clip_key(played: Played, frame: int, key: KeyMoment, library: Library | None):
-    """The library's key that is played at `frame`: of that clip and side, carrying the asked words if any does,
-    nearest."""
-    if library is None or played.clip[frame] < 0:
+def _frame_at(played: Played, frame: float) -> int:
+    return int(np.clip(np.rint(frame), 0, len(played.motion) - 1))
+
+
+def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, library: Library | None):
+    """The library's key that the run plays: carrying the asked words if any does, then nearest to what `frame` shows."""
+    if library is None or played.clip[run[0]] < 0:
         return None
-    path, side = played.clips[played.clip[frame]], bool(played.mirrored[frame])
+    path, side = played.clips[played.clip[run[0]]], bool(played.mirrored[run[0]])
     own = [k for k in library.keys if library.clips[k.clip].path == path and library.clips[k.clip].mirrored == side]
+    own = [k for k in own if np.isfinite(crossing(played.clip_frame[run], played.times[run], k.frame))]
     carrying = [k for k in own if set(key.words) <= set(k.words)] or own
     return min(carrying, key=lambda k: abs(k.frame - played.clip_frame[frame]), default=None)
+
+
+def _instead(key: KeyMoment, words, result) -> tuple[str, ...] | None:
+    """The words used in place of the asked ones: what a take says of it, else those played where they lack some."""
+    if result is not None and result.used_instead is not None:
+        return tuple(result.used_instead)
+    return None if set(key.words) <= set(words) else tuple(sorted(words))
 
 
 def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> float:

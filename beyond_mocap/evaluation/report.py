@@ -78,7 +78,7 @@ def rounded(value, digits: int = 5):
     if isinstance(value, (int, np.integer)):
         return int(value)
     if isinstance(value, (float, np.floating)):
-        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+        return float(f"{round(float(value), 9) + 0.0:.{digits}g}") if math.isfinite(value) else None
     return value
 
 

@@ -155,10 +155,11 @@ def test_a_key_whose_words_are_lacking_says_what_was_used(cut, track_of, library
     assert report["annotation_similarity"]["keys"] == 1.0
 
 
-def test_a_key_that_no_clip_plays_has_no_clip(cut, track_of, library):
+def test_a_key_that_no_clip_plays_says_what_is_shown(cut, track_of, library):
     take = cut(("walk.bvh", 0, 200), timeline=Timeline(keys=(KeyMoment(12.0, ("kick",)),)))
     told = evaluate(take, track_of(take), library)["keys"][0]
-    assert told["clip"] is None and told["time_error_s"] is None
+    assert (told["clip"], told["clip_frame"], told["time_error_s"]) == ("walk.bvh", 120.0, None)
+    assert told["used_instead"] == ["front", "walking"]
 
 
 def test_the_gap_to_the_ball_as_written_out(cut, track_of, still_ball, library):
@@ -230,6 +231,13 @@ def test_a_motion_alone_still_has_what_needs_nothing_else(uncut):
     assert report["skate"]["gmd_ratio"] is not None and report["skate"]["source_gmd_ratio"] is None
     assert report["warp_rate"]["max"] is None and report["loop_share"] is None
     json.dumps(report, allow_nan=False)
+
+
+def test_a_library_of_one_clip_has_no_other_to_compare_poses_with(uncut, track_of, library):
+    alone = replace(library, clips=tuple(clip for clip in library.clips if clip.path == "jog.bvh"))
+    report = evaluate(uncut, track_of(uncut), alone)
+    assert report["pose_realism"] is None
+    assert report["skate"]["source_contact_cm_s"] is not None
 
 
 def test_a_standing_body_stays_still(cut, track_of, library):
