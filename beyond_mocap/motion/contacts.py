@@ -2,8 +2,9 @@
 
 A point of the foot (ankle, toe) stands where it is low and slow, both judged by the clip itself. *Low* is near the lower
 envelope of the point's own height, because floors drift in real recordings: by centimetres in optical ones (a tilted volume),
-by decimetres in inertial suits, which integrate height. *Slow* is a share of how fast the foot swings around that moment,
-because a planted foot slides 2 cm/s in a good walk, 0.5 m/s in a suit, and the ankle of a sprinter never falls below 1 m/s.
+by decimetres in inertial suits, which integrate height. *Slow* is near the lower envelope of its own speed, by a share of how
+fast it swings around that moment: a planted foot slides 2 cm/s in a good walk, 0.5 m/s in a suit, and the ankle of a sprinter
+hardly falls below 1 m/s.
 Two thresholds each (enter, leave) and shortest durations keep the labels from flickering.
 """
 
@@ -18,9 +19,9 @@ from .motion import Motion, forward_kinematics
 _ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once within it
 _SWING_SECONDS = 1.2
 _DIFFERENCE_SECONDS = 1.0 / 60.0
-_LOW = (0.03, 0.055)  # metres above the envelope: to enter, to leave
-_SLOW = (0.25, 0.45)  # metres per second: to enter, to leave, where the foot hardly moves
-_SLOW_SHARE = (0.10, 0.18)  # of the swing's speed: to enter, to leave
+_LOW = (0.045, 0.06)  # metres above the envelope: to enter, to leave
+_SLOW = (0.20, 0.35)  # metres per second above the envelope: to enter, to leave, where the foot hardly moves
+_SLOW_SHARE = (0.08, 0.14)  # of the swing's speed: to enter, to leave
 _HELD_UP = 0.10  # metres above the other foot's envelope: this foot does not stand at all
 _UPRIGHT = 0.45  # of the leg's length: hips above the foot
 _SHORTEST = 0.04  # seconds of contact
@@ -54,9 +55,11 @@ def _points_down(positions: np.ndarray, joints: tuple[int, int], body: Humanoid,
     heights = positions[:, joints, 2]
     above = heights - _standing_heights(heights, positions[:, body.hips, 2], leg, fps)
     speed = _horizontal_speed(positions[:, joints, :2], fps)
-    swing = maximum_filter1d(speed, _window(_SWING_SECONDS, fps), axis=0, mode="nearest")
+    window = _window(_SWING_SECONDS, fps)
+    swing = maximum_filter1d(speed, window, axis=0, mode="nearest")
+    excess = speed - grey_opening(speed, size=(window, 1), mode="nearest")
     enter, leave = (
-        (above < low) & (speed < np.maximum(slow, share * swing)) for low, slow, share in zip(_LOW, _SLOW, _SLOW_SHARE)
+        (above < low) & (excess < np.maximum(slow, share * swing)) for low, slow, share in zip(_LOW, _SLOW, _SLOW_SHARE)
     )
     return np.stack([_hysteresis(enter[:, side], leave[:, side]) for side in (0, 1)], axis=1)
 
