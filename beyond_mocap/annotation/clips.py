@@ -17,8 +17,9 @@ _COLUMNS = ("file", "start_frame", "end_frame", "key_frame", "labels")
 
 @dataclass(frozen=True)
 class ClipAnnotation:
-    """Words for a stretch of one clip. start, end: 0-based frames in the clip's own rate, end inclusive. key: the frame of
-    the key moment (the foot meets the ball), None for continuous motions. words: from root to leaf plus modifiers."""
+    """Words for a stretch of one clip. start, end: 0-based frames in the clip's own rate, end inclusive. key: the frame
+    of the key moment (the foot meets the ball), None for continuous motions. words: from root to leaf plus
+    modifiers."""
 
     start: int
     end: int
@@ -29,9 +30,9 @@ class ClipAnnotation:
 def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnnotation, ...]:
     """The annotations in a text file beside a clip, in the timelines' text form, ordered by start; InputError as there.
 
-    fps: the clip's rate; times become its nearest frames. A key line belongs to the shortest span around it that names the
-    same action, and lends it its words; a key line on its own has no extent. Spans may overlap; spans without words or
-    with `transition` say nothing about a clip and are left out.
+    fps: the clip's rate; times become its nearest frames. A key line belongs to the shortest span around it that names
+    the same action, and lends it its words; a key line on its own has no extent. Spans may overlap; spans without words
+    or with `transition` say nothing about a clip and are left out.
     """
     return clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
 
@@ -48,8 +49,8 @@ def clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ..
 def read_annotation_csv(path: str | os.PathLike) -> dict[str, tuple[ClipAnnotation, ...]]:
     """file (as the column spells it) -> its annotations in the table's order.
 
-    Columns file, start_frame, end_frame, key_frame, labels; others are ignored. A blank key_frame means none; rows without
-    labels are left out. InputError names the line of a row that is not of this form.
+    Columns file, start_frame, end_frame, key_frame, labels; others are ignored. A blank key_frame means none; rows
+    without labels are left out. InputError names the line of a row that is not of this form.
     """
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     found: dict[str, list[ClipAnnotation]] = {}
@@ -71,7 +72,8 @@ def _owner(key: KeyMoment, spans: list[Span]) -> Span | None:
 
 
 def _actions(item: Span | KeyMoment) -> set[str]:
-    """The words that name what is done: App. A's discrete roots, or all words where there is none ("slide", user words)."""
+    """The words that name what is done: App. A's discrete roots, or all words where there is none ("slide", user
+    words)."""
     words = set(item.words)
     return words & DISCRETE or words
 

@@ -19,8 +19,9 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
     """(G-1,) m/s, from each gait to the next faster one: s_A + (s_B - s_A) / omega, for speeds (G,) in ascending order.
 
     Faustino §3.1.1 prints s_A + (s_A - s_B) / omega, which lies below the slower gait's own speed; the sign is turned
-    here so that omega = 4 puts the threshold a quarter of the way up, as his text explains ("to limit the usage of slower
-    locomotion mocaps on higher movement speed"). The step up from a gait below STANDING_SPEED is never lower than that.
+    here so that omega = 4 puts the threshold a quarter of the way up, as his text explains ("to limit the usage of
+    slower locomotion mocaps on higher movement speed"). The step up from a gait below STANDING_SPEED is never lower
+    than that.
     """
     speeds = np.asarray(speeds, dtype=float)
     if speeds.ndim != 1 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
@@ -29,7 +30,8 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
         raise InputError("omega", f"{omega}", "a number of at least 1")
     slow, fast = speeds[:-1], speeds[1:]
     thresholds = slow + (fast - slow) / omega
-    return np.where((slow < STANDING_SPEED) & (fast > STANDING_SPEED), np.maximum(thresholds, STANDING_SPEED), thresholds)
+    from_standing = (slow < STANDING_SPEED) & (fast > STANDING_SPEED)
+    return np.where(from_standing, np.maximum(thresholds, STANDING_SPEED), thresholds)
 
 
 def automatic_gaits(
@@ -37,19 +39,20 @@ def automatic_gaits(
     fps: float,
     speeds: np.ndarray,
     omega: float = 4.0,
-    hysteresis: float = 0.15,
+    hysteresis: float = 0.2,
     minimum: float = 0.4,
 ) -> np.ndarray:
     """(T,) index into `speeds`: the gait of every frame (Faustino §3.1.1's pseudo-code, made steady).
 
     speed: (T,) m/s at `fps` frames per second. speeds: (G,) m/s, ascending, the average speed of each gait's clips.
     hysteresis: how far beyond a threshold the speed must go to change gait, as a share of the distance between the two
-    gaits (the paper has none: at a boundary speed its annotation flickers with the noise). minimum: seconds a gait lasts at
-    least; shorter ones go to the neighbour that is nearer in gait, then to the longer one.
+    gaits, at most a quarter of the threshold (the paper has none: at a boundary speed its annotation flickers with the
+    noise). minimum: seconds a gait lasts at least; shorter ones go to the neighbour that is nearer in gait, then to the
+    longer one.
     """
     speed = np.asarray(speed, dtype=float)
     thresholds = gait_thresholds(speeds, omega)
-    margins = hysteresis * np.diff(np.asarray(speeds, dtype=float))
+    margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)
     steps = [_trigger(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
     gaits = np.sum(steps, axis=0, dtype=int) if steps else np.zeros(len(speed), dtype=int)
     return _without_short_runs(gaits, int(np.ceil(minimum * fps - 1e-9)))
@@ -65,6 +68,8 @@ def _trigger(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
 
 def _without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
     """The gaits with every run shorter than `frames` given to a neighbour, shortest first."""
+    if not len(gaits):
+        return gaits
     edges = np.flatnonzero(np.diff(gaits)) + 1
     starts = [0, *edges.tolist()]
     runs = [[stop - start, int(gaits[start])] for start, stop in zip(starts, [*starts[1:], len(gaits)])]
@@ -74,7 +79,7 @@ def _without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
             break
         runs[short][1] = _adopting_gait(runs, short)
         runs = _joined(runs)
-    return np.repeat([gait for _, gait in runs], [length for length, _ in runs]) if len(gaits) else gaits
+    return np.repeat([gait for _, gait in runs], [length for length, _ in runs])
 
 
 def _adopting_gait(runs: list[list[int]], index: int) -> int:

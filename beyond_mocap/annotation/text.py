@@ -1,8 +1,8 @@
 """The text form of timelines (Faustino §4.2.2): `START END words...` or `TIME words...`, read and written.
 
 `#` starts a comment. Times are seconds; a number that ends in `f`, or every number after a line `unit frames`, counts
-frames from the track's first time. Faustino leaves words out where a transition is wanted; here a line without words means
-automatic locomotion (his line 1), and the word `transition` alone says transition.
+frames from the track's first time. Faustino leaves words out where a transition is wanted; here a line without words
+means automatic locomotion (his line 1), and the word `transition` alone says transition.
 """
 
 from __future__ import annotations
@@ -102,9 +102,8 @@ def _seconds(token: str, unit: str, fps: float | None, start: float, place: str)
 
 def _span(times: list[float], words: list[str], number: int, place: str) -> Span:
     if times[1] <= times[0]:
-        raise InputError(
-            place, f"the end {times[1]:g} is not after the start {times[0]:g}", "START < END", "for a key moment write one time"
-        )
+        found = f"the end {times[1]:g} is not after the start {times[0]:g}"
+        raise InputError(place, found, "START < END", "for a key moment write one time")
     return _placed(Span, place, *times, words, number)
 
 

@@ -67,7 +67,8 @@ class KeyMoment:
 
 @dataclass(frozen=True)
 class Timeline:
-    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion throughout."""
+    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion
+    throughout."""
 
     spans: tuple[Span, ...] = ()
     keys: tuple[KeyMoment, ...] = ()
@@ -97,10 +98,14 @@ def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str
 def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> Timeline:
     """The timeline with automatic locomotion put in wherever no span with words holds (Faustino §3.1.1).
 
-    times: (T,) seconds of the output frames. words: T word tuples, the automatic gait of each frame. Spans with words and
-    key moments stay as they are; the others are replaced by one span per stretch of equal automatic words.
+    times: (T,) seconds of the output frames. words: T word tuples, the automatic gait of each frame. Spans with words
+    and key moments stay as they are; the others are replaced by one span per stretch of equal automatic words. A
+    stretch runs from its first frame to the next stretch's; the last ends at the last frame, which has no stretch of
+    its own.
     """
     times = np.asarray(times, dtype=float)
+    if not len(times):
+        return timeline
     asked = [span for span in timeline.spans if span.words]
     automatic = [piece for start, end in _open_stretches(asked, times) for piece in _pieces(start, end, times, words)]
     return Timeline((*asked, *automatic), timeline.keys)
@@ -108,13 +113,11 @@ def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]
 
 def _open_stretches(asked: list[Span], times: np.ndarray) -> list[tuple[float, float]]:
     """(start, end) seconds between the first and the last time that no span of `asked` covers."""
-    out, reached = [], times[0] if len(times) else 0.0
-    for span in asked:
-        if span.start > reached + _SAME_TIME:
-            out.append((reached, min(span.start, times[-1])))
-        reached = max(reached, span.end)
-    if len(times) and times[-1] > reached + _SAME_TIME:
-        out.append((reached, times[-1]))
+    out, reached = [], times[0]
+    for start, end in [*((span.start, span.end) for span in asked), (times[-1], times[-1])]:
+        if min(start, times[-1]) > reached + _SAME_TIME:
+            out.append((reached, min(start, times[-1])))
+        reached = max(reached, end)
     return out
 
 
@@ -134,10 +137,12 @@ def problems(
     end: float | None = None,
     where: str = "annotations",
 ) -> list[InputError]:
-    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown; `validate`'s list.
+    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown; `validate`'s
+    list.
 
-    known_words: words beyond the vocabulary (the library's and the user's). start, end: the track's first and last time in
-    seconds, None where there is no track to compare with. where: the file, for `file:line:` in front of each message.
+    known_words: words beyond the vocabulary (the library's and the user's). start, end: the track's first and last time
+    in seconds, None where there is no track to compare with. where: the file, for `file:line:` in front of each
+    message.
     """
     known = vocabulary_words(known_words)
     found: list[InputError] = []
@@ -165,8 +170,8 @@ def missing_keys(
 ) -> list[tuple[KeyMoment, tuple[tuple[str, ...], ...]]]:
     """The key moments that no choice serves, each with the `count` nearest choices.
 
-    choices: the words of every clip's key moment, those of mirrored clips included. A choice serves a key moment when it
-    carries all of its words; further words do no harm.
+    choices: the words of every clip's key moment, those of mirrored clips included. A choice serves a key moment when
+    it carries all of its words; further words do no harm.
     """
     held = [tuple(choice) for choice in choices]
     lacking = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in held)]
@@ -228,7 +233,8 @@ def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
     """Spans with words that overlap, and key moments at one time: nobody can do both."""
     asked = [span for span in timeline.spans if span.words]
     pairs = [(a, b, "overlap") for a, b in zip(asked, asked[1:]) if b.start < a.end - _SAME_TIME]
-    pairs += [(a, b, "are at one time") for a, b in zip(timeline.keys, timeline.keys[1:]) if b.time - a.time <= _SAME_TIME]
+    keys = timeline.keys
+    pairs += [(a, b, "are at one time") for a, b in zip(keys, keys[1:]) if b.time - a.time <= _SAME_TIME]
     return [
         InputError(
             where if b.line is None else f"{where}:{b.line}",

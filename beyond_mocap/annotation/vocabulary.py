@@ -95,7 +95,8 @@ def relatives(word: str) -> frozenset[str]:
 def words_below(words: Iterable[str]) -> tuple[str, ...]:
     """What the tree offers next after `words`, in the tree's order: all children of the deepest places they reach.
 
-    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, outside, top, volley.
+    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, outside, top,
+    volley.
     """
     asked = set(words)
     reached = [path for path in _paths(VOCABULARY) if asked.issuperset(path[1:])]
@@ -124,8 +125,8 @@ def nearest(words: Iterable[str], choices: Iterable[Iterable[str]], count: int =
     """The `count` word combinations of `choices` that come closest to `words`, best first; equal sets count once.
 
     Ordered by the asked words a choice lacks (one that names the action, like "kick", weighs more than all that only
-    colour it), then by how many words it has that stand near the missing ones in the tree (so that "header", where there
-    is none, leads to "jump"), then by words nobody asked for, then in the tree's order.
+    colour it), then by how many words it has that stand near the missing ones in the tree (so that "header", where
+    there is none, leads to "jump"), then by words nobody asked for, then in the tree's order.
     """
     asked = frozenset(words)
     unique = {frozenset(choice): tuple(choice) for choice in map(tuple, choices)}

@@ -5,12 +5,13 @@ Every writer writes beside its target and renames, so that nobody ever sees half
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
 import math
 import os
-import tempfile
+import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,8 +31,9 @@ _FARTHEST = 1e4  # metres
 
 @dataclass(frozen=True, eq=False)
 class Provenance:
-    """Where each of T output frames came from: times (T,) s; clip, T paths as below the library; clip_frame (T,) fractional,
-    in the clip's own rate; mirrored (T,) bool; words, T tuples; contacts (T, 2) bool, left and right foot on the ground."""
+    """Where each of T output frames came from: times (T,) s; clip, T paths as below the library; clip_frame (T,)
+    fractional, in the clip's own rate; mirrored (T,) bool; words, T tuples; contacts (T, 2) bool, left and right foot
+    on the ground."""
 
     times: np.ndarray
     clip: tuple[str, ...]
@@ -98,7 +100,8 @@ def read_ball(path: str | os.PathLike) -> BallPath:
     """The table that `write_ball` wrote; InputError with the line of a row that is not of that form."""
     rows = list(read_rows(path, BALL_COLUMNS))
     positions = np.column_stack([_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
-    return BallPath(frozen_array(_column(rows, "time_s")), frozen_array(positions), frozen_array(_flags(rows, "measured"), bool))
+    times, measured = _column(rows, "time_s"), _flags(rows, "measured")
+    return BallPath(frozen_array(times), frozen_array(positions), frozen_array(measured, bool))
 
 
 def write_report(path: str | os.PathLike, report: dict) -> None:
@@ -125,19 +128,15 @@ def atomic_write(path: str | os.PathLike, content: str | bytes) -> None:
     InputError where the folder is missing or cannot be written.
     """
     path = Path(path)
+    beside = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.part")
     try:
-        handle, beside = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    except OSError as error:
-        raise InputError(path, error.strerror or "cannot be written", "a folder that can be written") from None
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content.encode("utf-8") if isinstance(content, str) else content)
-        os.chmod(beside, 0o666 & ~_umask())
+        beside.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
         os.replace(beside, path)
     except OSError as error:
-        raise InputError(path, error.strerror or "cannot be written", "a file that can be replaced") from None
+        raise InputError(path, error.strerror or "cannot be written", "a place where files can be written") from None
     finally:
-        Path(beside).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            beside.unlink()
 
 
 def plain(value):
@@ -176,7 +175,8 @@ def read_rows(path: str | os.PathLike, required: Sequence[str]) -> Iterable[tupl
 
 
 def number(text: str, name: str, place: str, blank: bool = False) -> float:
-    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names the column and the place."""
+    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names the column and the
+    place."""
     if blank and text.lower() in ("", "nan"):
         return math.nan
     try:
@@ -188,12 +188,6 @@ def number(text: str, name: str, place: str, blank: bool = False) -> float:
     if name.endswith("_m") and abs(value) > _FARTHEST:
         raise InputError(place, f"{name} {text}", "metres from the pitch's centre", "check the unit")
     return value
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _text(path: str | os.PathLike) -> str:
@@ -215,8 +209,9 @@ def _check_header(names: list[str], required: Sequence[str], path) -> None:
     missing = [name for name in required if name not in names]
     if missing:
         shown = ",".join(names)[:80]
-        raise InputError(f"{path}:1", f"no column {', '.join(missing)} in {shown!r}", f"a header with {','.join(required)}")
-    if len(set(names)) != len(names) and any(names.count(name) > 1 for name in required):
+        found = f"no column {', '.join(missing)} in {shown!r}"
+        raise InputError(f"{path}:1", found, f"a header with {','.join(required)}")
+    if any(names.count(name) > 1 for name in required):
         raise InputError(f"{path}:1", "a column twice", "each column once")
 
 

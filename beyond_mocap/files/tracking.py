@@ -6,6 +6,7 @@ Inside: metres from the pitch's centre, x along its length, y to the left of +x,
 from __future__ import annotations
 
 import hashlib
+import importlib
 import io
 import os
 import re
@@ -34,11 +35,12 @@ _META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.js
 
 
 def read_track_csv(path: str | os.PathLike) -> Track:
-    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, other columns ignored, as the file has it.
+    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, other columns ignored, as the file
+    has it.
 
-    Empty cells (or nan) are unknown. Rows stay in the file's order, repeated times and gaps included: `motion.track.clean`
-    puts that right and tells. InputError, with the line, for missing columns, cells that are no number or beyond 10 km,
-    fewer than two samples with a position, and rates outside 5 to 100 Hz.
+    Empty cells (or nan) are unknown. Rows stay in the file's order, repeated times and gaps included:
+    `motion.track.clean` puts that right and tells. InputError, with the line, for missing columns, cells that are no
+    number or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz.
     """
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}
@@ -81,10 +83,10 @@ class MatchPlayer:
 class Match:
     """Everybody's samples, N times and P players, as the feed has them (not cleaned).
 
-    times: (N,) seconds from the first frame of the first period; each later period starts ten seconds after the one before.
-    players: P of them. positions: (P, N, 2) metres, NaN where a player is not there. ball: (N, 3) metres, NaN where
-    unknown. length, width: of the pitch, metres. fps: the feed's rate. provider: whose form it was. periods: (start, end)
-    seconds. notes: what was guessed, for people. Arrays are read-only.
+    times: (N,) seconds from the first frame of the first period; each later period starts ten seconds after the one
+    before. players: P of them. positions: (P, N, 2) metres, NaN where a player is not there. ball: (N, 3) metres, NaN
+    where unknown. length, width: of the pitch, metres. fps: the feed's rate. provider: whose form it was. periods:
+    (start, end) seconds. notes: what was guessed, for people. Arrays are read-only.
     """
 
     times: np.ndarray
@@ -111,7 +113,8 @@ class Match:
         high = np.inf if end is None else end + 1e-9
         there = np.flatnonzero(np.isfinite(path).all(axis=1) & (self.times >= low) & (self.times <= high))
         if len(there) < 2:
-            raise InputError("player", f"{player_id!r} has {len(there)} samples from {start} to {end} s", "at least two")
+            found = f"{player_id!r} has {len(there)} samples from {start} to {end} s"
+            raise InputError("player", found, "at least two")
         part = slice(there[0], there[-1] + 1)
         return Track(self.times[part], path[part], self.ball[part], name=player_id)
 
@@ -125,10 +128,10 @@ def read_match(
 ) -> Match:
     """A provider's tracking file as arrays; the second time from a cache of them.
 
-    meta: the provider's metadata, for Metrica's CSV the other team's file; where None, a file beside `path` whose name fits
-    is taken. provider: one of PROVIDERS; where None, guessed from the content. cache_dir: where arrays are kept, keyed by
-    the content of both files; by default the user's cache folder. pitch: length and width in metres for feeds that have
-    none (Metrica's CSV, Stats Perform), by default 105 x 68. What was guessed is in the match's notes.
+    meta: the provider's metadata, for Metrica's CSV the other team's file; where None, a file beside `path` whose name
+    fits is taken. provider: one of PROVIDERS; where None, guessed from the content. cache_dir: where arrays are kept,
+    keyed by the content of both files; by default the user's cache folder. pitch: length and width in metres for feeds
+    that have none (Metrica's CSV, Stats Perform), by default 105 x 68. What was guessed is in the match's notes.
     InputError where files are missing or not of that form, and where kloppy is not installed.
     """
     path = _existing(path)
@@ -190,38 +193,35 @@ _TEAMS = (("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home")
 def _load(path: Path, meta: Path, provider: str, pitch: tuple[float, float]):
     """kloppy's dataset in the provider's own coordinates; `pitch` in metres for a feed that must be told."""
     try:
-        from kloppy import metrica, secondspectrum, skillcorner, sportec, statsperform, tracab
+        reader = importlib.import_module(f"kloppy.{provider}")
     except ImportError as error:
         raise InputError(
             path, f"kloppy cannot be imported ({error})", "kloppy 3.19 or newer", "pip install 'beyond-mocap[tracking]'"
         ) from None
-    loaders = {
-        "tracab": lambda: tracab.load(meta_data=str(meta), raw_data=str(path), coordinates="tracab"),
-        "metrica": lambda: _load_metrica(metrica, path, meta),
-        "skillcorner": lambda: skillcorner.load(meta_data=str(meta), raw_data=str(path), coordinates="skillcorner"),
-        "sportec": lambda: sportec.load_tracking(meta_data=str(meta), raw_data=str(path), coordinates="sportec"),
-        "secondspectrum": lambda: secondspectrum.load(
-            meta_data=str(meta), raw_data=str(path), coordinates="secondspectrum"
-        ),
-        "statsperform": lambda: statsperform.load_tracking(
-            ma1_data=str(meta), ma25_data=str(path), pitch_length=pitch[0], pitch_width=pitch[1], coordinates="sportvu"
-        ),
-    }
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return loaders[provider]()
+            return _read_with(reader, str(path), str(meta), provider, pitch)
     except Exception as error:  # kloppy raises whatever its parsers meet in a wrong file
         found = f"not readable as {provider} ({type(error).__name__}: {str(error)[:120]})"
-        raise InputError(path, found, f"a {provider} file and its metadata {meta.name}", "check both, or --provider") from None
+        expected = f"a {provider} file and its metadata {meta.name}"
+        raise InputError(path, found, expected, "check both, or --provider") from None
 
 
-def _load_metrica(metrica, path: Path, meta: Path):
-    """Metrica's two CSV files, whichever team comes first, or its EPTS text with XML metadata."""
-    if path.suffix.lower() != ".csv":
-        return metrica.load_tracking_epts(meta_data=str(meta), raw_data=str(path), coordinates="metrica")
-    home, away = (meta, path) if "away" in path.name.lower() else (path, meta)
-    return metrica.load_tracking_csv(home_data=str(home), away_data=str(away), coordinates="metrica")
+def _read_with(reader, path: str, meta: str, provider: str, pitch: tuple[float, float]):
+    """One provider's loader; their argument names differ. Metrica has CSV (a file per team) and EPTS (text with
+    XML)."""
+    if provider == "metrica" and path.lower().endswith(".csv"):
+        home, away = (meta, path) if "away" in Path(path).name.lower() else (path, meta)
+        return reader.load_tracking_csv(home_data=home, away_data=away, coordinates="metrica")
+    if provider == "metrica":
+        return reader.load_tracking_epts(meta_data=meta, raw_data=path, coordinates="metrica")
+    if provider == "statsperform":
+        return reader.load_tracking(
+            ma1_data=meta, ma25_data=path, pitch_length=pitch[0], pitch_width=pitch[1], coordinates="sportvu"
+        )
+    load = reader.load_tracking if provider == "sportec" else reader.load
+    return load(meta_data=meta, raw_data=path, coordinates=provider)
 
 
 def _arrays(dataset, path: Path, pitch: tuple[float, float] | None) -> dict[str, np.ndarray]:
@@ -272,8 +272,8 @@ def _shirt(player) -> tuple[str, int, str]:
 
 
 def _described(player) -> tuple[str, str, str, str]:
-    name = player.name or str(player.player_id)
-    return str(player.player_id), str(player.team.ground), name, str(-1 if player.jersey_no is None else player.jersey_no)
+    id_, shirt = str(player.player_id), player.jersey_no
+    return id_, str(player.team.ground), player.name or id_, str(-1 if shirt is None else shirt)
 
 
 def _height(point) -> float:
@@ -299,9 +299,10 @@ def _unit(dataset) -> float:
 def _metric(system, length: float, width: float, upward: bool):
     """The map from a provider's plane coordinates (..., 2) to metres from the pitch's centre, y to the left of +x.
 
-    kloppy's own transformations pass through its standard pitch and bend positions between the lines; this one is linear.
-    upward: y grows upward whatever the system says. kloppy turns the y of Metrica's CSV over while reading and still calls
-    it downward; Metrica says (and the same match in TRACAB's form agrees) that the file's own y grows downward.
+    kloppy's own transformations pass through its standard pitch and bend positions between the lines; this one is
+    linear. upward: y grows upward whatever the system says. kloppy turns the y of Metrica's CSV over while reading and
+    still calls it downward; Metrica says (and the same match in TRACAB's form agrees) that the file's own y grows
+    downward.
     """
     size = system.pitch_dimensions
     x, y = size.x_dim, size.y_dim
@@ -319,7 +320,7 @@ def _match(arrays: dict[str, np.ndarray], provider: str, notes: list[str]) -> Ma
     notes = [*notes, f"no pitch size in the feed, {length:g} x {width:g} m taken"] if guessed else notes
     return Match(
         times=frozen_array(arrays["times"]),
-        players=tuple(MatchPlayer(id_, team, name, int(shirt)) for id_, team, name, shirt in arrays["players"].tolist()),
+        players=tuple(MatchPlayer(*who, int(shirt)) for *who, shirt in arrays["players"].tolist()),
         positions=frozen_array(arrays["positions"]),
         ball=frozen_array(arrays["ball"]),
         length=length,

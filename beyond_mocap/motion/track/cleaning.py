@@ -1,8 +1,8 @@
 """What is wrong with a feed's samples, put right and told.
 
-How real feeds err: samples are missing, or kept going at constant velocity while the player was out of sight, and then snap
-back by 0.4-1.4 m from one sample to the next, some 8 times per player and half; single samples jump away and return; an
-absent ball stands at a sentinel (z = -10, or exactly at the origin).
+How real feeds err: samples are missing, or kept going at constant velocity while the player was out of sight, and then
+snap back by 0.4-1.4 m from one sample to the next, some 8 times per player and half; single samples jump away and
+return; an absent ball stands at a sentinel (z = -10, or exactly at the origin).
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ _PITCH = 200.0  # metres from the centre beyond which no ball is
 @dataclass(frozen=True)
 class DataReport:
     """What `clean` found. lines: for people, one finding each, with times. rate: samples per second (median). dropped:
-    rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start, end)
-    seconds between measured samples. ball_unknown: samples without a ball. warnings: those lines that ask for attention."""
+    rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start,
+    end) seconds between measured samples. ball_unknown: samples without a ball. warnings: those lines that ask for
+    attention."""
 
     lines: tuple[str, ...]
     rate: float
@@ -50,11 +51,11 @@ class DataReport:
 def clean(track: Track) -> tuple[Track, DataReport]:
     """The track in order of time, with one believable position per sample, and a report of what that took.
 
-    Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the coasted
-    samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample intervals, are
-    put in and marked `filled`. Both get a cubic between the believed neighbours that starts and ends with their velocities
-    (beyond one second only as curved as the distance allows); before the first and after the last believed sample, the
-    velocity dies away within half a second. A track that is already clean comes back equal.
+    Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
+    coasted samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample
+    intervals, are put in and marked `filled`. Both get a cubic between the believed neighbours that starts and ends
+    with their velocities (beyond one second only as curved as the distance allows); before the first and after the last
+    believed sample, the velocity fades (to a third in half a second). A track that is already clean comes back equal.
     InputError where fewer than two samples have a position, or a gap is longer than an hour.
     """
     times, positions, ball, notes, dropped, merged = _in_order(track)
@@ -129,9 +130,8 @@ def _with_missing_rows(times, positions, ball, name: str):
     gaps = np.flatnonzero(steps > GAP_INTERVALS * interval + 1e-9)
     if len(gaps) and steps[gaps].max() > _LONGEST_GAP:
         worst = gaps[np.argmax(steps[gaps])]
-        raise InputError(
-            name, f"nothing between {times[worst]:g} and {times[worst + 1]:g} s", "gaps of an hour at most", "cut the track"
-        )
+        found = f"nothing between {times[worst]:g} and {times[worst + 1]:g} s"
+        raise InputError(name, found, "gaps of an hour at most", "cut the track")
     new = [np.linspace(times[i], times[i + 1], int(round(steps[i] / interval)) + 1)[1:-1] for i in gaps]
     at = np.repeat(gaps + 1, [len(piece) for piece in new])
     if not len(at):
@@ -141,7 +141,8 @@ def _with_missing_rows(times, positions, ball, name: str):
 
 
 def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """(N,) bool samples not to be believed, and the times of steps too large to be repaired; all positions are numbers."""
+    """(N,) bool samples not to be believed, and the times of steps too large to be repaired; all positions are
+    numbers."""
     wrong = _spikes(times, positions)
     left = np.flatnonzero(~wrong)
     jumps, excess = _jumps(times[left], positions[left])
@@ -163,8 +164,8 @@ def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tup
 def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """(N,) bool: single samples far off the line between their neighbours, while the neighbours' own lines are better.
 
-    A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it off
-    theirs equally, so neither stands out and steps are left to `_jumps`.
+    A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
+    off theirs equally, so neither stands out and steps are left to `_jumps`.
     """
     wrong = np.zeros(len(times), dtype=bool)
     if len(times) < 3:
@@ -178,8 +179,8 @@ def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
 
 def _jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
-    """Steps that no player takes: indices j (the step is from sample j to j+1), and each one's excess (len, 2) metres over
-    the median velocity of the 0.6 s (7 samples at least) around it."""
+    """Steps that no player takes: indices j (the step is from sample j to j+1), and each one's excess (len, 2) metres
+    over the median velocity of the 0.6 s (7 samples at least) around it."""
     steps = np.diff(times)
     if len(steps) < 3:
         return [], np.zeros((0, 2))
@@ -204,8 +205,9 @@ def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int)
 
 
 def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
-    """Indices of the samples up to `jump` that are not believed: as many as making up for `size` metres takes, and on back
-    while they lie on an exact line. The first sample of such a line is where the player was last seen, and is kept.
+    """Indices of the samples up to `jump` that are not believed: as many as making up for `size` metres takes, and on
+    back while they lie on an exact line. The first sample of such a line is where the player was last seen, and is
+    kept.
     """
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
@@ -234,7 +236,8 @@ def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> n
 
 
 def _end_state(times, positions, believed, index: int, direction: int):
-    """(time, position, velocity) of the believed sample `index`, velocity over the believed samples beside it; or None."""
+    """(time, position, velocity) of the believed sample `index`, velocity over the believed samples beside it; or
+    None."""
     if not 0 <= index < len(times):
         return None
     members = [index]
@@ -250,11 +253,12 @@ def _end_state(times, positions, believed, index: int, direction: int):
 
 
 def _cubic(at: np.ndarray, before, after) -> np.ndarray:
-    """(len(at), 2): Hermite cubic from one end state to the other; beyond the track's ends, a velocity that dies away."""
+    """(len(at), 2): Hermite cubic from one end state to the other; beyond the track's ends, a velocity that dies
+    away."""
     if before is None or after is None:
         time, place, velocity = before or after
         away = at - time
-        return place + velocity * np.sign(away)[:, None] * (0.25 * (1.0 - np.exp(-np.abs(away) / 0.25)))[:, None]
+        return place + velocity * np.sign(away)[:, None] * (0.5 * (1.0 - np.exp(-np.abs(away) / 0.5)))[:, None]
     (t0, p0, v0), (t1, p1, v1) = before, after
     length = t1 - t0
     if length > 1.0:

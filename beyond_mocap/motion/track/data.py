@@ -1,4 +1,5 @@
-"""The samples of one tracked player and the ball, as a feed delivers them (`Track`) and at a rate of ours (`SampledTrack`)."""
+"""The samples of one tracked player and the ball, as a feed delivers them (`Track`) and at a rate of ours
+(`SampledTrack`)."""
 
 from __future__ import annotations
 
@@ -17,11 +18,11 @@ BALL_RADIUS = 0.11
 class Track:
     """One player's samples, N of them.
 
-    times: (N,) seconds. positions: (N, 2) metres on the pitch, origin its centre, x along its length, y to the left of +x.
-    ball: (N, 3) metres, the ball's centre, NaN where unknown (z alone may be unknown); None means no ball.
-    ball_height_known: (N,) bool, False where the feed has no height; None means wherever z is a number.
-    filled: (N,) bool, put in by `clean` because the feed had nothing. outlier: (N,) bool, replaced by `clean` because the
-    feed was wrong; None means none. name: who this is, for messages. Arrays are read-only copies.
+    times: (N,) seconds. positions: (N, 2) metres on the pitch, origin its centre, x along its length, y to the left of
+    +x. ball: (N, 3) metres, the ball's centre, NaN where unknown (z alone may be unknown); None means no ball.
+    ball_height_known: (N,) bool, False where the feed has no height; None means wherever z is a number. filled: (N,)
+    bool, put in by `clean` because the feed had nothing. outlier: (N,) bool, replaced by `clean` because the feed was
+    wrong; None means none. name: who this is, for messages. Arrays are read-only copies.
     """
 
     times: np.ndarray
@@ -72,11 +73,12 @@ class Track:
 class SampledTrack:
     """A track at an even rate, T frames; frame 0 is the track's first time. Arrays are read-only.
 
-    times: (T,) seconds on the track's clock. positions: (T, 2) metres, smoothed. raw: (T, 2) metres, the measured samples
-    linearly interpolated (what errors are measured against). velocity: (T, 2) m/s of the smoothed positions. speed: (T,) m/s.
-    direction: (T,) radians from +x, of travel, unwrapped; holds while the player stands. valid: (T,) bool, False within a
-    long gap, where nobody knows what the player did (and which is not standing). ball: (T, 3) metres, NaN where there is no
-    ball at all. ball_measured: (T,) bool, False where it lies between samples too far apart. fps: frames per second.
+    times: (T,) seconds on the track's clock. positions: (T, 2) metres, smoothed. raw: (T, 2) metres, the measured
+    samples linearly interpolated (what errors are measured against). velocity: (T, 2) m/s of the smoothed positions.
+    speed: (T,) m/s. direction: (T,) radians from +x, of travel, unwrapped; holds while the player stands. valid: (T,)
+    bool, False within a long gap, where nobody knows what the player did (and which is not standing). ball: (T, 3)
+    metres, NaN where there is no ball at all. ball_measured: (T,) bool, False where it lies between samples too far
+    apart. fps: frames per second.
     """
 
     times: np.ndarray

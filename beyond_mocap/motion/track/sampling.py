@@ -26,8 +26,9 @@ _LONGEST = 6 * 3600.0
 def sample(track: Track, fps: float) -> SampledTrack:
     """`track` (cleaned) at `fps` frames per second: floor(duration * fps) + 1 frames from its first time on.
 
-    The ball is interpolated linearly, held before its first and after its last sample, and lies no lower than its radius,
-    which is also its height where the feed has none. InputError where there are fewer than two measured samples.
+    The ball is interpolated linearly, held before its first and after its last sample, and lies no lower than its
+    radius, which is also its height where the feed has none. InputError where there are fewer than two measured
+    samples.
     """
     times, fine, step = _grids(track, fps)
     positions = smoothed(_linear(fine, track.times, track.positions), fps * step)[::step]
@@ -53,11 +54,11 @@ def smoothed(positions: np.ndarray, fps: float) -> np.ndarray:
     """Positions (T, k) at `fps` without the feed's jitter: a Hann window of 1.2 s, its bias put back twice.
 
     One pass of a window pulls curves inward by half its variance times the acceleration (0.037 s^2 for 1.5 s: 15 cm at
-    4 m/s^2). Smoothing what is left over and adding it back takes that out up to the fourth derivative; twice, up to the
-    sixth. Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples, mean / 95 %:
-    Hann 0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one 0.18 / 0.5 cm and
-    jerk 10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The window also has an end:
-    an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
+    4 m/s^2). Smoothing what is left over and adding it back takes that out up to the fourth derivative; twice, up to
+    the sixth. Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples,
+    mean / 95 %: Hann 0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one
+    0.18 / 0.5 cm and jerk 10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The
+    window also has an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
     """
     out = zero_phase_hann(positions, fps, SMOOTHING_SECONDS)
     for _ in range(2):
@@ -82,9 +83,9 @@ def zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarra
 def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     """(T,) radians from +x, unwrapped: where `velocity` (T, 2) m/s points while it is at least MOVING_SPEED.
 
-    Slower frames keep the direction they came with, and turn to the next one in the last half second before it: a player
-    who stands does not spin with the noise, and does not snap round when setting off. All slow: the direction of the
-    frame that is fastest, 0 if none moves.
+    Slower frames keep the direction they came with, and turn to the next one in the last half second before it: a
+    player who stands does not spin with the noise, and does not snap round when setting off. All slow: the direction of
+    the frame that is fastest, 0 if none moves.
     """
     speed = np.linalg.norm(velocity, axis=1)
     moving = np.flatnonzero(speed >= min(MOVING_SPEED, speed.max(initial=0.0)))
@@ -104,7 +105,8 @@ def _pause(moving: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndar
 
 
 def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Frame times, the times of a finer grid of at least 50 Hz (the window wants many values), and its steps per frame."""
+    """Frame times, the times of a finer grid of at least 50 Hz (the window wants many values), and its steps per
+    frame."""
     if not 1.0 <= fps <= 480.0:
         raise InputError("fps", f"{fps}", "1 to 480 frames per second")
     if np.count_nonzero(track.measured) < 2 or not np.all(np.diff(track.times) > 0):

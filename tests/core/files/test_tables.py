@@ -1,0 +1,141 @@
+"""Tables out and back: what is written reads back, bad files get one line, no half files."""
+
+import json
+import os
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.files.tables import (
+    Provenance,
+    atomic_write,
+    read_ball,
+    read_curve,
+    read_provenance,
+    write_ball,
+    write_provenance,
+    write_report,
+)
+from beyond_mocap.take import BallPath
+
+READERS = (read_provenance, read_ball, read_curve)
+HEADERS = {
+    read_provenance: "frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right\n",
+    read_ball: "time_s,x_m,y_m,z_m,measured\n",
+    read_curve: "x_m,y_m,z_m\n",
+}
+
+
+def provenance():
+    return Provenance(
+        times=np.arange(3) / 30,
+        clip=("a/run, fast.bvh", 'b"quoted".bvh', "c.bvh"),
+        clip_frame=np.array([0.0, 1.25, 119.5]),
+        mirrored=np.array([False, True, True]),
+        words=(("running",), ("kick", "right"), ()),
+        contacts=np.array([[True, False], [False, False], [False, True]]),
+    )
+
+
+def test_provenance_comes_back(tmp_path):
+    file = tmp_path / "p.csv"
+    write_provenance(file, provenance())
+    assert file.read_text(encoding="utf-8").splitlines()[0] + "\n" == HEADERS[read_provenance]
+    back, wrote = read_provenance(file), provenance()
+    assert back.clip == wrote.clip and back.words == wrote.words
+    for name in ("times", "clip_frame", "mirrored", "contacts"):
+        np.testing.assert_allclose(getattr(back, name), getattr(wrote, name), atol=1e-6)
+
+
+def test_the_ball_comes_back_with_its_unknowns(tmp_path):
+    positions = np.array([[1.0, 2.0, 0.11], [np.nan] * 3, [-3.5, 0.25, 2.0]])
+    file = tmp_path / "b.csv"
+    write_ball(file, BallPath(np.arange(3) / 25, positions, np.array([True, False, True])))
+    back = read_ball(file)
+    np.testing.assert_allclose(back.positions, positions)
+    assert back.measured.tolist() == [True, False, True] and file.read_text().splitlines()[2] == "0.040000,,,,0"
+
+
+def test_a_report_is_json_without_nan(tmp_path):
+    file = tmp_path / "r.json"
+    write_report(
+        file,
+        {
+            "version": "1",
+            "root_error_m": {"mean": np.float64(0.5), "max": float("nan")},
+            "frames": np.int64(3),
+            "list": np.array([1.0, np.inf]),
+            "keys": ({"labels": ("kick", "low"), "used_instead": None},),
+            "done": np.bool_(True),
+        },
+    )
+    assert json.loads(file.read_text(encoding="utf-8")) == {
+        "version": "1",
+        "root_error_m": {"mean": 0.5, "max": None},
+        "frames": 3,
+        "list": [1.0, None],
+        "keys": [{"labels": ["kick", "low"], "used_instead": None}],
+        "done": True,
+    }
+
+
+def test_a_curve_with_and_without_height(tmp_path):
+    file = tmp_path / "c.csv"
+    file.write_text("x_m,y_m\n0,0\n\n1.5,-2\n", encoding="utf-8")
+    np.testing.assert_allclose(read_curve(file), [[0, 0, 0], [1.5, -2, 0]])
+    file.write_text("\ufeffname,y_m,x_m,z_m\r\na,1,2,3\r\nb,4,5,6\r\n", encoding="utf-8")
+    np.testing.assert_allclose(read_curve(file), [[2, 1, 3], [5, 4, 6]])
+
+
+@pytest.mark.parametrize(
+    "reader, text, part",
+    [
+        (read_curve, "", "an empty file"),
+        (read_curve, "x,y\n1,2\n", "no column x_m, y_m"),
+        (read_curve, "x_m,y_m\n1,2\n", "1 points"),
+        (read_curve, "x_m,y_m\n1,2\n1,abc\n", ":3: y_m 'abc'"),
+        (read_curve, "x_m,y_m\n1,2\n1\n", ":3: 1 cells"),
+        (read_curve, "x_m,y_m\n1,2\n1,inf\n", ":3: y_m 'inf'"),
+        (read_curve, "x_m,y_m\n1,2\n1,2e5\n", ":3: y_m 2e5"),
+        (read_curve, "x_m,y_m,x_m\n1,2,3\n1,2,3\n", "a column twice"),
+        (read_ball, HEADERS[read_ball] + "0,1,2,3,yes\n", ":2: measured 'yes'"),
+        (read_provenance, HEADERS[read_provenance] + "0,0,a,0,2,run,0,0\n", ":2: mirrored '2'"),
+    ],
+)
+def test_mistakes_name_their_line(tmp_path, reader, text, part):
+    file = tmp_path / "t.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        reader(file)
+    assert part in str(caught.value) and "t.csv" in str(caught.value)
+
+
+@given(st.sampled_from(READERS), st.booleans(), st.binary(max_size=120))
+def test_any_content_is_read_or_refused(tmp_path_factory, reader, headed, content):
+    file = tmp_path_factory.mktemp("fuzz") / "t.csv"
+    file.write_bytes(HEADERS[reader].encode() * headed + content)
+    try:
+        reader(file)
+    except InputError as error:
+        assert "\n" not in str(error)
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path, monkeypatch):
+    file = tmp_path / "r.json"
+    write_report(file, {"a": 1})
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(InputError, match="No space"):
+        write_report(file, {"a": 2})
+    assert [path.name for path in tmp_path.iterdir()] == ["r.json"] and json.loads(file.read_text()) == {"a": 1}
+
+
+def test_a_missing_folder_is_told(tmp_path):
+    with pytest.raises(InputError, match="No such file"):
+        atomic_write(tmp_path / "none" / "x.txt", "x")
