@@ -40,8 +40,13 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
     one in the folder above that, since a library is often one folder of a larger collection."""
     folder = Path(folder)
     places = {parent for clip in clips for parent in clip.parents if parent == folder or folder in parent.parents}
-    places |= {folder, folder.absolute().parent}
+    places |= {folder, _absolute(folder).parent}
     return sorted(place / TABLE_NAME for place in places if (place / TABLE_NAME).is_file())
+
+
+def _absolute(path: Path) -> Path:
+    """The whole path without `..`: where the library is given as `..`, the folder above it is not its last part."""
+    return Path(os.path.normpath(path.absolute()))
 
 
 class Annotations:
@@ -49,16 +54,17 @@ class Annotations:
 
     def __init__(self, folder: Path, clips: list[Path]):
         """Reads every table that may apply; InputError where one is broken."""
-        self.tables = {table.parent.absolute(): read_annotation_csv(table) for table in find_tables(folder, clips)}
+        self.tables = {_absolute(table.parent): read_annotation_csv(table) for table in find_tables(folder, clips)}
 
     def of(self, clip: Path, fps: float) -> tuple[ClipAnnotation, ...]:
         """Rows of one clip: NAME.txt beside it, else the nearest table from its folder upward that has rows for it."""
         beside = clip.with_suffix(".txt")
         if beside.is_file():
             return tuple(read_clip_annotations(beside, fps))
-        for place in clip.absolute().parents:
+        clip = _absolute(clip)
+        for place in clip.parents:
             if place in self.tables:
-                rows = self.tables[place].get(clip.absolute().relative_to(place).as_posix())
+                rows = self.tables[place].get(clip.relative_to(place).as_posix())
                 if rows:
                     return tuple(rows)
         return ()
