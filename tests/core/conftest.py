@@ -1,0 +1,93 @@
+"""A small made library with planted truths (speeds, a kick whose moment is known), and made tracks, for the core's tests."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation import KeyMoment, Span, Timeline
+from beyond_mocap.files import bvh
+from beyond_mocap.library.library import Library, build
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.gestures import strike
+from beyond_mocap.motion.motion import Motion
+from beyond_mocap.motion.track import Track
+
+# clip -> metres per second, words
+
+SPEEDS = {"stand": (0.0, "standing"), "walk": (1.4, "walking"), "jog": (2.8, "jogging"), "run": (5.0, "running")}
+KICK = "kick low inside right"
+
+
+def write_clip(path: Path, motion: Motion, text: str) -> Path:
+    """One recording and its words, which stand in a file beside it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    bvh.write(path, motion)
+    path.with_suffix(".txt").write_text(text)
+    return path
+
+
+@pytest.fixture(scope="session")
+def clip_file():
+    """clip_file(path, speed=1.4, seconds=3.0, words="walking", fps=30, **gait): a made gait and its words."""
+
+    def make(path, speed=1.4, seconds=3.0, words="walking", fps=30.0, **more) -> Path:
+        return write_clip(Path(path), gait(speed, seconds, fps, **more), f"0 {seconds:g} {words}\n" if words else "# nothing\n")
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def clips_folder(tmp_path_factory) -> Path:
+    """stand, walk, jog and run at SPEEDS, a walk that turns left, and a kick with the right foot (60 fps) among them."""
+    folder = tmp_path_factory.mktemp("clips")
+    for seed, (name, (speed, words)) in enumerate(SPEEDS.items()):
+        write_clip(folder / f"{name}.bvh", gait(speed, 5.0, 30.0, seed=seed), f"0 5 {words}\n")
+    write_clip(folder / "bows" / "turn.bvh", gait(1.4, 4.0, 60.0, turn_rate=0.9, seed=7), "0 4 walking left\n")
+    kick = strike("kick low inside", fps=60.0)
+    text = f"0 2 jogging front\n{kick.start:.3f} {kick.end:.3f} {KICK}\n{kick.key:.3f} {KICK}\n"
+    write_clip(folder / "kick.bvh", kick.motion, text)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def library(clips_folder) -> Library:
+    return build(clips_folder)
+
+
+@pytest.fixture(scope="session")
+def kick_seconds() -> float:
+    """When the ball is kicked in the made clip."""
+    return strike("kick low inside", fps=60.0).key
+
+
+@pytest.fixture(scope="session")
+def track_of():
+    """track_of(speed, seconds=8, turn=0, hz=25, start=0, ball=False) -> Track without noise.
+
+    speed: m/s, one or a function of the time since the first sample; turn: radians per second. The ball rolls 1 m ahead."""
+
+    def make(speed=1.4, seconds=8.0, turn=0.0, hz=25.0, start=0.0, ball=False) -> Track:
+        fine = np.arange(0.0, seconds + 0.5 / hz, 0.001)
+        fast = np.broadcast_to(speed(fine) if callable(speed) else speed, fine.shape)
+        way = np.broadcast_to(turn(fine) if callable(turn) else turn * fine, fine.shape)
+        velocity = fast[:, None] * np.stack([np.cos(way), np.sin(way)], axis=1)
+        path = np.concatenate([np.zeros((1, 2)), np.cumsum(velocity[:-1] * 0.001, axis=0)])
+        times = np.arange(int(round(seconds * hz)) + 1) / hz
+        places = np.stack([np.interp(times, fine, path[:, axis]) for axis in (0, 1)], axis=1)
+        rolling = np.column_stack([places + [1.0, 0.0], np.full(len(times), 0.11)]) if ball else None
+        return Track(times + start, places, rolling)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def timeline_of():
+    """timeline_of((start, end, words) or (time, words), ...) -> Timeline, words as text."""
+
+    def make(*lines) -> Timeline:
+        spans = [Span(line[0], line[1], tuple(line[2].split())) for line in lines if len(line) == 3]
+        keys = [KeyMoment(line[0], tuple(line[1].split())) for line in lines if len(line) == 2]
+        return Timeline(tuple(spans), tuple(keys))
+
+    return make

@@ -1,0 +1,135 @@
+"""Which files below a folder are clips, and which words belong to each."""
+
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.library.scan import Annotations, find_clips
+
+HEADER = "file,fps,start_frame,end_frame,key_frame,labels,comment\n"
+
+
+def row(file, words, start=0, end=9, key=""):
+    return f"{file},30,{start},{end},{key},{words},\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """collection/library with a clip at the top and one in a folder; only names matter here."""
+    library = tmp_path / "collection" / "library"
+    (library / "deep").mkdir(parents=True)
+    for name in ("b.bvh", "deep/a.BVH"):
+        (library / name).write_text("HIERARCHY")
+    return library
+
+
+def names(folder):
+    return [path.relative_to(folder).as_posix() for path in find_clips(folder)]
+
+
+def words(folder, name, fps=30.0):
+    rows = Annotations(folder, find_clips(folder)).of(folder / name, fps)
+    return [" ".join(row.words) for row in rows]
+
+
+def test_clips_are_found_in_order_whatever_the_case_of_their_suffix(folder):
+    (folder / "Z.bvh").write_text("")
+    (folder / "notes.txt").write_text("")
+    assert names(folder) == ["Z.bvh", "b.bvh", "deep/a.BVH"]
+
+
+def test_linked_folders_and_files_are_followed(folder, tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "far" / "c.bvh").write_text("")
+    (tmp_path / "single.bvh").write_text("")
+    (folder / "linked").symlink_to(tmp_path / "far")
+    (folder / "d.bvh").symlink_to(tmp_path / "single.bvh")
+    assert names(folder) == ["b.bvh", "d.bvh", "deep/a.BVH", "linked/c.bvh"]
+
+
+def test_a_loop_of_links_ends(folder):
+    (folder / "deep" / "up").symlink_to(folder)
+    (folder / "self").symlink_to(folder, target_is_directory=True)
+    assert names(folder) == ["b.bvh", "deep/a.BVH"]
+
+
+def test_a_folder_that_can_be_reached_twice_is_read_once(folder):
+    (folder / "again").symlink_to(folder / "deep")
+    assert len(names(folder)) == 2
+
+
+def test_the_library_itself_may_be_a_link(folder, tmp_path):
+    (tmp_path / "link").symlink_to(folder)
+    assert names(tmp_path / "link") == ["b.bvh", "deep/a.BVH"]
+
+
+def test_the_cache_is_not_searched(folder):
+    (folder / ".beyond_mocap").mkdir()
+    (folder / ".beyond_mocap" / "old.bvh").write_text("")
+    assert names(folder) == ["b.bvh", "deep/a.BVH"]
+
+
+@pytest.mark.parametrize("make", [lambda p: None, lambda p: p.mkdir(), lambda p: p.write_text("a file")])
+def test_a_missing_or_empty_folder_is_told(tmp_path, make):
+    make(tmp_path / "nothing")
+    with pytest.raises(InputError, match="nothing: no .*; expected .*; .") as told:
+        find_clips(tmp_path / "nothing")
+    assert "\n" not in str(told.value)
+
+
+def test_the_text_beside_a_clip_wins_over_tables(folder):
+    (folder / "annotations.csv").write_text(HEADER + row("b.bvh", "walking"))
+    assert words(folder, "b.bvh") == ["walking"]
+    (folder / "b.txt").write_text("0 1 jogging\n")
+    assert words(folder, "b.bvh") == ["jogging"]
+
+
+def test_the_nearest_table_that_speaks_of_a_clip_wins(folder):
+    (folder.parent / "annotations.csv").write_text(HEADER + row("library/deep/a.BVH", "far") + row("library/b.bvh", "far"))
+    assert words(folder, "deep/a.BVH") == words(folder, "b.bvh") == ["far"]
+    (folder / "annotations.csv").write_text(HEADER + row("deep/a.BVH", "top"))
+    assert (words(folder, "deep/a.BVH"), words(folder, "b.bvh")) == (["top"], ["far"])
+    (folder / "deep" / "annotations.csv").write_text(HEADER + row("other.bvh", "beside"))
+    assert words(folder, "deep/a.BVH") == ["top"]
+    (folder / "deep" / "annotations.csv").write_text(HEADER + row("a.BVH", "beside"))
+    assert words(folder, "deep/a.BVH") == ["beside"]
+
+
+def test_a_table_two_folders_above_says_nothing(folder):
+    (folder.parent.parent / "annotations.csv").write_text(HEADER + row("collection/library/b.bvh", "too far"))
+    assert words(folder, "b.bvh") == []
+
+
+def test_tables_are_found_from_wherever_one_stands(folder, monkeypatch):
+    (folder.parent / "annotations.csv").write_text(HEADER + row("library/b.bvh", "above"))
+    for here, given in ((folder, "."), (folder.parent, "library"), (folder / "deep", ".."), (folder / "deep", "../../library")):
+        monkeypatch.chdir(here)
+        paths = find_clips(given)
+        clip = next(path for path in paths if path.name == "b.bvh")
+        assert [row.words for row in Annotations(given, paths).of(clip, 30.0)] == [("above",)], (here, given)
+
+
+def test_clips_in_linked_folders_are_named_by_where_they_are_linked(folder, tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "far" / "c.bvh").write_text("")
+    (tmp_path / "far" / "c.txt").write_text("0 1 running\n")
+    (tmp_path / "far" / "d.bvh").write_text("")
+    (folder / "linked").symlink_to(tmp_path / "far")
+    (folder / "annotations.csv").write_text(HEADER + row("linked/d.bvh", "jogging"))
+    assert (words(folder, "linked/c.bvh"), words(folder, "linked/d.bvh")) == (["running"], ["jogging"])
+
+
+def test_a_broken_table_is_told_with_its_line(folder):
+    (folder / "annotations.csv").write_text(HEADER + row("b.bvh", "walking") + row("b.bvh", "walking", start="x"))
+    with pytest.raises(InputError, match=r"annotations\.csv:3"):
+        words(folder, "b.bvh")
+    (folder / "annotations.csv").write_text("file,start_frame\n")
+    with pytest.raises(InputError, match=r"annotations\.csv:1.*labels"):
+        words(folder, "b.bvh")
+
+
+def test_all_that_was_read_for_words_is_known_to_the_cache(folder):
+    (folder.parent / "annotations.csv").write_text(HEADER + row("library/b.bvh", "walking"))
+    (folder / "deep" / "a.txt").write_text("0 1 jogging\n")
+    paths = find_clips(folder)
+    sources = {path.resolve() for path in Annotations(folder, paths).sources(paths)}
+    assert sources == {(folder.parent / "annotations.csv").resolve(), (folder / "deep" / "a.txt").resolve()}
