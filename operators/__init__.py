@@ -5,25 +5,45 @@ The classes are registered in the order of CLASSES.
 
 import bpy
 
-from . import add_stage, cancel, export_bvh, import_clips, remove_player
+from . import (
+    add_stage,
+    bake,
+    build_library,
+    cancel,
+    command,
+    export_bvh,
+    import_clips,
+    import_tracking,
+    mirror,
+    remove_player,
+    synthesize,
+)
 
 CLASSES = (
     import_clips.BEYOND_MOCAP_OT_import_clips,
     import_clips.BEYOND_MOCAP_FH_clips,
+    mirror.BEYOND_MOCAP_OT_mirror,
     export_bvh.BEYOND_MOCAP_OT_export_bvh,
+    import_tracking.BEYOND_MOCAP_OT_import_tracking,
+    import_tracking.BEYOND_MOCAP_FH_tracking,
     remove_player.BEYOND_MOCAP_OT_remove_player,
-    add_stage.BEYOND_MOCAP_OT_add_stage,
+    build_library.BEYOND_MOCAP_OT_build_library,
+    synthesize.BEYOND_MOCAP_OT_synthesize,
     cancel.BEYOND_MOCAP_OT_cancel,
+    bake.BEYOND_MOCAP_OT_bake,
+    add_stage.BEYOND_MOCAP_OT_add_stage,
 )
 
 
 def register():
-    """Register the operators, in order."""
+    """Register the operators, in order, and the command."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    command.register()
 
 
 def unregister():
-    """Unregister the operators, the last one first."""
+    """Take the command away and unregister the operators, the last one first."""
+    command.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

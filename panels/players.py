@@ -43,6 +43,8 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         column.prop(player, "tracking_file")
         if player.feed_id:
             column.prop(player, "feed_id")
+            column.prop(settings, "section_start")
+            column.prop(settings, "section_end")
         column.prop(player, "annotation_file")
         column.prop(player, "annotation_text")
         column.prop(player, "body")

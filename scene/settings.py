@@ -39,6 +39,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     feed_id: StringProperty(
         name="ID in the feed", description="Which player of the tracking file this is; empty for a file of one player"
     )
+    provider: StringProperty(name="Provider", description="Whose form the tracking file has; empty guesses it")
     annotation_file: StringProperty(
         name="Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Text file of lines 'START END words' and 'TIME words'; none means automatic locomotion",
@@ -74,6 +75,14 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
     players: CollectionProperty(type=BeyondMocapPlayer)
     active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
+    section_start: FloatProperty(
+        name="From", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1,
+        description="Second of a whole match at which to begin",
+    )
+    section_end: FloatProperty(
+        name="To", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1,
+        description="Second of a whole match at which to end; 0 goes to its end",
+    )
     method: EnumProperty(name="Method", items=METHODS, default="path", description="How position is dealt with")
     catch_up: BoolProperty(
         name="Catch Up", default=True, description="Let the body catch up with the track smoothly after each warp"
@@ -115,6 +124,16 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
 def absolute(path: str) -> str:
     """A path as typed into a setting, made absolute; empty stays empty."""
     return bpy.path.abspath(path) if path else ""
+
+
+def as_setting(path: str) -> str:
+    """A chosen path as it is kept: relative to the file where it is saved and the user's preferences say so."""
+    if bpy.data.is_saved and bpy.context.preferences.filepaths.use_relative_paths:
+        try:
+            return bpy.path.relpath(path)
+        except ValueError:  # another drive on Windows
+            return path
+    return path
 
 
 def active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:

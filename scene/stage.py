@@ -12,6 +12,8 @@ from .measure import units_per_metre
 LENGTH, WIDTH, LINE = 105.0, 68.0, 0.12  # metres; International Football Association Board, Laws of the Game, Law 1
 NAME = "Stage"
 FOCUS = "Stage focus"
+MARK = "beyond_mocap_focus"
+HALF_WIDTH = 0.36  # metres to either side that the camera shows with some margin, per metre of its distance
 CAMERA_FROM = (-1.5, -8.5, 1.3)  # metres from the focus: from the touchline, a little above the players' heads
 
 
@@ -45,16 +47,22 @@ def remove(scene: bpy.types.Scene) -> None:
     bpy.data.collections.remove(stage)
 
 
-def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray) -> None:
-    """Let the stage's camera follow `places` (F, 2) metres over scene frames (F,); nothing happens where there is none."""
+def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:
+    """Let the stage's camera follow and stand back as far as it takes; nothing happens where there is no such camera.
+
+    frames: (F,) scene frames. places: (F, 2) metres, the middle of what is to be seen. reach: (F,) metres from there to the
+    farthest player. The camera hangs on an empty, whose size is its distance.
+    """
     stage = scene.collection.children.get(NAME)
     focus = stage.objects.get(FOCUS) if stage else None
     if focus is None:
         return
-    units = units_per_metre(scene)
-    path = np.column_stack([places * units, np.full(len(frames), focus.location.z)])
-    channels.discard(focus, "beyond_mocap_focus")
-    channels.animate(focus, FOCUS, frames, {"location": ("Object Transforms", path)})["beyond_mocap_focus"] = True
+    path = np.column_stack([places * units_per_metre(scene), np.full(len(frames), focus.location.z)])
+    distance = np.maximum(1.0, reach / (HALF_WIDTH * np.linalg.norm(CAMERA_FROM)))
+    group = "Object Transforms"
+    curves = {"location": (group, path), "scale": (group, np.repeat(distance[:, None], 3, axis=1))}
+    channels.discard(focus, MARK)
+    channels.animate(focus, FOCUS, frames, curves)[MARK] = True
 
 
 def _ground(stage, units: float) -> None:

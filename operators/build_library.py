@@ -1,0 +1,77 @@
+"""Build Library: read a folder of clips and their words, once; the next time its cache answers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty
+
+from ..beyond_mocap.errors import InputError
+from ..scene import session
+from ..scene.settings import absolute
+from .verb import BackgroundVerb
+
+if TYPE_CHECKING:
+    from ..beyond_mocap.library.library import Library
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a build needs to know."""
+
+    folder: str
+    unit: float | None
+    rebuild: bool
+
+
+class BEYOND_MOCAP_OT_build_library(BackgroundVerb, bpy.types.Operator):
+    """Read all clips of the library folder, their words and foot contacts, and sort them for the search.
+The result is kept in a cache, so that the next time takes a moment"""
+
+    bl_idname = "beyond_mocap.build_library"
+    bl_label = "Build Library"
+    kind = "library"
+
+    rebuild: BoolProperty(name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context):
+        """A folder has to be chosen."""
+        cls.poll_message_set("Choose the library's folder first")
+        return bool(context.scene.beyond_mocap.library_folder)
+
+    def order(self, context):
+        """Folder and unit."""
+        settings = context.scene.beyond_mocap
+        if not settings.library_folder:
+            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
+        return Order(absolute(settings.library_folder), settings.library_unit or None, self.rebuild)
+
+    @staticmethod
+    def work(order, progress, cancelled):
+        """Build it."""
+        from ..beyond_mocap.library.library import build
+
+        return build(order.folder, rebuild=order.rebuild, unit=order.unit, progress=progress, cancelled=cancelled)
+
+    def apply(self, scene, built):
+        """Keep it, and say what it holds."""
+        session.keep_library(built)
+        scene.beyond_mocap.library_holds = summary(built)
+        for note in built.notes:
+            self.report({"INFO"}, note)
+        self.report({"INFO"}, scene.beyond_mocap.library_holds.replace("\n", "; "))
+
+
+def summary(built: "Library") -> str:
+    """Lines for the panel: clips and minutes, key moments, gaits with their speeds."""
+    originals = [clip for clip in built.clips if not clip.mirrored]
+    keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
+    lines = [f"{len(originals)} clips, {built.minutes:.1f} minutes, {len(built.skeleton)} joints"]
+    lines += [", ".join(f"{gait.word} {gait.speed:.1f} m/s" for gait in built.gaits)]
+    if keys:
+        lines += ["Moments: " + ", ".join(f"{count} {word}" for word, count in keys.most_common())]
+    return "\n".join(lines)

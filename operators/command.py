@@ -1,0 +1,27 @@
+"""The command line inside Blender: `blender --command beyond_mocap VERB ...`, the core's verbs with Blender's own formats."""
+
+from __future__ import annotations
+
+import bpy
+
+NAME = "beyond_mocap"
+
+_registered = []
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command line; returns its exit status."""
+    from ..beyond_mocap.__main__ import main
+    from ..scene.deliver import WRITERS
+
+    return main(arguments, WRITERS, prog=f"blender --command {NAME}")
+
+
+def register():
+    """Make the command known to Blender."""
+    _registered.append(bpy.utils.register_cli_command(NAME, run))
+
+
+def unregister():
+    """Take it away."""
+    bpy.utils.unregister_cli_command(_registered.pop())

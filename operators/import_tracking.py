@@ -1,0 +1,116 @@
+"""Import Tracking: files of dots become players in the list; nothing else in the scene changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import CollectionProperty, EnumProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.files.tracking import PROVIDERS
+from ..scene import tracks
+from ..scene.settings import as_setting
+from .verb import Verb
+
+SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
+SECTION = 60.0  # seconds of a whole match that are taken at first
+
+
+class BEYOND_MOCAP_OT_import_tracking(Verb, bpy.types.Operator, ImportHelper):
+    """Import players' positions: CSV files with time_s, x_m, y_m, or a provider's tracking file (TRACAB, Metrica,
+SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name beside a CSV is taken as the player's words"""
+
+    bl_idname = "beyond_mocap.import_tracking"
+    bl_label = "Import Tracking"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    filename_ext = ".csv"
+
+    filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml", options={"HIDDEN"})
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+    metadata: StringProperty(
+        name="Metadata", subtype="FILE_PATH",
+        description="The provider's second file; where empty, one beside the tracking file whose name fits is taken",
+    )
+    provider: EnumProperty(
+        name="Provider",
+        items=[("AUTO", "Guess", "By what the file looks like")] + [(name, name.capitalize(), name) for name in PROVIDERS],
+        description="Whose form the file has",
+    )
+
+    def invoke(self, context, event):
+        """Dropped files are imported at once; else the file browser opens."""
+        if self.directory and self.files:
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def paths(self) -> list[str]:
+        """The chosen files."""
+        names = [file.name for file in self.files if file.name]
+        if names:
+            return [str(Path(self.directory or Path(self.filepath).parent, name)) for name in names]
+        if not self.filepath:
+            raise InputError("import", "no file given", "a tracking file", "choose one")
+        return [bpy.path.abspath(self.filepath)]
+
+    def do(self, context):
+        """Read all files, then fill the list."""
+        settings = context.scene.beyond_mocap
+        provider = "" if self.provider == "AUTO" else self.provider
+        read = [(path, *tracks.players_in(path, self.metadata, provider)) for path in self.paths()]
+        if not settings.players:
+            self.set_clock(settings, [player for _, found, _ in read for player in found])
+        for path, found, notes in read:
+            for player in found:
+                self.add(settings, path, player, provider)
+            for note in notes:
+                self.report({"INFO"}, note)
+        settings.active_player = len(settings.players) - sum(len(found) for _, found, _ in read)
+        self.report({"INFO"}, f"{len(settings.players)} players in the list")
+
+    @staticmethod
+    def set_clock(settings, found):
+        """The first players' clock starts with the start frame; of a whole match the first minute is chosen."""
+        settings.start_time = min(player.start for player in found)
+        if any(player.feed_id for player in found):
+            settings.section_start = settings.start_time
+            settings.section_end = min(settings.start_time + SECTION, max(player.end for player in found))
+
+    def add(self, settings, path: str, found: tracks.Found, provider: str):
+        """One more player in the list; of a whole match only the first is ticked."""
+        entry = settings.players.add()
+        entry.name = _free_name(found.name, {player.name for player in settings.players})
+        entry.tracking_file, entry.metadata_file = as_setting(path), as_setting(self.metadata) if self.metadata else ""
+        entry.feed_id, entry.provider = found.feed_id, provider
+        same_file = [player for player in settings.players if player.tracking_file == entry.tracking_file]
+        entry.use = not found.feed_id or len(same_file) == 1
+        team = found.team if found.feed_id else ("home", "away")[(len(settings.players) - 1) % 2]
+        entry.shirt = SHIRTS.get(team, SHIRTS["home"])[0 if found.feed_id else (len(settings.players) - 1) // 2 % 2]
+        words = Path(path).with_suffix(".txt")
+        if not found.feed_id and words.is_file() and words != Path(path):
+            entry.annotation_file = as_setting(str(words))
+
+
+def _free_name(wanted: str, taken: set[str]) -> str:
+    """`wanted`, or the first "wanted 2", "wanted 3" ... that is not taken."""
+    number, name = 1, wanted
+    while name in taken:
+        number += 1
+        name = f"{wanted} {number}"
+    return name
+
+
+class BEYOND_MOCAP_FH_tracking(bpy.types.FileHandler):
+    """Tracking files dropped into the 3D view"""
+
+    bl_idname = "BEYOND_MOCAP_FH_tracking"
+    bl_label = "Player tracking"
+    bl_import_operator = "beyond_mocap.import_tracking"
+    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat;.txt"
+
+    @classmethod
+    def poll_drop(cls, context):
+        """The 3D view, where the dots will be."""
+        return context.area is not None and context.area.type == "VIEW_3D"

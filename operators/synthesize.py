@@ -1,0 +1,134 @@
+"""Synthesize: a take for every chosen player. Nothing in the scene moves before Bake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ..beyond_mocap.annotation import validate
+from ..beyond_mocap.plan import Plan
+from ..beyond_mocap.take import Take
+from ..scene import plans, session
+from ..scene.settings import absolute
+from .build_library import summary
+from .verb import BackgroundVerb
+
+if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a second, and switching on has to be quick
+    from ..beyond_mocap.library.library import Library
+
+FIGURES = (  # of the report: what the panel's table shows, path in the report, factor (a negative one counts from 1), form
+    ("Off the track, mean", "root_error_m.mean", 100, "{:.1f} cm"),
+    ("Off the track, 95 %", "root_error_m.p95", 100, "{:.1f} cm"),
+    ("Feet slide", "skate.contact_cm_s", 1, "{:.1f} cm/s"),
+    ("in the recordings", "skate.source_contact_cm_s", 1, "{:.1f} cm/s"),
+    ("Jerk at seams / recordings", "seam_jerk_ratio.median", 1, "{:.2f}"),
+    ("Words met", "annotation_similarity.all", -50, "{:.0f} %"),  # -1 is all, +1 none
+    ("Time stretched", "warp_rate.max", 1, "{:.2f} x"),
+    ("Seconds to make", "seconds.total", 1, "{:.1f}"),
+)
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a run needs: one plan per player, the library or how to build it.
+
+    plans: (player's name, plan, where its words are written, warnings about its track).
+    """
+
+    plans: tuple[tuple[str, Plan, str, tuple[str, ...]], ...]
+    folder: str
+    unit: float | None
+    library: "Library | None"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run brings: the library it used, and per player the plan, the take, the report and the track's warnings."""
+
+    library: "Library"
+    made: tuple[tuple[str, Plan, Take, dict, tuple[str, ...]], ...]
+
+
+class BEYOND_MOCAP_OT_synthesize(BackgroundVerb, bpy.types.Operator):
+    """Find clips for every ticked player's track and words, and join them into one motion.
+The scene changes with Bake only"""
+
+    bl_idname = "beyond_mocap.synthesize"
+    bl_label = "Synthesize"
+    kind = "synthesis"
+
+    @classmethod
+    def poll(cls, context):
+        """A library and a player."""
+        settings = context.scene.beyond_mocap
+        if not settings.library_folder:
+            cls.poll_message_set("Choose the library's folder in step 1 first")
+            return False
+        cls.poll_message_set("Import tracking and tick a player in step 2 first")
+        return any(player.use for player in settings.players)
+
+    def order(self, context):
+        """Tracks and words of all chosen players."""
+        settings = context.scene.beyond_mocap
+        folder = absolute(settings.library_folder)
+        asked = []
+        for player in plans.chosen(settings):
+            plan, warnings = plans.plan_of(settings, player)
+            asked.append((player.name, plan, plans.words_from(player), warnings))
+        return Order(tuple(asked), folder, settings.library_unit or None, session.library(folder))
+
+    @staticmethod
+    def work(order, progress, cancelled):
+        """The library, where this session has none yet, then one player after the other."""
+        from ..beyond_mocap.evaluation.report import evaluate
+        from ..beyond_mocap.library.library import build
+        from ..beyond_mocap.synthesize import synthesize
+
+        clips = order.library or build(order.folder, unit=order.unit, progress=progress, cancelled=cancelled)
+        made = []
+        for number, (name, plan, where, warnings) in enumerate(order.plans):
+            def report(fraction, text, number=number, name=name):
+                progress((number + fraction) / len(order.plans), f"{name}: {text}")
+
+            validate(plan.timeline, clips.words, float(plan.track.times[0]), float(plan.track.times[-1]), where)
+            begun = perf_counter()
+            take = synthesize(clips, plan, progress=report, cancelled=cancelled)
+            figures = evaluate(take, plan.track, clips)
+            figures["seconds"]["total"] = perf_counter() - begun
+            made.append((name, plan, take, figures, warnings))
+        return Result(clips, tuple(made))
+
+    def apply(self, scene, result):
+        """Keep the takes and show their quality."""
+        settings = scene.beyond_mocap
+        session.keep_library(result.library)
+        settings.library_holds = summary(result.library)
+        for name, plan, take, report, warnings in result.made:
+            player = settings.players.get(name)
+            if player is None:
+                self.report({"WARNING"}, f"{name} is not in the list any more; its take is dropped")
+                continue
+            player.take = session.keep_take(plan, take)
+            player.quality = quality(report)
+            told = dict.fromkeys((*warnings, *report.get("warnings", ())))
+            player.warnings = "\n".join(line for line in told if line not in result.library.notes)
+        self.report({"INFO"}, f"{len(result.made)} players synthesized; press Bake to see them")
+
+
+def quality(report: dict) -> str:
+    """Lines "name: value" of those figures that the report has."""
+    lines = []
+    for name, path, factor, form in FIGURES:
+        value = report
+        for key in path.split("."):
+            value = value.get(key) if isinstance(value, dict) else None
+        if value is not None:
+            lines.append(f"{name}: {form.format(factor * (value if factor > 0 else value - 1.0))}")
+    for key in report.get("keys", ()):
+        used = key.get("used_instead")
+        lines.append(f"{' '.join(key['labels'])} at {key['time_s']:.1f} s: {' '.join(used) if used else 'found'}")
+    return "\n".join(lines)

@@ -1,0 +1,53 @@
+"""What the settings ask for, as the core's plans."""
+
+from __future__ import annotations
+
+from ..beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
+from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.motion.track import Track, clean
+from ..beyond_mocap.plan import Plan
+from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
+from .tracks import read_track
+
+
+def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
+    """The players that are switched on; InputError where there is none."""
+    players = [player for player in settings.players if player.use]
+    if not players:
+        raise InputError("players", "none is switched on", "at least one", "import tracking in step 2 and tick a player")
+    return players
+
+
+def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> tuple[Plan, tuple[str, ...]]:
+    """The plan of one player, and what in the track asks for attention."""
+    track, found = clean(read_track(settings, player))
+    plan = Plan(
+        track=track,
+        timeline=timeline_of(player, settings.rate, track),
+        library=absolute(settings.library_folder),
+        method=settings.method,
+        catch_up=settings.catch_up,
+        fps=settings.rate,
+        alpha=settings.alpha,
+        mirror=settings.mirror,
+        nearest=settings.nearest,
+        seed=settings.seed,
+    )
+    return plan, found.warnings
+
+
+def timeline_of(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
+    """The player's words: from the text of this file, else from the file on disk, else none (all automatic)."""
+    start, text = float(track.times[0]), player.annotation_text
+    if text is not None:
+        return parse_timeline(text.as_string(), words_from(player), fps, start)
+    if player.annotation_file:
+        return read_timeline(words_from(player), fps, start)
+    return Timeline()
+
+
+def words_from(player: BeyondMocapPlayer) -> str:
+    """Where the player's words are written, for messages."""
+    if player.annotation_text is not None:
+        return f"text {player.annotation_text.name}"
+    return absolute(player.annotation_file) or f"player {player.name}"

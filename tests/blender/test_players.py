@@ -1,0 +1,240 @@
+"""The road from tracking to baked players: operators give what the functions give, undo works, trouble is told."""
+
+import importlib
+import os
+import pathlib
+
+import bpy
+import numpy as np
+import pytest
+from undo import assert_one_step, press, state
+
+SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend"
+CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside",
+         "receive_foot", "dribble_jogging")
+WORDS = "6.0 kick right running low inside\n"
+
+
+@pytest.fixture(scope="session")
+def library_folder(tmp_path_factory):
+    """A few clips of the sample, so that building takes a second; built once by whoever comes first."""
+    folder = tmp_path_factory.mktemp("library")
+    for name in CLIPS:
+        for suffix in (".bvh", ".txt"):
+            (folder / f"{name}{suffix}").symlink_to(SAMPLE / "library" / f"{name}{suffix}")
+    return folder
+
+
+@pytest.fixture
+def match(tmp_path):
+    """Twelve seconds of two players, one with words and a ball."""
+    time = np.arange(0.0, 12.01, 0.1)
+    for number, (speed, ball) in enumerate(((3.0, True), (1.3, False)), 1):
+        angle = 0.08 * time * (-1) ** number
+        x, y = speed * time * np.cos(angle), speed * time * np.sin(angle)
+        lines = ["time_s,x_m,y_m" + ",ball_x_m,ball_y_m,ball_z_m" * ball]
+        lines += [f"{t:.1f},{a:.3f},{b:.3f}" + f",{a + 0.6:.3f},{b:.3f},0.11" * ball for t, a, b in zip(time, x, y)]
+        (tmp_path / f"player{number}.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "player1.txt").write_text(WORDS)
+    return tmp_path
+
+
+@pytest.fixture
+def ready(match, library_folder):
+    """Settings as an animator fills them in; nothing built yet."""
+    settings = bpy.context.scene.beyond_mocap
+    settings.library_folder = str(library_folder)
+    bpy.ops.beyond_mocap.import_tracking(directory=str(match), files=[{"name": "player1.csv"}, {"name": "player2.csv"}])
+    return settings
+
+
+@pytest.fixture
+def session(extension):
+    module = importlib.import_module(f"{extension.__name__}.scene.session")
+    yield module
+    module.clear()
+
+
+def test_tracking_becomes_players(match, core):
+    bpy.context.scene.render.fps = 25
+    assert_one_step(bpy.ops.beyond_mocap.import_tracking, filepath=str(match / "player1.csv"))
+    settings = bpy.context.scene.beyond_mocap
+    assert [player.name for player in settings.players] == ["player1"]
+    assert settings.players[0].annotation_file == str(match / "player1.txt")
+    assert_one_step(bpy.ops.beyond_mocap.import_tracking, filepath=str(match / "player1.csv"))
+    players = bpy.context.scene.beyond_mocap.players  # undo has replaced what was there before
+    assert [player.name for player in players] == ["player1", "player1 2"]
+    assert_one_step(bpy.ops.beyond_mocap.remove_player)
+    assert bpy.context.scene.render.fps == 25
+
+
+def test_paths_are_kept_relative_where_the_user_wants_that(match):
+    bpy.ops.wm.save_as_mainfile(filepath=str(match / "scene.blend"))
+    bpy.context.preferences.filepaths.use_relative_paths = True
+    bpy.ops.beyond_mocap.import_tracking(filepath=str(match / "player1.csv"))
+    player = bpy.context.scene.beyond_mocap.players[0]
+    assert player.tracking_file == "//player1.csv" and player.annotation_file == "//player1.txt"
+
+
+def test_words_of_a_text_count_more_than_those_on_disk(extension, ready, core):
+    plans = importlib.import_module(f"{extension.__name__}.scene.plans")
+    text = bpy.data.texts.new("Words")
+    text.write("3.0 kick right running low inside\n")
+    ready.players[0].annotation_text = text
+    assert plans.plan_of(ready, ready.players[0])[0].timeline.keys[0].time == 3.0
+    text.clear()
+    text.write("3.0 kik right\n")
+    with pytest.raises(RuntimeError, match="text Words:1: the word 'kik'"):
+        bpy.ops.beyond_mocap.synthesize()
+
+
+def test_the_whole_road(extension, ready, core, session):
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 24, 1.001
+    rate = 24 / 1.001
+    bpy.ops.beyond_mocap.add_stage()
+    bpy.ops.ed.undo_push(message="before")
+    assert press(bpy.ops.beyond_mocap.build_library) == {"FINISHED"}
+    settings = bpy.context.scene.beyond_mocap
+    assert f"{len(CLIPS)} clips" in settings.library_holds
+    assert press(bpy.ops.beyond_mocap.synthesize) == {"FINISHED"}
+    settings = bpy.context.scene.beyond_mocap
+    built = session.library(settings.library_folder)
+    for player in settings.players:
+        made = session.made(player.take)
+        again = core("synthesize").synthesize(built, made.plan)
+        assert np.array_equal(made.take.motion.rotations, again.motion.rotations)
+        assert np.array_equal(made.take.motion.root_positions, again.motion.root_positions)
+        assert "Feet slide" in player.quality
+    synthesized = state()
+    assert press(bpy.ops.beyond_mocap.bake) == {"FINISHED"}
+    baked = state()
+    rooms = {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("action", "bake")}
+    resample = core("motion.motion").resample
+    for player in bpy.context.scene.beyond_mocap.players:
+        take = session.made(player.take).take
+        read, expected = rooms["action"].read(player.body, bpy.context.scene), resample(take.motion, rate)
+        assert abs(len(read) - len(expected)) <= 1
+        count = min(len(read), len(expected))
+        np.testing.assert_allclose(read.root_positions[:count], expected.root_positions[:count], atol=1e-5)
+        assert np.abs(np.sum(read.rotations[:count] * expected.rotations[:count], axis=-1)).min() > 1 - 1e-6
+    assert "Ball" in bpy.data.objects and bpy.context.scene.frame_end >= int(12 * rate)
+    assert (scene.render.fps, scene.render.fps_base) == (24, pytest.approx(1.001))
+    bpy.ops.ed.undo()
+    assert state() == synthesized
+    bpy.ops.ed.undo()
+    assert [player.take for player in bpy.context.scene.beyond_mocap.players] == ["", ""]
+    bpy.ops.ed.undo()
+    assert bpy.context.scene.beyond_mocap.library_holds == ""
+    for _ in range(3):
+        bpy.ops.ed.redo()
+    assert state() == baked
+
+
+def test_baking_again_replaces_the_take_only(extension, ready, session):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.bake()
+    once = state()
+    ready.seed = 1
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.bake()
+    assert {kind: state()[kind] for kind in ("objects", "actions", "meshes", "curves", "armatures")} == {
+        kind: once[kind] for kind in ("objects", "actions", "meshes", "curves", "armatures")}
+    bpy.data.objects.remove(ready.players[0].body)
+    bpy.ops.beyond_mocap.bake()
+    assert ready.players[0].body is not None
+
+
+def test_the_ball_lies_where_the_file_says_and_rolls(extension, ready, session):
+    bpy.context.scene.render.fps = 10
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.bake()
+    ball = bpy.data.objects["Ball"]
+    bpy.context.scene.frame_set(1 + 50)
+    at, angle = 3.0 * 5.0, -0.08 * 5.0
+    np.testing.assert_allclose(ball.location, [at * np.cos(angle) + 0.6, at * np.sin(angle), 0.11], atol=0.05)
+    turned = ball.rotation_quaternion.copy()
+    bpy.context.scene.frame_set(1 + 51)
+    moved = turned.rotation_difference(ball.rotation_quaternion).angle
+    assert moved == pytest.approx(0.3 / 0.11, rel=0.1)
+
+
+def test_another_unit_scale(ready, session):
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.bake()
+    bpy.context.scene.frame_set(1 + 24 * 6)
+    body = ready.players[0].body
+    hips = body.matrix_world @ body.pose.bones[0].matrix
+    assert hips.translation.xy.length == pytest.approx(100 * 18, rel=0.05)
+    assert 70 < hips.translation.z < 120
+
+
+@pytest.mark.parametrize("operator, message", [
+    ("build_library", "Choose the library's folder first"),
+    ("synthesize", "Choose the library's folder"),
+    ("bake", "Synthesize first"),
+    ("import_tracking", "no file given"),
+])
+def test_nothing_filled_in(operator, message):
+    before = state()
+    with pytest.raises(RuntimeError, match=message):
+        getattr(bpy.ops.beyond_mocap, operator)()
+    assert state() == before
+
+
+def refused(operator, message, **arguments):
+    """The operator reports `message` and the scene is as before."""
+    before = state()
+    with pytest.raises(RuntimeError, match=message):
+        operator(**arguments)
+    assert state() == before
+
+
+def test_missing_files_are_named(ready, match, tmp_path):
+    ready.library_folder = str(tmp_path / "nowhere")
+    refused(bpy.ops.beyond_mocap.build_library, "nowhere: no such folder")
+    refused(bpy.ops.beyond_mocap.synthesize, "nowhere: no such folder")
+    refused(bpy.ops.beyond_mocap.import_tracking, "missing.csv", filepath=str(tmp_path / "missing.csv"))
+    (match / "player1.csv").unlink()
+    refused(bpy.ops.beyond_mocap.synthesize, "player1.csv")
+
+
+@pytest.mark.parametrize("content, found", [
+    ("", "empty|form|time_s|expected"),
+    ("time_s,x_m\n0,1\n", "y_m"),
+    ("time_s,x_m,y_m\n0,a,1\n", "csv:2"),
+    ("a,b,c\n1,2,3\n", "expected"),
+])
+def test_bad_tracking(tmp_path, content, found):
+    path = tmp_path / "bad.csv"
+    path.write_text(content)
+    refused(bpy.ops.beyond_mocap.import_tracking, found, filepath=str(path))
+
+
+def test_words_that_the_library_lacks(ready, match):
+    (match / "player1.txt").write_text("6.0 header\n")
+    refused(bpy.ops.beyond_mocap.synthesize, "header")
+    ready.nearest = True
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    assert "header at 6.0 s: " in ready.players[0].quality
+
+
+def test_a_take_of_another_session(ready, session):
+    bpy.ops.beyond_mocap.synthesize()
+    session.clear()
+    refused(bpy.ops.beyond_mocap.bake, "synthesize again")
+
+
+def test_a_library_that_cannot_be_written(ready, library_folder, tmp_path):
+    locked = tmp_path / "locked"
+    locked.mkdir()
+    for name in CLIPS[:4]:
+        for suffix in (".bvh", ".txt"):
+            (locked / f"{name}{suffix}").symlink_to(SAMPLE / "library" / f"{name}{suffix}")
+    locked.chmod(0o500)
+    ready.library_folder = str(locked)
+    assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
+    locked.chmod(0o700)
+    if os.geteuid():
+        assert not (locked / ".beyond_mocap").exists()
