@@ -84,9 +84,15 @@ def support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> 
     return np.where(contacts, lower, np.nan)
 
 
-def heel_rest_height(feet: np.ndarray) -> float:
-    """Height of the heel joint in a flat stance, m: 2nd percentile over feet (T, 2, 2, 3), as the floor is of toes."""
-    return float(np.percentile(feet[..., 0, 2], 2)) if feet.size else np.nan
+def heel_rest_height(feet: np.ndarray, contacts: np.ndarray) -> float:
+    """Height of the heel joint on a flat foot, m: 2nd percentile over feet (T, 2, 2, 3) while both are in contact (T,
+    2).
+
+    Over all frames where they never are, as in a run; NaN for no frames.
+    """
+    both = contacts.all(axis=1)
+    heights = feet[both if both.any() else slice(None), :, 0, 2]
+    return float(np.percentile(heights, 2)) if heights.size else np.nan
 
 
 def planted_shift(feet: np.ndarray, wanted: np.ndarray, contacts: np.ndarray) -> np.ndarray:

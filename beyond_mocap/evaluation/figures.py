@@ -77,7 +77,7 @@ def skate_and_ground(view: View) -> dict:
     travel = feet.stance_travel(planted[:, :, 1], feet.stances(played.contacts))
     own = np.zeros(0) if view.reference is None else view.reference.used_stances(view.used)
     skating = feet.skating_steps(planted[:, :, 1], floor_height(played.motion), fps)
-    heel_rest = feet.heel_rest_height(planted) if view.reference is None else view.reference.heel_rest
+    heel_rest = feet.heel_rest_height(planted, played.contacts) if view.reference is None else view.reference.heel_rest
     support = feet.support_height(planted, played.contacts, heel_rest)
     return {
         "skate": {
@@ -185,7 +185,8 @@ def asked_words(
 
 
 def filled_timeline(view: View) -> Timeline:
-    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet (Faustino §3.1.1)."""
+    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet (Faustino
+    §3.1.1)."""
     if view.library is None or view.track is None:
         return view.timeline
     try:

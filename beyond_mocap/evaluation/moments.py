@@ -66,7 +66,8 @@ def _frame_at(played: Played, frame: float) -> int:
 
 
 def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, library: Library | None):
-    """The library's key that the run plays: carrying the asked words if any does, then nearest to what `frame` shows."""
+    """The library's key that the run plays: carrying the asked words if any does, then nearest to what `frame`
+    shows."""
     if library is None or played.clip[run[0]] < 0:
         return None
     path, side = played.clips[played.clip[run[0]]], bool(played.mirrored[run[0]])

@@ -13,7 +13,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..library.library import Clip, Library
-from ..motion.contacts import floor_height
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
 from . import feet, jerk, realism, root
@@ -27,8 +26,8 @@ class Recording:
     """One uncut clip at the output's rate, T frames, measured.
 
     features (T, 6 J) float32 m, of `realism.pose_features`. sway, surge, speed (T,): m, m/s, m/s. contact_speed (T, 2)
-    m/s, NaN without contact. skating (T,) bool. support (T, 2) m. jerk (T-3,) m/s^3. stances (S, 3) of its own frames
-    and their travel (S,) m.
+    m/s, NaN without contact. skating (T,) bool. heel_rest: height of its heel joint on a flat foot, m. support (T, 2)
+    m. jerk (T-3,) m/s^3. stances (S, 3) of its own frames and their travel (S,) m.
     """
 
     path: str
@@ -39,6 +38,7 @@ class Recording:
     speed: np.ndarray
     contact_speed: np.ndarray
     skating: np.ndarray
+    heel_rest: float
     support: np.ndarray
     jerk: np.ndarray
     stances: np.ndarray
@@ -108,8 +108,7 @@ def library_reference(library: Library, fps: float) -> LibraryReference:
 def build_reference(library: Library, fps: float) -> LibraryReference:
     """Measures every recording of a library at `fps` frames per second."""
     originals, twins = _originals(library.clips)
-    heel_rest = _heel_rest(originals)
-    measured = [measure(clip, fps, heel_rest) for clip in originals]
+    measured = [measure(clip, fps) for clip in originals]
     lengths = [len(recording.sway) for recording in measured]
     first = np.concatenate([[0], np.cumsum(lengths)])
     windows = [jerk.uncut_windows(recording.jerk, recording.speed) for recording in measured]
@@ -124,7 +123,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         jerk_above_real=np.concatenate([_above(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
         travel=_joined(measured, "travel"),
-        heel_rest=heel_rest,
+        heel_rest=float(np.median([recording.heel_rest for recording in measured])),
         jerk_p95=jerk_p95,
         poses=poses,
         pose_p95=pose_p95,
@@ -151,21 +150,8 @@ def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
     return list(chosen.values()), np.array([count[path] > 1 for path in chosen])
 
 
-def _heel_rest(clips: list[Clip]) -> float:
-    """Height of the heel joint in a flat stance, m, over all clips."""
-    heights = [feet.heel_rest_height(_foot_positions(clip.motion)[clip.contacts.all(axis=1)]) for clip in clips]
-    known = [height for height in heights if np.isfinite(height)]
-    if known:
-        return float(np.median(known))
-    return float(np.median([feet.heel_rest_height(_foot_positions(clip.motion)) for clip in clips]))
-
-
-def _foot_positions(motion) -> np.ndarray:
-    return forward_kinematics(motion)[0][:, feet.foot_joints(motion.skeleton)]
-
-
-def measure(clip: Clip, fps: float, heel_rest: float) -> Recording:
-    """One clip at `fps`, uncut, measured frame by frame. heel_rest: height of the heel joint on a flat foot, m."""
+def measure(clip: Clip, fps: float) -> Recording:
+    """One clip at `fps`, uncut, measured frame by frame; its floor is at height 0."""
     motion = resample(clip.motion, fps)
     skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
     positions = forward_kinematics(motion)[0]
@@ -173,6 +159,7 @@ def measure(clip: Clip, fps: float, heel_rest: float) -> Recording:
     at = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
     contacts = clip.contacts[at]
     spans = feet.stances(contacts)
+    heel_rest = feet.heel_rest_height(planted, contacts)
     return Recording(
         path=clip.path,
         rate=clip.motion.fps,
@@ -181,7 +168,8 @@ def measure(clip: Clip, fps: float, heel_rest: float) -> Recording:
         surge=root.surge(pelvis, fps),
         speed=root.travel_speed(pelvis, fps),
         contact_speed=np.concatenate([feet.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
-        skating=np.append(feet.skating_steps(planted[:, :, 1], floor_height(clip.motion), fps), False),
+        skating=np.append(feet.skating_steps(planted[:, :, 1], 0.0, fps), False),
+        heel_rest=heel_rest,
         support=feet.support_height(planted, contacts, heel_rest),
         jerk=jerk.jerk(positions, fps),
         stances=spans,
