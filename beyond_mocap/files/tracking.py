@@ -229,29 +229,41 @@ def _arrays(dataset, path: Path, pitch: tuple[float, float] | None) -> dict[str,
     records = [frame for frame in dataset.records if frame.players_data or frame.ball_coordinates is not None]
     if len(records) < 2:
         raise InputError(path, f"{len(records)} frames with anybody in them", "a match")
-    times, starts = _clock(records)
+    times, periods = _clock(records)
     players = sorted({player for frame in records for player in frame.players_data}, key=_shirt)
-    row = {player.player_id: index for index, player in enumerate(players)}
-    positions = np.full((len(players), len(records), 2), np.nan)
-    ball = np.full((len(records), 3), np.nan)
-    for index, frame in enumerate(records):
-        for player, data in frame.players_data.items():
-            if data.coordinates is not None:
-                positions[row[player.player_id], index] = data.coordinates.x, data.coordinates.y
-        point = frame.ball_coordinates
-        if point is not None:
-            ball[index] = point.x, point.y, _height(point)
     length, width, guessed = _pitch(dataset, pitch)
-    upward = path.suffix.lower() == ".csv"
-    to_metres = _metric(dataset.metadata.coordinate_system, length, width, upward)
+    to_metres = _metric(dataset.metadata.coordinate_system, length, width, path.suffix.lower() == ".csv")
+    ball = _ball_samples(records)
     return {
         "times": times,
-        "positions": to_metres(positions),
+        "positions": to_metres(_player_samples(records, players)),
         "ball": np.concatenate([to_metres(ball[:, :2]), ball[:, 2:] * _unit(dataset)], axis=1),
         "players": np.array([_described(player) for player in players], dtype=str).reshape(len(players), 4),
         "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]),
-        "periods": np.array(starts),
+        "periods": np.array(periods),
     }
+
+
+def _player_samples(records, players) -> np.ndarray:
+    """(P, N, 2) in the provider's coordinates, NaN where a player is not there."""
+    row = {player.player_id: index for index, player in enumerate(players)}
+    out = np.full((len(players), len(records), 2), np.nan)
+    for index, frame in enumerate(records):
+        for player, data in frame.players_data.items():
+            if data.coordinates is not None:
+                out[row[player.player_id], index] = data.coordinates.x, data.coordinates.y
+    return out
+
+
+def _ball_samples(records) -> np.ndarray:
+    """(N, 3) in the provider's coordinates, NaN where unknown; many feeds have no height."""
+    out = np.full((len(records), 3), np.nan)
+    for index, frame in enumerate(records):
+        point = frame.ball_coordinates
+        if point is not None:
+            height = getattr(point, "z", None)
+            out[index] = point.x, point.y, np.nan if height is None else height
+    return out
 
 
 def _clock(records) -> tuple[np.ndarray, list[tuple[float, float]]]:
@@ -274,11 +286,6 @@ def _shirt(player) -> tuple[str, int, str]:
 def _described(player) -> tuple[str, str, str, str]:
     id_, shirt = str(player.player_id), player.jersey_no
     return id_, str(player.team.ground), player.name or id_, str(-1 if shirt is None else shirt)
-
-
-def _height(point) -> float:
-    height = getattr(point, "z", None)
-    return np.nan if height is None else height
 
 
 def _pitch(dataset, pitch: tuple[float, float] | None) -> tuple[float, float, bool]:

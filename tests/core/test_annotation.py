@@ -116,13 +116,14 @@ spans = st.builds(lambda pair, w: Span(*pair, w), stretches, words)
 keys = st.builds(KeyMoment, seconds, words.filter(bool))
 
 
+@settings(deadline=None)
 @given(st.builds(Timeline, st.lists(spans, max_size=5).map(tuple), st.lists(keys, max_size=4).map(tuple)))
 def test_what_is_written_reads_back_equal(timeline):
     assert parse_timeline(format_timeline(timeline)) == timeline
 
 
+@settings(max_examples=200, deadline=None)
 @given(st.text(alphabet=st.characters(codec="utf-8"), max_size=200))
-@settings(max_examples=200)
 def test_any_text_is_read_or_refused_in_one_line(text):
     try:
         timeline = parse_timeline(text, "a.txt", fps=30)
@@ -135,6 +136,7 @@ def test_any_text_is_read_or_refused_in_one_line(text):
 TOKENS = "0 1 2.5 9f -3 1e400 nan inf kick walking transition unit frames # x".split()
 
 
+@settings(deadline=None)
 @given(st.lists(st.sampled_from(TOKENS), max_size=12))
 def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
     try:
@@ -234,6 +236,7 @@ def test_automatic_gaits_fill_what_is_left_open():
     assert filled.keys == (KeyMoment(3.0, ("kick",)),)
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-1, 11), st.floats(0.01, 4), st.booleans()), max_size=6),
     st.lists(st.sampled_from(["walking", "running"]), min_size=2, max_size=60),
@@ -278,6 +281,7 @@ def test_a_speed_at_the_boundary_does_not_flicker():
     assert plain > 60 and steady < plain / 8
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(0, 12), max_size=80), st.integers(1, 5))
 def test_gaits_are_in_range_and_last(speed, count):
     speeds = np.linspace(0.2, 8.0, count)
@@ -346,6 +350,7 @@ def test_mistakes_in_the_table_name_their_line(tmp_path, text, part):
     assert part in str(caught.value) and "annotations.csv" in str(caught.value)
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=120))
 def test_any_table_is_read_or_refused(tmp_path_factory, content):
     file = tmp_path_factory.mktemp("fuzz") / "annotations.csv"

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError
 from .data import Track
-from .sampling import GAP_INTERVALS
+from .sampling import GAP_INTERVALS, LONG_GAP
 
 FASTEST = 12.0
 """m/s; nobody runs faster, so a sample that wants it is wrong."""
@@ -24,6 +24,7 @@ _EXCURSION = 0.5  # seconds that a feed may be away and still be seen to return
 _COAST = (0.2, 0.9)  # seconds before a snap that are not believed: at least, and at most while the feed coasts
 _CATCH_UP = 3.0  # m/s; so much faster than before may a snap be made up for, which asks for more seconds than the least
 _COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
+_STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
 _SNAP_LIMIT = 3.0  # metres; a longer step is another player, or truth: told, not repaired
 _LEAN = 0.3  # seconds whose slope is the velocity next to a gap
 _LONGEST_GAP = 3600.0
@@ -154,6 +155,8 @@ def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tup
         if back is not None:
             used.add(back)
             wrong[left[jump + 1 : back + 1]] = True
+        elif min(jump + 1, len(left) - 1 - jump) <= _STRAY:
+            wrong[left[: jump + 1] if jump < _STRAY else left[jump + 1 :]] = True
         elif np.linalg.norm(excess[place]) > _SNAP_LIMIT:
             too_far.append(float(times[left[jump + 1]]))
         else:
@@ -165,17 +168,27 @@ def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """(N,) bool: single samples far off the line between their neighbours, while the neighbours' own lines are better.
 
     A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
-    off theirs equally, so neither stands out and steps are left to `_jumps`.
+    off theirs equally, so neither stands out and steps are left to `_jumps`. The first and last sample have one
+    neighbour only: they count as off the line of the third and fourth, or their own strays would blame the second.
     """
     wrong = np.zeros(len(times), dtype=bool)
-    if len(times) < 3:
+    if len(times) < 5:
         return wrong
-    span = times[2:] - times[:-2]
-    share = ((times[1:-1] - times[:-2]) / span)[:, None]
-    off = np.linalg.norm(positions[1:-1] - positions[:-2] * (1 - share) - positions[2:] * share, axis=1)
-    beside = np.pad(off, 1)
-    wrong[1:-1] = (off > _SPIKE + _HARDEST / 8.0 * span**2) & (off > 1.5 * np.maximum(beside[:-2], beside[2:]))
+    off = _off_line(times[1:-1], positions[1:-1], times[:-2], positions[:-2], times[2:], positions[2:])
+    first, last = (_off_line(times[i], positions[i], times[j], positions[j], times[k], positions[k]) for i, j, k in _ENDS)
+    beside = np.concatenate([[first], off, [last]])
+    far = off > _SPIKE + _HARDEST / 8.0 * (times[2:] - times[:-2]) ** 2
+    wrong[1:-1] = far & (off > 1.5 * np.maximum(beside[:-2], beside[2:]))
     return wrong
+
+
+_ENDS = ((0, 2, 3), (-1, -3, -4))
+
+
+def _off_line(time, place, time_a, place_a, time_b, place_b) -> np.ndarray:
+    """(...,) metres from `place` (..., 2) to where the straight, steady way from a to b is at `time` (...,)."""
+    share = np.asarray((time - time_a) / (time_b - time_a))[..., None]
+    return np.linalg.norm(place - place_a * (1 - share) - place_b * share, axis=-1)
 
 
 def _jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
@@ -271,37 +284,49 @@ def _cubic(at: np.ndarray, before, after) -> np.ndarray:
 
 
 def _report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
-    interval = track.interval
-    believed = np.flatnonzero(track.measured)
-    wide = np.flatnonzero(np.diff(track.times[believed]) > GAP_INTERVALS * interval + 1e-9)
-    gaps = tuple((float(track.times[believed[i]]), float(track.times[believed[i + 1]])) for i in wide)
-    warnings = [f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}"] if snaps else []
-    speed = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
-    fast = track.times[1:][speed > FASTEST]
-    if len(fast):
-        warnings.append(f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}")
-    warnings += [f"no samples from {a:.2f} to {b:.2f} s" for a, b in gaps if b - a > 1.0]
-    lines = list(notes)
-    for count, what, where in (
-        (track.filled.sum(), "samples filled", track.times[track.filled]),
-        (track.outlier.sum(), "outliers replaced", track.times[track.outlier]),
-    ):
-        if count:
-            lines.append(f"{count} {what}: {_stretches(where, interval)}")
-    unknown = int(np.count_nonzero(~np.isfinite(track.ball[:, :2]).all(axis=1)))
-    if 0 < unknown < len(track):
-        lines.append(f"ball unknown in {unknown} of {len(track)} samples")
+    gaps = _gaps(track)
+    warnings = _warnings(track, snaps, gaps)
     return DataReport(
-        lines=(*lines, *warnings),
-        rate=1.0 / interval,
+        lines=(*notes, *_replacements(track), *warnings),
+        rate=1.0 / track.interval,
         dropped=dropped,
         merged=merged,
         filled=int(track.filled.sum()),
         outliers=int(track.outlier.sum()),
         gaps=gaps,
-        ball_unknown=unknown,
+        ball_unknown=int(np.count_nonzero(_no_ball(track))),
         warnings=tuple(warnings),
     )
+
+
+def _gaps(track: Track) -> tuple[tuple[float, float], ...]:
+    """(start, end) seconds wherever measured samples are more than three intervals apart."""
+    times = track.times[track.measured]
+    wide = np.flatnonzero(np.diff(times) > GAP_INTERVALS * track.interval + 1e-9)
+    return tuple((float(times[i]), float(times[i + 1])) for i in wide)
+
+
+def _no_ball(track: Track) -> np.ndarray:
+    return ~np.isfinite(track.ball[:, :2]).all(axis=1)
+
+
+def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[str]:
+    """What was left as it is although nobody should believe it."""
+    speed = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
+    fast = track.times[1:][speed > FASTEST]
+    out = [f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}"] if snaps else []
+    out += [f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}"] if len(fast) else []
+    return out + [f"no samples from {a:.2f} to {b:.2f} s" for a, b in gaps if b - a > LONG_GAP]
+
+
+def _replacements(track: Track) -> list[str]:
+    """What was put in and replaced, and how much of the ball is missing."""
+    marked = (("samples filled", track.filled), ("outliers replaced", track.outlier))
+    out = [f"{m.sum()} {what}: {_stretches(track.times[m], track.interval)}" for what, m in marked if m.any()]
+    unknown = _no_ball(track)
+    if unknown.any() and not unknown.all():
+        out.append(f"ball unknown in {unknown.sum()} of {len(track)} samples")
+    return out
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:

@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.errors import InputError
@@ -113,6 +113,7 @@ def test_mistakes_name_their_line(tmp_path, reader, text, part):
     assert part in str(caught.value) and "t.csv" in str(caught.value)
 
 
+@settings(deadline=None)
 @given(st.sampled_from(READERS), st.booleans(), st.binary(max_size=120))
 def test_any_content_is_read_or_refused(tmp_path_factory, reader, headed, content):
     file = tmp_path_factory.mktemp("fuzz") / "t.csv"

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.errors import InputError
@@ -123,6 +123,7 @@ def test_files_that_are_no_table_are_refused(tmp_path):
 NEARLY_NUMBERS = st.text("0123456789.,-en\r\n\"", max_size=150).map(str.encode)
 
 
+@settings(deadline=None)
 @given(st.booleans(), st.one_of(st.binary(max_size=150), NEARLY_NUMBERS))
 def test_any_content_is_read_or_refused(tmp_path_factory, headed, content):
     file = tmp_path_factory.mktemp("fuzz") / "t.csv"

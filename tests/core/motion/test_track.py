@@ -65,6 +65,16 @@ def test_planted_spikes_are_found_and_nothing_else(rate, size):
     assert report.outliers == 4 and f"{track.times[places[0]]:.2f}" in report.lines[0]
 
 
+@pytest.mark.parametrize("place", [0, 1, -2, -1])
+def test_spikes_at_the_ends_are_found(place):
+    track, truth = made()
+    positions = track.positions.copy()
+    positions[place] += (0.9, 0.5)
+    cleaned, _ = clean(Track(track.times, positions))
+    assert np.flatnonzero(cleaned.outlier).tolist() == [place % len(track)]
+    assert distance(cleaned.positions, truth).max() < 0.1
+
+
 def test_a_feed_that_is_away_for_some_samples_is_mended():
     track, truth = made()
     positions = track.positions.copy()
@@ -117,6 +127,24 @@ def test_a_long_gap_is_not_standing_and_is_warned_of():
     assert not sampled.valid[inside].any() and sampled.valid[sampled.times < 5.9].all()
     assert sampled.speed[inside].min() > 1.0
     assert any("no samples from" in line for line in report.warnings)
+
+
+@pytest.mark.parametrize("rate", [10.0, 20.0, 50.0])
+def test_everything_at_once_is_still_the_same_run(rate):
+    rng = np.random.default_rng(11)
+    track, truth = made(rate, noise=0.01, seed=4)
+    positions = track.positions.copy()
+    places = np.array([0.15, 0.45, 0.75]) * len(track)
+    positions[places.astype(int)] += (0.7, -0.6)
+    positions[int(0.3 * len(track))] = np.nan
+    keep = np.abs(track.times - 12.0) > 0.4
+    shuffled = rng.permutation(np.flatnonzero(keep))
+    cleaned, report = clean(Track(track.times[shuffled], positions[shuffled]))
+    np.testing.assert_allclose(cleaned.times, track.times, atol=1e-9)
+    assert report.outliers == 3 and report.filled == 1 + np.count_nonzero(~keep)
+    sampled = sample(cleaned, 30)
+    error = distance(sampled.positions, path(sampled.times))
+    assert error.mean() < 0.02 and error.max() < 0.2
 
 
 def test_missing_positions_keep_the_clock():
