@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 import tempfile
-import zipfile
 from dataclasses import asdict
 from pathlib import Path
 
@@ -47,7 +46,7 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
     beside = folder / CACHE_FOLDER
     if os.access(beside if beside.is_dir() else folder, os.W_OK):
         return beside, ""
-    base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     name = hashlib.blake2b(str(folder.absolute()).encode()).hexdigest()[:16]
     elsewhere = Path(base) / "beyond_mocap" / name
     return elsewhere, f"{folder} cannot be written: its cache is kept in {elsewhere}"
@@ -103,7 +102,7 @@ def load(place: Path, key: str):
             if header["key"] != key:
                 return None
             return _restore(header, {name: arrays[name] for name in arrays.files})
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+    except Exception:  # a damaged file can fail in any of zipfile's, numpy's, json's and our own ways
         return None
 
 
