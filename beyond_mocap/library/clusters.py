@@ -8,6 +8,7 @@ and the clusters come out within a percent of those in all dimensions in a tenth
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,10 +66,12 @@ def _kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.n
     One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ.
     """
     from sklearn.cluster import KMeans
+    from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits
 
     step = -(-len(points) // MOST_FITTED)
-    with threadpool_limits(limits=1):
+    with threadpool_limits(limits=1), warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # fewer different blocks than clusters: fewer clusters then
         fit = KMeans(min(count, len(points[::step])), n_init=1, max_iter=60, tol=1e-3, random_state=seed)
         fit.fit(points[::step])
         label = fit.labels_ if step == 1 else fit.predict(points)
