@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 
 from ..errors import InputError
-from .timeline import NUMBER, KeyMoment, Span, Timeline
+from .timeline import LONGEST_TIME, NUMBER, KeyMoment, Span, Timeline
 
 _FORM = "'START END words...' or 'TIME words...'"
 _LARGEST_FILE = 16 * 1024 * 1024
@@ -91,7 +91,7 @@ def _leading_numbers(tokens: list[str], place: str) -> list[str]:
 def _seconds(token: str, unit: str, fps: float | None, start: float, place: str) -> float:
     in_frames = token[-1] in "fF"
     value = float(token[:-1] if in_frames else token)
-    if abs(value) > 1e9:
+    if not abs(value) <= LONGEST_TIME:
         raise InputError(place, f"the time {token}", "a time within the track")
     if not in_frames and unit == "seconds":
         return value

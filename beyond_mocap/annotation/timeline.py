@@ -18,6 +18,9 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
 EDGE_TOLERANCE = 0.1
 """Seconds by which a time may lie outside the track: one sample of a 10 Hz feed."""
 
+LONGEST_TIME = 1e11
+"""Seconds from 0 that a time may lie: feeds count from kick-off, some from 1970."""
+
 _SAME_TIME = 1e-6
 
 
@@ -31,8 +34,8 @@ def _checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
 
 def _checked_time(value: float, where: str) -> float:
     time = float(value)
-    if not math.isfinite(time):
-        raise InputError(where, f"the time {time}", "a finite number of seconds")
+    if not abs(time) <= LONGEST_TIME:
+        raise InputError(where, f"the time {time:g}", "a time within the track, in seconds")
     return time
 
 

@@ -110,7 +110,7 @@ def test_an_empty_file_means_all_automatic():
 
 
 words = st.lists(st.from_regex(r"[a-z_]{1,8}", fullmatch=True).filter(lambda w: w != "unit"), max_size=4).map(tuple)
-seconds = st.floats(-1e6, 1e6).filter(lambda t: abs(t) > 1e-300 or t == 0.0)
+seconds = st.floats(-1e10, 1e10)
 stretches = st.tuples(seconds, seconds).map(sorted).filter(lambda pair: pair[0] < pair[1])
 spans = st.builds(lambda pair, w: Span(*pair, w), stretches, words)
 keys = st.builds(KeyMoment, seconds, words.filter(bool))

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from beyond_mocap.annotation import Timeline
 from beyond_mocap.errors import InputError
 from beyond_mocap.files.tables import (
     Provenance,
@@ -19,7 +20,9 @@ from beyond_mocap.files.tables import (
     write_provenance,
     write_report,
 )
-from beyond_mocap.take import BallPath
+from beyond_mocap.motion.motion import Motion
+from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.take import BallPath, Take
 
 READERS = (read_provenance, read_ball, read_curve)
 HEADERS = {
@@ -48,6 +51,31 @@ def test_provenance_comes_back(tmp_path):
     assert back.clip == wrote.clip and back.words == wrote.words
     for name in ("times", "clip_frame", "mirrored", "contacts"):
         np.testing.assert_allclose(getattr(back, name), getattr(wrote, name), atol=1e-6)
+
+
+def test_a_take_tells_where_its_frames_came_from(tmp_path):
+    motion = Motion(Skeleton(("hips",), (-1,), np.zeros((1, 3))), np.zeros((2, 3)), [[[1.0, 0, 0, 0]]] * 2, 30.0)
+    take = Take(
+        motion=motion,
+        start_time=4.0,
+        clips=("run.bvh", "kick.bvh"),
+        clip=np.array([1, 0]),
+        clip_frame=np.array([7.5, 2.0]),
+        mirrored=np.array([True, False]),
+        words=(("kick", "left"), ("running",)),
+        contacts=np.array([[True, False], [False, True]]),
+        seams=np.array([1]),
+        timeline=Timeline(),
+        keys=(),
+        ball=None,
+        method="path",
+        seed=0,
+    )
+    write_provenance(tmp_path / "p.csv", take)
+    assert (tmp_path / "p.csv").read_text(encoding="utf-8").splitlines()[1:] == [
+        "0,4.000000,kick.bvh,7.5000,1,kick left,1,0",
+        "1,4.033333,run.bvh,2.0000,0,running,0,1",
+    ]
 
 
 def test_the_ball_comes_back_with_its_unknowns(tmp_path):
