@@ -44,7 +44,7 @@ def _read_fast(text: bytes) -> np.ndarray | None:
     if not len(ends) or powers is None:
         return None
     plain, mantissa_ends, exponent = powers
-    decimals = _decimals(characters, ends, mantissa_ends)
+    decimals = None if _hollow(characters, mantissa_ends) else _decimals(characters, ends, mantissa_ends)
     digits = _integers(plain.translate(None, b"."), len(ends))
     if decimals is None or digits is None:
         return None
@@ -64,6 +64,13 @@ def _integers(text: bytes, count: int) -> np.ndarray | None:
     except (ValueError, DeprecationWarning):
         return None
     return digits if len(digits) == count else None
+
+
+def _hollow(characters: np.ndarray, ends: np.ndarray) -> bool:
+    """Whether some number has no digits, which `numpy.fromstring` takes for zero: a sign, a point, or both."""
+    last = characters[ends - 1]
+    before_point = characters[ends[last == _POINT] - 2] - np.uint8(ord("0"))
+    return bool(np.any((last == _MINUS) | (last == _PLUS)) or np.any(before_point > 9))
 
 
 def _decimals(characters: np.ndarray, ends: np.ndarray, mantissa_ends: np.ndarray) -> np.ndarray | None:
