@@ -143,7 +143,7 @@ def _place(stage, name: str, data) -> bpy.types.Object:
 
 def _sun(stage) -> None:
     light = bpy.data.lights.new("Sun", "SUN")
-    light.energy, light.angle = 3.2, 0.03
+    light.energy, light.angle = 2.8, 0.03
     _place(stage, "Sun", light).rotation_euler = (0.75, 0.25, 0.5)
 
 
@@ -168,5 +168,5 @@ def _sky() -> bpy.types.World:
         world.use_nodes = True
     background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
     background.inputs["Color"].default_value = (0.55, 0.68, 0.85, 1.0)
-    background.inputs["Strength"].default_value = 0.8
+    background.inputs["Strength"].default_value = 1.1
     return world

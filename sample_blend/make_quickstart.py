@@ -1,0 +1,89 @@
+"""Writes quickstart.blend beside this file: a pitch, a camera, and settings filled in for the sample, with paths relative
+to the file, so that three buttons lead to two moving players.
+
+    .venv-4.5/bin/python sample_blend/make_quickstart.py
+
+Run it with Blender 4.5 as a Python module: newer Blenders open what that one writes, not the other way round.
+"""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import shutil
+import sys
+import tempfile
+
+import demo
+
+OUT = demo.HERE / "quickstart.blend"
+HOW_TO = """Beyond Mocap: quickstart
+
+In the 3D view press N and choose the tab "Beyond Mocap", then press from top to bottom:
+
+  1  Build Library    reads the clips in the folder "library"
+  3  Synthesize       finds clips for both players' tracks and words
+  4  Bake             puts them onto armatures, with the ball
+
+Press Space to play.
+The words of the first player are in the text "player1 words" (Text Editor): change them and
+press Synthesize and Bake again.
+"""
+
+
+def words_as_texts(bpy, settings) -> None:
+    """Each player's words as a text of the file, where they can be edited without leaving Blender."""
+    for player in settings.players:
+        text = bpy.data.texts.new(f"{player.name} words")
+        text.write(pathlib.Path(player.annotation_file).read_text("utf-8"))
+        player.annotation_text = text
+
+
+def relative_paths(settings) -> None:
+    """Paths that go along when the folder is moved."""
+    def from_here(path: str) -> str:
+        return "//" + pathlib.Path(path).relative_to(demo.HERE).as_posix()
+
+    settings.library_folder = from_here(settings.library_folder)
+    for player in settings.players:
+        player.tracking_file, player.annotation_file = from_here(player.tracking_file), from_here(player.annotation_file)
+
+
+def open_the_tab(bpy) -> None:
+    """Sidebars open, and the view through the camera, wherever the file has windows; file browsers at no one's home."""
+    spaces = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
+    for space in spaces:
+        if space.type == "VIEW_3D":
+            space.show_region_ui = True
+            space.shading.type = "MATERIAL"
+            space.region_3d.view_perspective = "CAMERA"
+        elif space.type == "FILE_BROWSER" and space.params is not None:
+            space.params.directory = b"//"
+
+
+def main() -> int:
+    """Make the file."""
+    _, switch_off = demo.load_extension()
+    import bpy
+
+    if bpy.app.version >= (5, 0, 0):
+        print("this has to be run with Blender 4.5, so that 4.5 can open what it writes", file=sys.stderr)
+        return 2
+    demo.prepare(bpy)
+    scene = bpy.context.scene
+    scene.frame_end = 1201
+    words_as_texts(bpy, scene.beyond_mocap)
+    relative_paths(scene.beyond_mocap)
+    bpy.data.texts.new("Read me").write(HOW_TO)
+    open_the_tab(bpy)
+    with tempfile.TemporaryDirectory() as folder:  # Blender writes down where it saved a file: let that be nowhere
+        written = pathlib.Path(folder, OUT.name)
+        bpy.ops.wm.save_as_mainfile(filepath=str(written), compress=True, relative_remap=False)
+        shutil.move(written, OUT)
+    switch_off()
+    print(f"{OUT}: {os.path.getsize(OUT) / 1024:.0f} KB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
