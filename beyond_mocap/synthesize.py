@@ -38,7 +38,6 @@ from .synthesis.wanted import Wanted, wanted
 from .take import BallPath, KeyResult, Take
 
 Progress = Callable[[float, str], None]
-COVERAGE = 1.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +189,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         method=plan.method,
         seed=plan.seed,
         seconds=seconds,
-        warnings=(*library.notes, *order.warnings, *_coverage(library, track)),
+        warnings=(*library.notes, *order.warnings),
     )
 
 
@@ -209,16 +208,3 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
         shown = placed.clip_frame
     source = library.clips[clip]
     return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, key.used_instead)
-
-
-def _coverage(library: Library, track: SampledTrack) -> list[str]:
-    """A warning where the track is faster than anything recorded (../shared/metrics.md, speed coverage)."""
-    fastest = float(library.frames.speed.max())
-    above = np.flatnonzero(track.speed > COVERAGE * fastest)
-    if not len(above):
-        return []
-    share = len(above) / len(track.times)
-    return [
-        f"{len(above) / track.fps:.1f} s ({share:.0%}) ask for more than the library's fastest {fastest:.1f} m/s, first at "
-        f"{track.times[above[0]]:.1f} s: strides are stretched there"
-    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -26,10 +26,11 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     scores of the recordings beside ours.
     """
     report = evaluate_played(
-        played_from_take(take), track=track, timeline=take.timeline, library=library, warnings=take.warnings
+        played_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
-    return {**report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method}
+    warnings = [*take.warnings, *report["warnings"]]
+    return {**report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings}
 
 
 def evaluate_played(
@@ -39,7 +40,6 @@ def evaluate_played(
     timeline: Timeline | None = None,
     library: Library | None = None,
     ik_miss: np.ndarray | None = None,
-    warnings: Sequence[str] = (),
 ) -> dict:
     """The report of anything played, from memory or files (`played_from_take`, `played_from_tables`).
 
@@ -61,7 +61,7 @@ def evaluate_played(
         **figures.seams_and_loops(view),
         **figures.poses(view),
         "annotation_similarity": figures.annotation_similarity(view),
-        "warnings": [*warnings, *figures.coverage_warnings(view)],
+        "warnings": figures.coverage_warnings(view),
     }
     return rounded(report)
 
