@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..annotation import nearest
+from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest
 
 # a foot meets the ball in all of these: where one is lacking, another shows at least the same contact
 _FOOT_ON_BALL = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"}, {"stomp"})
@@ -43,14 +43,18 @@ def serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
 
 
 def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
-    """The keys whose words come nearest to `words`: most shared words, then fewest extra; none where nothing is shared
-    (a kick is no answer to a slide), except that a foot on the ball stands for a foot on the ball."""
+    """The keys whose words come nearest to `words`: most shared words, then fewest extra; none where the action itself is
+    not shared (a kick is no answer to a slide, and a right kick none to a right header), except that a foot on the ball
+    stands for a foot on the ball."""
     wanted = frozenset(words)
-    scores = [(len(wanted & key.words) + _same_contact(wanted, key.words), -len(key.words - wanted)) for key in keys]
-    best = max(scores, default=(0, 0))
-    if best[0] <= 0:
-        return ()
-    return tuple(key for key, score in zip(keys, scores) if score == best)
+    near = [key for key in keys if _actions(wanted) & key.words or _same_contact(wanted, key.words)]
+    scores = [(len(wanted & key.words) + _same_contact(wanted, key.words), -len(key.words - wanted)) for key in near]
+    return tuple(key for key, score in zip(near, scores) if score == max(scores))
+
+
+def _actions(words: frozenset[str]) -> frozenset[str]:
+    """The words that say what is done, not which side, at which pace: roots of App. A, else what is not a mere colour."""
+    return words & DISCRETE or words - CONTINUOUS - VOCABULARY["modifier"].keys() or words
 
 
 def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
