@@ -166,10 +166,12 @@ def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancell
 
 
 def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
-    """Rows cut to the clip; InputError for one that begins after its end."""
+    """Rows cut to the clip; InputError for one that begins, or has its key moment, after the clip's end."""
     for row in rows:
         if row.start >= count:
             raise InputError(path, f"a row that begins at frame {row.start:g}", f"frames 0 to {count - 1}", "mend the row")
+        if row.key is not None and row.key >= count:
+            raise InputError(path, f"a key moment at frame {row.key:g}", f"frames 0 to {count - 1}", "mend the row")
     return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
 
 
