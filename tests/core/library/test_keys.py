@@ -1,0 +1,76 @@
+"""Which key moments can serve which words, and what stands in where none does."""
+
+import pytest
+
+from beyond_mocap.library.keys import Key, nearest_serving, nearest_words, serving
+
+
+def key(words, clip=0):
+    return Key(clip, 10.0, 5.0, 15.0, frozenset(words.split()))
+
+
+LOW, TOP, VOLLEY, LEFT = (
+    key("kick low inside right running"), key("kick high top right"), key("kick low volley right"), key("kick low inside left"),
+)  # fmt: skip
+KICKS = (LOW, TOP, VOLLEY, LEFT)
+
+
+@pytest.mark.parametrize(
+    "words, keys",
+    [
+        ("kick", KICKS),
+        ("kick low", (LOW, VOLLEY, LEFT)),
+        ("inside kick", (LOW, LEFT)),
+        ("left kick", (LEFT,)),
+        ("kick bicycle", ()),
+        ("", KICKS),
+    ],
+)
+def test_a_key_serves_when_it_carries_all_words(words, keys):
+    assert serving(KICKS, words.split()) == keys
+
+
+@pytest.mark.parametrize(
+    "words, keys",
+    [
+        ("kick low outside right", (VOLLEY,)),  # as near as the others in what is shared, and with fewest words beyond
+        ("kick high top left", (TOP,)),
+        ("kick left running", (LEFT,)),
+        ("running receive foot", (LOW,)),  # a foot meets the ball
+        ("receive foot low inside", (LEFT,)),
+        ("dribble", (TOP, VOLLEY, LEFT)),
+    ],
+)
+def test_the_nearest_shares_most_and_has_least_beyond(words, keys):
+    found = nearest_serving(KICKS, words.split())
+    assert set(keys) <= set(found) and len({len(set(words.split()) & k.words) for k in found}) == 1
+
+
+@pytest.mark.parametrize(
+    "words", ["slide", "header", "right header", "running header", "receive body high", "jump slide right", "getting_up left", "throwb high"]
+)
+def test_a_kick_is_no_answer_to_another_action(words):
+    """Sharing a side, a pace or a height is not sharing the movement."""
+    assert nearest_serving(KICKS, words.split()) == ()
+
+
+def test_a_foot_on_the_ball_stands_for_a_foot_on_the_ball_only():
+    trap, body = key("receive foot low inside right"), key("receive body")
+    assert nearest_serving((trap, body), ["kick", "right"]) == (trap,)
+    assert nearest_serving((body,), ["kick", "right"]) == ()
+    assert nearest_serving((trap, body), ["receive", "high"]) == (body,)
+
+
+def test_own_words_of_the_user_name_an_action_too():
+    own = key("rabona right")
+    assert nearest_serving((own, LOW), ["rabona", "left"]) == (own,)
+    assert nearest_serving((own,), ["moonwalk"]) == ()
+
+
+def test_an_empty_library_of_keys():
+    assert serving((), ["kick"]) == nearest_serving((), ["kick"]) == () and nearest_words((), ["kick"]) == ()
+
+
+def test_nearest_words_are_offered_once_each():
+    offered = nearest_words((*KICKS, *KICKS), ["kick", "low", "left"], 3)
+    assert offered[0].split() == sorted(LEFT.words) and len(set(offered)) == 3
