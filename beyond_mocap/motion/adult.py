@@ -19,7 +19,7 @@ _CENTRE = (
     ("Spine1", "Spine", (4, 0, 72)),
     ("Spine2", "Spine1", (-5, 0, 75)),
     ("Neck", "Spine2", (-14, 0, 118)),
-    ("Head", "Neck", (13, 0, 52)),
+    ("Head", "Neck", (9, 0, 52)),
 )
 _ARM = (
     ("Shoulder", "Spine2", (2, 14, 92)),

@@ -255,18 +255,18 @@ def _trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) -> dic
     angle = {name: np.radians(at_speed(name, gear)) * ahead * wobble for name in ("pelvis_turn", "chest_turn", "list", "tilt", "lean")}
     pelvis = np.stack(
         [
-            angle["list"] * np.cos(turn - 2.0 * np.pi * 0.17) + 0.35 * lean[:, 0] + idle * 0.02 * _wander(course.times, seed + 1, 6.0),
+            angle["list"] * np.cos(turn - 2.0 * np.pi * 0.2) + 0.35 * lean[:, 0] + idle * 0.02 * _wander(course.times, seed + 1, 6.0),
             angle["tilt"] + 0.35 * lean[:, 1] + np.radians(1.0) * run_share(gear) * np.cos(2.0 * turn),
-            -angle["pelvis_turn"] * np.cos(turn + 2.0 * np.pi * 0.04 * run_share(gear)),
+            -angle["pelvis_turn"] * np.cos(turn + 2.0 * np.pi * 0.18 * run_share(gear)),
         ],
         axis=-1,
     )
     breath = idle * np.radians(0.9) * np.sin(2.0 * np.pi * 0.24 * course.times + seed)
     spine = np.stack(
         [
-            -0.85 * (angle["list"] * np.cos(turn - 2.0 * np.pi * 0.17)) + 0.35 * lean[:, 0],
+            -0.85 * (angle["list"] * np.cos(turn - 2.0 * np.pi * 0.2)) + 0.35 * lean[:, 0],
             angle["lean"] - angle["tilt"] + style.lean + 0.35 * lean[:, 1] - breath + 0.02 * np.sin(2.0 * turn) * run_share(gear),
-            style.twist * (angle["pelvis_turn"] + angle["chest_turn"]) * np.cos(turn),
+            style.twist * angle["chest_turn"] * np.cos(turn) - pelvis[:, 2],
         ],
         axis=-1,
     )

@@ -1,0 +1,246 @@
+"""Pictures of motions: rows of bodies rendered with Cycles on the CPU, to look at and to show.
+
+    python sample_blend/contact_sheet.py CLIP.bvh OUT.png [FIRST_SECOND LAST_SECOND [COUNT]]
+
+Bodies are skinned here, one mesh per moment, so no armature is needed; any Blender from 4.5 on, or pip's bpy.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import mathutils
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+if __name__ == "__main__":
+    sys.path.insert(0, str(HERE.parent))
+
+from beyond_mocap.files import bvh  # noqa: E402
+from beyond_mocap.motion.body import MATERIALS, BodyMesh, deformed, low_poly_body  # noqa: E402
+from beyond_mocap.motion.humanoid import heading  # noqa: E402
+from beyond_mocap.motion.motion import Motion, at_frames, place, pose_kinematics  # noqa: E402
+
+COLOURS = {
+    "skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84), "socks": (0.72, 0.06, 0.05),
+    "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02),
+}
+BLUE_TEAM = {"shirt": (0.05, 0.16, 0.55), "shorts": (0.04, 0.07, 0.22), "socks": (0.05, 0.16, 0.55)}
+BALL_RADIUS = 0.11
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Who is drawn: a motion on the pitch, the colours of the shirt, and how to skin it (made from the skeleton if None)."""
+
+    motion: Motion
+    colours: dict | None = None
+    body: BodyMesh | None = None
+
+
+def new_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
+    """An empty file with sun, sky and grass, set to render with Cycles on the CPU."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device = "CPU"
+    scene.cycles.samples = samples
+    scene.cycles.use_denoising = False
+    scene.cycles.max_bounces = 3
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.view_settings.view_transform = "Standard"
+    world = bpy.data.worlds.new("sky")
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs[0].default_value = (0.62, 0.76, 0.92, 1.0)
+    world.node_tree.nodes["Background"].inputs[1].default_value = 0.75
+    scene.world = world
+    light = bpy.data.lights.new("sun", "SUN")
+    light.energy, light.angle = 3.2, 0.03
+    sun = bpy.data.objects.new("sun", light)
+    sun.rotation_euler = (0.75, 0.15, -0.5)
+    scene.collection.objects.link(sun)
+    add_mesh("grass", [(-300, -300, 0), (300, -300, 0), (300, 300, 0), (-300, 300, 0)], [(0, 1, 2, 3)], [paint("grass", (0.10, 0.25, 0.07))])
+    return scene
+
+
+def paint(name: str, colour) -> bpy.types.Material:
+    """A plain matt material."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    shader = material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (*colour, 1.0)
+    shader.inputs["Roughness"].default_value = 0.85
+    return material
+
+
+def add_mesh(name: str, vertices, faces, materials, material=None, smooth: bool = False) -> bpy.types.Object:
+    """A mesh object in the scene; material: index per face."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([tuple(v) for v in np.asarray(vertices, dtype=float)], [], [tuple(f) for f in faces])
+    for entry in materials:
+        mesh.materials.append(entry)
+    if material is not None:
+        mesh.polygons.foreach_set("material_index", np.asarray(material, dtype=np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.full(len(mesh.polygons), smooth))
+    mesh.update()
+    thing = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None) -> None:
+    """The actor's body at fractional `frames` (N,), each moved by `moved` (N, 3) metres."""
+    body = actor.body or low_poly_body(actor.motion.skeleton)
+    root, local = at_frames(actor.motion, np.asarray(frames, dtype=float))
+    places, world = pose_kinematics(actor.motion.skeleton, root, local)
+    skins = deformed(body, actor.motion.skeleton, places, world)
+    colours = {**COLOURS, **(actor.colours or {})}
+    materials = [paint(name, colours[name]) for name in MATERIALS]
+    for i, vertices in enumerate(skins):
+        shifted = vertices if moved is None else vertices + moved[i]
+        add_mesh("body", shifted, body.faces, materials, body.material, smooth=True)
+
+
+def add_ribbon(points: np.ndarray, colour, width: float = 0.07, height: float = 0.012) -> None:
+    """A path (N, 2) in metres as a flat ribbon on the grass."""
+    way = np.gradient(np.asarray(points, dtype=float), axis=0)
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+    side = 0.5 * width * np.stack([-way[:, 1], way[:, 0]], axis=-1)
+    left, right = points + side, points - side
+    rows = np.concatenate([np.c_[left, np.full(len(left), height)], np.c_[right, np.full(len(right), height)]])
+    count = len(points)
+    add_mesh("path", rows, [(i, count + i, count + i + 1, i + 1) for i in range(count - 1)], [paint("path", colour)])
+
+
+def add_ball(centres: np.ndarray) -> None:
+    """The ball at `centres` (N, 3) metres."""
+    material = paint("ball", (0.9, 0.9, 0.88))
+    for centre in np.atleast_2d(centres):
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=20, ring_count=12, radius=BALL_RADIUS, location=tuple(centre))
+        ball = bpy.context.object
+        ball.data.materials.append(material)
+        ball.data.polygons.foreach_set("use_smooth", np.full(len(ball.data.polygons), True))
+
+
+def look(scene: bpy.types.Scene, eye, at, wide: float | None = None, lens: float = 50.0) -> None:
+    """A camera at `eye` that looks at `at`; `wide`: metres across for a parallel view, else `lens` millimetres."""
+    camera = bpy.data.cameras.new("camera")
+    camera.clip_end = 500.0
+    if wide is not None:
+        camera.type, camera.ortho_scale = "ORTHO", wide
+    camera.lens = lens
+    thing = bpy.data.objects.new("camera", camera)
+    thing.location = eye
+    direction = np.asarray(at, dtype=float) - np.asarray(eye, dtype=float)
+    thing.rotation_euler = mathutils.Vector(direction).to_track_quat("-Z", "Y").to_euler()
+    scene.collection.objects.link(thing)
+    scene.camera = thing
+
+
+def render(scene: bpy.types.Scene, path: Path) -> np.ndarray:
+    """Renders to `path` (PNG) and returns the picture (H, W, 4), top row first, 0 .. 1."""
+    scene.render.filepath = str(path)
+    scene.render.image_settings.file_format = "PNG"
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(image.size[1], image.size[0], 4)[::-1]
+
+
+def save(picture: np.ndarray, path: Path) -> None:
+    """A picture (H, W, 4) as PNG."""
+    height, width = picture.shape[:2]
+    image = bpy.data.images.new("sheet", width, height)
+    image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+
+
+def contact_sheet(actors, path_xy, ball, times, out_png, *, fps=None, columns: int = 3, tile=(480, 320), samples: int = 24) -> None:
+    """Tiles of a passage: the actors (list of Actor) on the pitch at `times` (N,) seconds, their tracks as ribbons.
+
+    path_xy: a list of (M, 2) arrays in metres, one per actor, or None. ball: function of seconds -> (3,) metres, or None. The
+    camera follows the actors from the side and above; each tile is one render, put together into `out_png`.
+    """
+    out = Path(out_png)
+    tiles = []
+    for index, moment in enumerate(times):
+        scene = new_scene(*tile, samples)
+        centres = []
+        for actor in actors:
+            frame = moment * actor.motion.fps
+            add_bodies(actor, np.array([frame]))
+            centres.append(at_frames(actor.motion, np.array([frame]))[0][0])
+        for points, actor in zip(path_xy or (), actors):
+            add_ribbon(np.asarray(points), (actor.colours or COLOURS).get("shirt", (1, 1, 1)))
+        if ball is not None:
+            add_ball(ball(moment))
+            centres.append(np.asarray(ball(moment)))
+        _follow(scene, np.array(centres))
+        tiles.append(render(scene, out.with_suffix(f".{index}.tile.png")))
+        out.with_suffix(f".{index}.tile.png").unlink()
+    save(_grid(tiles, columns), out)
+
+
+def _follow(scene, centres: np.ndarray) -> None:
+    middle = centres[0] * [1, 1, 0] + [0, 0, 0.85]
+    look(scene, middle + np.array([2.2, -6.0, 1.9]), middle, lens=45.0)
+
+
+def _grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
+    height, width = tiles[0].shape[:2]
+    rows = -(-len(tiles) // columns)
+    sheet = np.ones((rows * height, columns * width, 4), np.float32)
+    for i, tile in enumerate(tiles):
+        row, column = divmod(i, columns)
+        sheet[row * height : (row + 1) * height, column * width : (column + 1) * width] = tile
+    return sheet
+
+
+def strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12, width: int = 1300) -> None:
+    """One motion at `frames` (N,) side by side, seen from the side and (below) half from the front: for looking at a cycle.
+
+    ball (N, 3): where the ball is at these frames, or None. Figures face right; each stands `spacing` metres from the last.
+    """
+    frames = np.asarray(frames, dtype=float)
+    facing = float(heading(motion)[int(frames[0])])
+    out = Path(out_png)
+    pictures = []
+    for turned in (0.0, np.radians(-52.0)):
+        row = place(motion, turned - facing)
+        root, _ = at_frames(row, frames)
+        stand = spacing * np.arange(len(frames))
+        moved = np.stack([stand - root[:, 0], -root[:, 1], np.zeros(len(frames))], axis=-1)
+        scene = new_scene(width, int(width * 2.2 / (spacing * len(frames))), samples)
+        add_bodies(Actor(row), frames, moved)
+        if ball is not None:
+            centres = np.stack([place_point(b, turned - facing) for b in np.asarray(ball)])
+            add_ball(centres + moved)
+        middle = np.array([stand[-1] / 2, 0.0, 0.93])
+        look(scene, middle + np.array([0.0, -30.0, 4.0]), middle, wide=spacing * len(frames))
+        part = out.with_suffix(".part.png")
+        pictures.append(render(scene, part))
+        part.unlink()
+    save(np.concatenate(pictures, axis=0), out)
+
+
+def place_point(point: np.ndarray, angle: float) -> np.ndarray:
+    """A point (3,) turned about Z."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([cos * point[0] - sin * point[1], sin * point[0] + cos * point[1], point[2]])
+
+
+def main(arguments: list[str]) -> None:
+    clip, out, *span = arguments
+    motion = bvh.read(clip).motion
+    first, last = (float(span[0]), float(span[1])) if len(span) >= 2 else (0.5, 1.5)
+    frames = np.linspace(first, last, int(span[2]) if len(span) > 2 else 10) * motion.fps
+    strip(motion, frames, out)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
