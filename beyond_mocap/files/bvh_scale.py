@@ -45,6 +45,7 @@ def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> 
     """
     out = np.zeros((4, len(values)))
     out[0] = 1.0
+    columns = [(letter, column) for letter, column in columns if values[:, column].any()]  # many never move
     if not columns:
         return out
     numbers = [column for _, column in columns]

@@ -15,6 +15,7 @@ import warnings
 import numpy as np
 
 _SPACE, _PLUS, _MINUS, _POINT = 32, 43, 45, 46
+_LETTER, _LOWER_CASE = ord("e"), 32  # the bit that makes E an e
 _LARGEST_POWER = 22
 _EXACT_POWERS = 10.0 ** np.arange(_LARGEST_POWER + 1)
 _LARGEST = 2**53
@@ -38,21 +39,77 @@ def _read_fast(text: bytes) -> np.ndarray | None:
     if unusual.translate(None, b"eE"):
         return None
     characters = np.frombuffer(text, np.uint8)
-    blank = characters <= _SPACE
-    ends = np.flatnonzero(blank[1:] > blank[:-1]) + 1
-    powers = _cut_exponents(characters, ends) if unusual else (text, ends, 0)
-    if not len(ends) or powers is None:
+    found = _points_and_ends(characters, bool(unusual))
+    if found is None or _hollow(characters, *found[:2]):
         return None
-    plain, mantissa_ends, exponent = powers
-    decimals = None if _hollow(characters, mantissa_ends) else _decimals(characters, ends, mantissa_ends)
-    digits = _integers(plain.translate(None, b"."), len(ends))
-    if decimals is None or digits is None:
+    points, mantissa_ends, ends = found
+    decimals = np.where(points < 0, 0, mantissa_ends - points - 1)
+    if unusual:
+        cut = _cut_exponents(characters, mantissa_ends, ends)
+        if cut is None:
+            return None
+        text, exponents = cut
+        decimals -= exponents
+    digits = _integers(text.translate(None, b"."), len(ends))
+    if digits is None:
         return None
-    power = decimals - exponent
-    values = _scaled(digits, power)
-    for i in np.flatnonzero((np.abs(power) > _LARGEST_POWER) | (digits > _LARGEST) | (digits < -_LARGEST)):
-        values[i] = float(text[ends[i - 1] if i else 0 : ends[i]])
+    values = _scaled(digits, decimals)
+    for i in np.flatnonzero((np.abs(decimals) > _LARGEST_POWER) | (digits > _LARGEST) | (digits < -_LARGEST)):
+        values[i] = float(characters[ends[i - 1] if i else 0 : ends[i]].tobytes())
     return _shaped(values, characters, ends)
+
+
+def _points_and_ends(characters: np.ndarray, letters: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Where each number's point (-1: none), its mantissa's end and its own end are: three (numbers,).
+
+    `letters`: whether exponents occur. None where a number has two points or letters, or a point behind its letter.
+    """
+    blank = characters <= _SPACE
+    marked = characters == _POINT
+    marked[1:] |= blank[1:] > blank[:-1]
+    if letters:
+        marked |= (characters | _LOWER_CASE) == _LETTER
+    marks = np.flatnonzero(marked)
+    kinds = characters[marks]
+    if np.all(kinds[0::2] == _POINT) and np.all(kinds[1::2] <= _SPACE) and len(marks) % 2 == 0:
+        return marks[0::2], marks[1::2], marks[1::2]
+    at = np.flatnonzero(kinds <= _SPACE)
+    inside = np.diff(at, prepend=-1) - 1  # how many marks a number has before its end
+    lettered = (inside > 0) & (kinds[at - 1] > ord("9"))
+    pointed = (inside > lettered) & (kinds[at - 1 - lettered] == _POINT)
+    if not len(at) or np.any(inside != lettered.astype(int) + pointed):
+        return None
+    points = np.where(pointed, marks[at - 1 - lettered], -1)
+    return points, marks[at - lettered], marks[at]
+
+
+def _hollow(characters: np.ndarray, points: np.ndarray, ends: np.ndarray) -> bool:
+    """Whether a number's mantissa lacks digits (`numpy.fromstring` takes "-" for zero) or has a sign behind its point."""
+    last, behind = characters[ends - 1], characters[points[points >= 0] + 1]
+    before_point = characters[ends[last == _POINT] - 2]
+    return bool(
+        np.any((last == _MINUS) | (last == _PLUS) | (last <= _SPACE))
+        or np.any((before_point < ord("0")) | (before_point > ord("9")))
+        or np.any((behind == _MINUS) | (behind == _PLUS))
+    )
+
+
+def _cut_exponents(characters: np.ndarray, mantissa_ends: np.ndarray, ends: np.ndarray) -> tuple[bytes, np.ndarray] | None:
+    """The text with exponents blanked, and each number's exponent (numbers,); None unless all are e+dd or e-dd."""
+    owner = np.flatnonzero(mantissa_ends < ends)
+    letters = mantissa_ends[owner]
+    if np.any(ends[owner] != letters + 4):
+        return None
+    sign, tens, ones = (characters[letters + i] for i in (1, 2, 3))
+    tens, ones = tens - np.uint8(ord("0")), ones - np.uint8(ord("0"))
+    if not np.all(((sign == _MINUS) | (sign == _PLUS)) & (tens < 10) & (ones < 10)):
+        return None
+    exponents = np.zeros(len(ends), dtype=np.int64)
+    exponents[owner] = np.where(sign == _MINUS, -1, 1) * (10 * tens.astype(int) + ones)
+    blanked = characters.copy()
+    for i in range(4):
+        blanked[letters + i] = _SPACE
+    return blanked.tobytes(), exponents
 
 
 def _integers(text: bytes, count: int) -> np.ndarray | None:
@@ -64,47 +121,6 @@ def _integers(text: bytes, count: int) -> np.ndarray | None:
     except (ValueError, DeprecationWarning):
         return None
     return digits if len(digits) == count else None
-
-
-def _hollow(characters: np.ndarray, ends: np.ndarray) -> bool:
-    """Whether some number has no digits, which `numpy.fromstring` takes for zero: a sign, a point, or both."""
-    last = characters[ends - 1]
-    before_point = characters[ends[last == _POINT] - 2] - np.uint8(ord("0"))
-    return bool(np.any((last == _MINUS) | (last == _PLUS)) or np.any(before_point > 9))
-
-
-def _decimals(characters: np.ndarray, ends: np.ndarray, mantissa_ends: np.ndarray) -> np.ndarray | None:
-    """How many digits stand behind each number's point: (numbers,); None where it has two, or a sign behind it."""
-    points = np.flatnonzero(characters == _POINT)
-    behind = characters[points + 1]
-    if np.any((behind == _MINUS) | (behind == _PLUS)):
-        return None
-    if len(points) == len(ends) and np.all(points < ends) and np.all(points[1:] > ends[:-1]):
-        return mantissa_ends - points - 1
-    owner = np.searchsorted(ends, points)
-    if np.any(np.diff(owner) == 0) or np.any(points >= mantissa_ends[owner]):
-        return None
-    decimals = np.zeros(len(ends), dtype=np.int64)
-    decimals[owner] = mantissa_ends[owner] - points - 1
-    return decimals
-
-
-def _cut_exponents(characters: np.ndarray, ends: np.ndarray):
-    """The text with exponents blanked, where each number's mantissa ends, and its exponent; None unless all are e+dd."""
-    letters = np.flatnonzero((characters | 32) == ord("e"))
-    owner = np.searchsorted(ends, letters)
-    behind = characters[np.minimum(letters[:, None] + (1, 2, 3), len(characters) - 1)]
-    sign, digits = behind[:, 0], behind[:, 1:] - np.uint8(ord("0"))
-    plain = (characters[letters - 1] > _SPACE) & (ends[owner] == letters + 4) & np.isin(sign, (_MINUS, _PLUS))
-    if not (np.all(plain) and np.all(digits < 10)):
-        return None
-    exponent = np.zeros(len(ends), dtype=np.int64)
-    exponent[owner] = np.where(sign == _MINUS, -1, 1) * (digits @ np.array([10, 1]))
-    mantissa_ends = ends.copy()
-    mantissa_ends[owner] = letters
-    blanked = characters.copy()
-    blanked[letters[:, None] + np.arange(4)] = _SPACE
-    return blanked.tobytes(), mantissa_ends, exponent
 
 
 def _scaled(digits: np.ndarray, power: np.ndarray) -> np.ndarray:
