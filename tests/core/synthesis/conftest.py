@@ -1,0 +1,16 @@
+"""Orders put into frames of the made library."""
+
+import pytest
+
+from beyond_mocap.plan import Plan
+from beyond_mocap.synthesis.wanted import wanted
+
+
+@pytest.fixture(scope="session")
+def order(library, track_of, timeline_of):
+    """order(*lines, track=None, **plan) -> Wanted: by default eight seconds of walking along +x."""
+
+    def make(*lines, track=None, **plan):
+        return wanted(library, Plan(track=track or track_of(), timeline=timeline_of(*lines), **plan))
+
+    return make
