@@ -63,15 +63,14 @@ The result is kept in a cache, so that the next time takes a moment"""
         scene.beyond_mocap.library_holds = summary(built)
         for note in built.notes:
             self.report({"INFO"}, note)
-        self.report({"INFO"}, scene.beyond_mocap.library_holds.replace("\n", "; "))
+        self.report({"INFO"}, scene.beyond_mocap.library_holds.splitlines()[0])
 
 
 def summary(built: "Library") -> str:
-    """Lines for the panel: clips and minutes, key moments, gaits with their speeds."""
+    """Lines for the panel: clips and minutes, then each gait with its speed, then key moments with their number."""
     originals = [clip for clip in built.clips if not clip.mirrored]
     keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
     lines = [f"{len(originals)} clips, {built.minutes:.1f} minutes, {len(built.skeleton)} joints"]
-    lines += [", ".join(f"{gait.word} {gait.speed:.1f} m/s" for gait in built.gaits)]
-    if keys:
-        lines += ["Moments: " + ", ".join(f"{count} {word}" for word, count in keys.most_common())]
+    lines += [f"{gait.word}: {gait.speed:.1f} m/s" for gait in built.gaits]
+    lines += [f"{word.replace('_', ' ')}: {count}" for word, count in keys.most_common()]
     return "\n".join(lines)

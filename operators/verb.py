@@ -108,9 +108,9 @@ class BackgroundVerb(Verb):
     def show(self, context):
         """Progress in the status bar, at the pointer and for the panel."""
         running = context.window_manager.beyond_mocap_work
-        running.kind, running.fraction, running.text = self.kind, self.job.fraction, self.job.text
+        text = self.job.text or f"{self.bl_label} ..."
+        running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
-        text = self.job.text or self.bl_label
         context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
         self.redraw(context)
 

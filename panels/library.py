@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import Step
+from .tab import Step, table
 
 
 class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
@@ -21,8 +21,12 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
         row.scale_y = 1.3
         row.operator("beyond_mocap.build_library", icon="ASSET_MANAGER")
         self.progress(context, "library")
-        for line in settings.library_holds.splitlines():
-            layout.label(text=line)
+        first, *held = settings.library_holds.splitlines() or ("",)
+        if held:
+            header, body = layout.panel("beyond_mocap_library_holds", default_closed=True)
+            header.label(text=first)
+            if body:
+                table(body, held)
         header, body = layout.panel("beyond_mocap_library_more", default_closed=True)
         header.label(text="Clips")
         if body:

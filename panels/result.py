@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.settings import active_player
-from .tab import Step
+from .tab import Step, table
 
 
 class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
@@ -32,16 +32,8 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
             body.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
         player = active_player(settings)
         if player is not None and player.quality:
-            self.table(player)
-
-    def table(self, player) -> None:
-        """Figures of one take, a line each, then what to look at."""
-        box = self.layout.box()
-        box.label(text=player.name, icon="INFO")
-        for line in player.quality.splitlines():
-            name, _, value = line.partition(": ")
-            row = box.split(factor=0.6)
-            row.label(text=name)
-            row.label(text=value)
-        for line in player.warnings.splitlines():
-            box.label(text=line, icon="ERROR")
+            box = layout.box()
+            box.label(text=player.name, icon="INFO")
+            table(box, player.quality.splitlines())
+            for line in player.warnings.splitlines():
+                box.label(text=line, icon="ERROR")

@@ -3,6 +3,20 @@
 from __future__ import annotations
 
 
+def table(layout, lines) -> None:
+    """Lines "name: value" in two columns; a line without a colon goes right across."""
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for line in lines:
+        name, colon, value = line.partition(": ")
+        if not colon:
+            column.label(text=line)
+            continue
+        row = column.split(factor=0.62)
+        row.label(text=name)
+        row.label(text=value)
+
+
 class Step:
     """One step: a collapsible panel in the 3D view's sidebar. The steps stand in the order of `bl_order`."""
 

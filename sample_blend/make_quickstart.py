@@ -55,7 +55,8 @@ def open_the_tab(bpy) -> None:
     for space in spaces:
         if space.type == "VIEW_3D":
             space.show_region_ui = True
-            space.shading.type = "MATERIAL"
+            space.shading.type, space.shading.color_type = "SOLID", "MATERIAL"
+            space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
             space.region_3d.view_perspective = "CAMERA"
         elif space.type == "FILE_BROWSER" and space.params is not None:
             space.params.directory = b"//"
@@ -71,7 +72,7 @@ def main() -> int:
         return 2
     demo.prepare(bpy)
     scene = bpy.context.scene
-    scene.frame_end = 1201
+    scene.frame_end, scene.beyond_mocap.active_player = 1201, 0
     words_as_texts(bpy, scene.beyond_mocap)
     relative_paths(scene.beyond_mocap)
     bpy.data.texts.new("Read me").write(HOW_TO)

@@ -51,7 +51,7 @@ def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection
     scene = context.scene
     units = units_per_metre(scene)
     data = bpy.data.armatures.new(name)
-    data.display_type = "STICK"
+    data.display_type = "WIRE"
     body = bpy.data.objects.new(name, data)
     scene.collection.objects.link(body)
     places, tails = rest_positions(skeleton), _tails(skeleton)
