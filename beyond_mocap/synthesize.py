@@ -112,7 +112,7 @@ def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footag
     pose[:, 0] = quaternion.multiply(quaternion.about_up(angle), pose[:, 0])
     root = np.concatenate([ground, height[:, None]], axis=1)
     if plan.method == "path":
-        return plant(library.skeleton, root, pose, footage.contacts, plan.fps)
+        return plant(library.skeleton, root, pose, footage.standing, plan.fps)
     none = np.zeros((len(root), 2))
     return Planted(root, pose, none, none)
 
@@ -181,7 +181,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         clip_frame=footage.clip_frame,
         mirrored=np.array([clips[clip].mirrored for clip in footage.clip]),
         words=words,
-        contacts=footage.contacts,
+        contacts=footage.standing.all(axis=2),
         seams=footage.seams,
         timeline=order.timeline,
         keys=tuple(_key_result(library, plan, order, edit, footage, i) for i in range(len(order.keys))),

@@ -23,7 +23,7 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 1
+VERSION = 2
 _FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "features", "words")
 
 
@@ -60,7 +60,7 @@ def save(place: Path, key: str, library) -> None:
             arrays[f"clusters.{length}.{name}"] = getattr(clusters, name)
     arrays["root"] = np.concatenate([clip.motion.root_positions for clip in library.clips])
     arrays["rotations"] = np.concatenate([clip.motion.rotations for clip in library.clips])
-    arrays["contacts"] = np.concatenate([clip.contacts for clip in library.clips])
+    arrays["standing"] = np.concatenate([clip.standing for clip in library.clips])
     arrays["offsets"], arrays["end_offsets"] = library.skeleton.offsets, library.skeleton.end_offsets
     arrays["header"] = np.frombuffer(json.dumps(_header(key, library)).encode(), np.uint8)
     try:
@@ -117,7 +117,7 @@ def _restore(header: dict, arrays: dict):
         part = slice(start, start + count)
         motion = Motion(skeleton, arrays["root"][part], arrays["rotations"][part], fps)
         rows = tuple(ClipAnnotation(row["start"], row["end"], row["key"], tuple(row["words"])) for row in rows)
-        clips.append(Clip(path, mirrored, motion, rows, arrays["contacts"][part]))
+        clips.append(Clip(path, mirrored, motion, rows, arrays["standing"][part]))
         start += count
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}

@@ -38,14 +38,19 @@ class Clip:
 
     path: below the library's folder, with slashes. motion: at its own rate, metres, the floor (2nd percentile of its toe
     heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
-    contacts: (T, 2) bool, left and right foot on the ground.
+    standing: (T, 2, 2) bool, left and right foot, whether heel and toe stand on the ground.
     """
 
     path: str
     mirrored: bool
     motion: Motion
     annotations: tuple[ClipAnnotation, ...]
-    contacts: np.ndarray
+    standing: np.ndarray
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """(T, 2) bool: left and right foot flat on the ground."""
+        return self.standing.all(axis=2)
 
     def words_at(self, frame: float) -> frozenset[str]:
         """Words of every row that covers `frame` (the clip's own rate)."""
@@ -54,7 +59,7 @@ class Clip:
     def twin(self) -> "Clip":
         """The same clip with left and right exchanged (Faustino §3.1.2), words too."""
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
-        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, self.contacts[:, ::-1])
+        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, self.standing[:, ::-1])
 
 
 @dataclass(frozen=True)
@@ -155,7 +160,7 @@ def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancell
         floor = foot_contacts.floor_height(motion)
         motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, floor])
         rows = _rows(path, annotations.of(path, motion.fps), len(motion))
-        clip = Clip(path.relative_to(folder).as_posix(), False, motion, rows, foot_contacts.detect(motion))
+        clip = Clip(path.relative_to(folder).as_posix(), False, motion, rows, foot_contacts.points(motion))
         clips += [clip, clip.twin()]
     if not any(clip.annotations for clip in clips):
         raise InputError(

@@ -1,4 +1,4 @@
-"""When a foot stands on the ground, seen from its joints alone.
+"""When a foot, or its heel or its toe, stands on the ground, seen from its joints alone.
 
 A point of the foot (ankle, toe) stands where it is low and slow, both judged by the clip itself. *Low* is near the lower
 envelope of the point's own height, because floors drift in real recordings: by centimetres in optical ones (a tilted volume),
@@ -20,8 +20,8 @@ _ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once
 _SWING_SECONDS = 1.2
 _DIFFERENCE_SECONDS = 1.0 / 60.0
 _LOW = (0.045, 0.06)  # metres above the envelope: to enter, to leave
-_SLOW = (0.20, 0.35)  # metres per second above the envelope: to enter, to leave, where the foot hardly moves
-_SLOW_SHARE = (0.08, 0.14)  # of the swing's speed: to enter, to leave
+_SLOW = (0.15, 0.25)  # metres per second above the envelope: to enter, to leave, where the foot hardly moves
+_SLOW_SHARE = (0.04, 0.08)  # of the swing's speed: to enter, to leave
 _HELD_UP = 0.10  # metres above the other foot's envelope: this foot does not stand at all
 _UPRIGHT = 0.45  # of the leg's length: hips above the foot
 _SHORTEST = 0.04  # seconds of contact
@@ -36,18 +36,29 @@ def floor_height(motion: Motion) -> float:
 
 
 def detect(motion: Motion) -> np.ndarray:
-    """Which foot is on the ground, by its ankle or its toe: (T, 2) bool, left and right; any rate from 25 fps up."""
+    """Which foot stands flat on the ground: (T, 2) bool, left and right; any rate from 25 fps up.
+
+    Flat is heel and toe (../shared/metrics.md averages the speed of both): while a foot rolls over one of them moves. On
+    recordings without sliding such stances travel a few millimetres.
+    """
+    return points(motion).all(axis=2)
+
+
+def points(motion: Motion) -> np.ndarray:
+    """Which point of which foot stands: (T, 2, 2) bool, left and right, heel (ankle joint) and toe; any rate from 25 fps up.
+
+    A skeleton without toe joints has its ankles in both columns.
+    """
     body = identify(motion.skeleton)
     positions, _ = forward_kinematics(motion)
-    kinds = [(body.left.foot, body.right.foot)]
-    if body.left.toe is not None and body.right.toe is not None:
-        kinds.append((body.left.toe, body.right.toe))
-    points = [_points_down(positions, joints, body, leg_length(motion.skeleton), motion.fps) for joints in kinds]
-    feet = np.any(points, axis=0)
+    leg = leg_length(motion.skeleton)
+    kinds = ((body.left.foot, body.right.foot), (body.left.toe_or_foot, body.right.toe_or_foot))
+    out = np.stack([_points_down(positions, joints, body, leg, motion.fps) for joints in kinds], axis=2)
     for side in (0, 1):
-        feet[:, side] = ~_without_short(~feet[:, side], _SHORTEST_GAP * motion.fps)
-        feet[:, side] = _without_short(feet[:, side], _SHORTEST * motion.fps)
-    return feet
+        for kind in (0, 1):
+            steady = ~_without_short(~out[:, side, kind], _SHORTEST_GAP * motion.fps)
+            out[:, side, kind] = _without_short(steady, _SHORTEST * motion.fps)
+    return out
 
 
 def _points_down(positions: np.ndarray, joints: tuple[int, int], body: Humanoid, leg: float, fps: float) -> np.ndarray:

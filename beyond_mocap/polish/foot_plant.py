@@ -37,8 +37,8 @@ class Planted:
     miss: np.ndarray
 
 
-def plant(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, contacts: np.ndarray, fps: float) -> Planted:
-    """The motion with its feet held on the ground, z = 0, wherever `contacts` (T, 2) says that they stand.
+def plant(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float) -> Planted:
+    """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn about
     the vertical that holds a flat foot's direction; the pelvis is lowered where a leg could not reach.
@@ -46,7 +46,7 @@ def plant(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, contacts:
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     scale = 30.0 / fps
-    goals = [_goal(places, world, limb, contacts[:, side], scale) for side, limb in enumerate((body.left, body.right))]
+    goals = [_goal(places, world, limb, standing[:, side], scale) for side, limb in enumerate((body.left, body.right))]
     root = root.copy()
     root[:, 2] -= _drop(places, (body.left, body.right), [goal for goal, _ in goals], int(round(4 * fps / 30.0)))
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
@@ -60,10 +60,10 @@ def plant(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, contacts:
     return Planted(root, out, correction, miss)
 
 
-def _goal(places: np.ndarray, world: np.ndarray, limb: Limb, contact: np.ndarray, scale: float):
+def _goal(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray, scale: float):
     """Where the ankle goes (T, 3) and the foot's world rotation (T, 4)."""
     heel, toe = places[:, limb.foot], places[:, limb.toe_or_foot]
-    weight = _carrying(heel[:, 2], toe[:, 2], contact)
+    weight = _firmness(stands)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
     yaw = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     flat = np.min(weight, axis=1)
@@ -75,21 +75,10 @@ def _goal(places: np.ndarray, world: np.ndarray, limb: Limb, contact: np.ndarray
     return heel + np.column_stack([ground, lift]), quaternion.multiply(spin, world[:, limb.foot])
 
 
-def _carrying(heel: np.ndarray, toe: np.ndarray, contact: np.ndarray) -> np.ndarray:
-    """(T, 2) 0 to 1: how much heel and toe carry the foot in each frame; 0 without contact.
-
-    A point carries while it is within a few centimetres of where it is when the foot is flat; at heel strike and at push
-    off only the lower one does. The first and the last frame of a stance count half: the foot is still arriving.
-    """
-    if not np.any(contact):
-        return np.zeros((len(contact), 2))
-    rest = np.array([np.percentile(heel[contact], 15), np.percentile(toe[contact], 15)])
-    above = np.stack([heel, toe], axis=1) - rest
-    carry = np.clip(1.0 - (above - 0.015) / 0.03, 0.0, 1.0)
-    lower = np.argmin(above, axis=1)
-    carry[np.arange(len(lower)), lower] = 1.0
-    inner = contact & np.roll(contact, 1) & np.roll(contact, -1)
-    return carry * np.where(inner, 1.0, 0.5)[:, None] * contact[:, None]
+def _firmness(stands: np.ndarray) -> np.ndarray:
+    """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, when it is still arriving, else 0."""
+    inner = stands & np.roll(stands, 1, axis=0) & np.roll(stands, -1, axis=0)
+    return np.where(inner, 1.0, np.where(stands, 0.5, 0.0))
 
 
 def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0) -> np.ndarray:

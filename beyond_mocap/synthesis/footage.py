@@ -23,7 +23,7 @@ class Footage:
     clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's own rate, piece (T,).
     pose (T, J, 4) local rotations, the root's relative to its facing; height (T,) m of the root; sway (T, 2) m from the
     clip's path to the root, in the facing frame; velocity (T, 2) m/s of the path as played, in the facing frame; turn (T,)
-    radians of facing since the frame before, 0 at a seam; contacts (T, 2) bool. ahead_*: the same for the frame that the
+    radians of facing since the frame before, 0 at a seam; standing (T, 2, 2) bool of heels and toes. ahead_*: the same for the frame that the
     piece before would have shown at each seam, (S, ...).
     """
 
@@ -36,7 +36,7 @@ class Footage:
     sway: np.ndarray
     velocity: np.ndarray
     turn: np.ndarray
-    contacts: np.ndarray
+    standing: np.ndarray
     seams: np.ndarray
     ahead_pose: np.ndarray
     ahead_height: np.ndarray
@@ -60,7 +60,7 @@ def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> F
     ahead = _poses(library, clip[before], ahead_frame)
     return Footage(
         clip, frame, _clip_frames(library, clip, frame), piece, pose, height, sway, velocity, turn,
-        _contacts(library, clip, frame), seams, *ahead[:3],
+        _standing(library, clip, frame), seams, *ahead[:3],
     )
 
 
@@ -97,11 +97,11 @@ def _interpolated(library: Library, clip: np.ndarray, frame: np.ndarray, values:
     return values[low] * (1.0 - weight) + values[high] * weight
 
 
-def _contacts(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """(T, 2) bool, from the nearest frame of each clip."""
+def _standing(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """(T, 2, 2) bool, from the nearest frame of each clip."""
     own = np.round(_clip_frames(library, clip, frame)).astype(int)
-    out = np.zeros((len(clip), 2), bool)
+    out = np.zeros((len(clip), 2, 2), bool)
     for number in np.unique(clip):
         at = clip == number
-        out[at] = library.clips[number].contacts[own[at]]
+        out[at] = library.clips[number].standing[own[at]]
     return out

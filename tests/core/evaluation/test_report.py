@@ -220,7 +220,7 @@ def _same(a, b):
         for left, right in zip(a, b, strict=True):
             _same(left, right)
     elif isinstance(a, float):
-        assert a == pytest.approx(b, rel=0.02, abs=2e-3)
+        assert a == pytest.approx(b, rel=0.02, abs=0.01)  # shares of a few dozen steps: one more or less on a rounded frame
     else:
         assert a == b
 
