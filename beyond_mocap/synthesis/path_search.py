@@ -46,7 +46,7 @@ class Weights:
     switch: float = 0.1
     pose: float = 1.0
     rate_change: float = 0.16
-    replay: float = 0.5
+    replay: float = 1.5
 
 
 @dataclass(frozen=True)
