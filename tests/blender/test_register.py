@@ -1,11 +1,21 @@
 """Switching the extension on and off leaves nothing behind and hides no error."""
 
+import subprocess
 import sys
 
 import bpy
 import pytest
 
 TAB = "Beyond Mocap"
+HEAVY = {"scipy", "sklearn", "kloppy", "lxml", "joblib", "matplotlib"}
+# A fresh process with this session's profile: enable, tell what is loaded, end without Blender's own ending (which may hang).
+ENABLE = """
+import os, sys
+import bpy, addon_utils
+assert addon_utils.enable(sys.argv[1]) is not None
+print(*sorted({name.partition(".")[0] for name in sys.modules}), flush=True)
+os._exit(0)
+"""
 
 
 def our_classes():
@@ -52,3 +62,10 @@ def test_a_registration_error_is_passed_on_and_undone(extension, monkeypatch):
 def test_the_core_has_one_name():
     with pytest.raises(ImportError):
         import beyond_mocap  # noqa: F401
+
+
+def test_enabling_loads_nothing_heavy(extension):
+    command = [sys.executable, "-P", "-c", ENABLE, extension.__name__]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    loaded = set(ran.stdout.splitlines()[-1].split())
+    assert "bpy" in loaded and not HEAVY & loaded
