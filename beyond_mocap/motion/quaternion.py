@@ -122,10 +122,11 @@ def to_euler(q: np.ndarray, order: str) -> np.ndarray:
     cosine = np.hypot(m[..., i, i], m[..., i, j])
     middle = np.arctan2(sine, cosine)
     first = np.arctan2(-sign * m[..., j, k], m[..., k, k])
-    third = np.arctan2(-sign * m[..., i, j], m[..., i, i])
     pole = cosine < 1e-9
     first = np.where(pole, np.arctan2(sign * m[..., k, j], m[..., j, j]), first)
-    third = np.where(pole, 0.0, third)
+    # from what is left when the first turn is taken back: near the pole both outer angles are uncertain, their sum is not
+    left = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
+    third = np.where(pole, 0.0, np.arctan2(sign * left[..., i], left[..., j]))
     return np.stack([first, middle, third], axis=-1)
 
 
