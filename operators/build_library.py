@@ -59,7 +59,7 @@ The result is kept in a cache, so that the next time takes a moment"""
 
     def apply(self, scene, built):
         """Keep it, and say what it holds."""
-        session.keep_library(built)
+        session.keep_library(built, scene.beyond_mocap.library_unit or None)
         scene.beyond_mocap.library_holds = summary(built)
         for note in built.notes:
             self.report({"INFO"}, note)

@@ -47,9 +47,10 @@ class Order:
 
 @dataclass(frozen=True)
 class Result:
-    """What a run brings: the library it used, and per player the plan, the take, the report and the track's warnings."""
+    """What a run brings: the library it used and the unit of its clips, and per player the plan, the take, the report and the track's warnings."""
 
     library: "Library"
+    unit: float | None
     made: tuple[tuple[str, Plan, Take, dict, tuple[str, ...]], ...]
 
 
@@ -79,7 +80,8 @@ The scene changes with Bake only"""
         for player in plans.chosen(settings):
             plan, warnings = plans.plan_of(settings, player)
             asked.append((player.name, plan, plans.words_from(player), warnings))
-        return Order(tuple(asked), folder, settings.library_unit or None, session.library(folder))
+        unit = settings.library_unit or None
+        return Order(tuple(asked), folder, unit, session.library(folder, unit))
 
     @staticmethod
     def work(order, progress, cancelled):
@@ -97,26 +99,29 @@ The scene changes with Bake only"""
             validate(plan.timeline, clips.words, float(plan.track.times[0]), float(plan.track.times[-1]), where)
             begun = perf_counter()
             take = synthesize(clips, plan, progress=report, cancelled=cancelled)
+            seconds = perf_counter() - begun
             figures = evaluate(take, plan.track, clips)
-            figures["seconds"]["total"] = perf_counter() - begun
+            figures["seconds"]["total"] = seconds
             made.append((name, plan, take, figures, warnings))
-        return Result(clips, tuple(made))
+        return Result(clips, order.unit, tuple(made))
 
     def apply(self, scene, result):
         """Keep the takes and show their quality."""
         settings = scene.beyond_mocap
-        session.keep_library(result.library)
+        session.keep_library(result.library, result.unit)
         settings.library_holds = summary(result.library)
+        lost = [name for name, *_ in result.made if name not in settings.players]
         for name, plan, take, report, warnings in result.made:
-            player = settings.players.get(name)
-            if player is None:
-                self.report({"WARNING"}, f"{name} is not in the list any more; its take is dropped")
+            if name in lost:
                 continue
+            player = settings.players[name]
             player.take = session.keep_take(plan, take)
             player.quality = quality(report)
             told = dict.fromkeys((*warnings, *report.get("warnings", ())))
             player.warnings = "\n".join(line for line in told if line not in result.library.notes)
-        self.report({"INFO"}, f"{len(result.made)} players synthesized; press Bake to see them")
+        if lost:
+            self.report({"WARNING"}, f"not in the list any more, so their takes are dropped: {', '.join(lost)}")
+        self.report({"INFO"}, f"{len(result.made) - len(lost)} players synthesized; press Bake to see them")
 
 
 def quality(report: dict) -> str:

@@ -87,7 +87,7 @@ def synthesize(load, settings, steps) -> list[dict]:
     order, recipe = load("operators.synthesize"), load("beyond_mocap.synthesize")
     steps.enter("Library")
     clips = load("beyond_mocap.library.library").build(settings.library_folder, progress=steps.progress)
-    session.keep_library(clips)
+    session.keep_library(clips, None)
     settings.library_holds = load("operators.build_library").summary(clips)
     reports = []
     for player in settings.players:

@@ -20,7 +20,7 @@ KEPT_TAKES = 200
 KEPT_LIBRARIES = 3
 
 _numbers = itertools.count(1)
-_libraries: dict[str, "Library"] = {}
+_libraries: dict[tuple[str, float | None], "Library"] = {}
 _takes: dict[str, "Made"] = {}
 
 
@@ -32,14 +32,14 @@ class Made:
     take: "Take"
 
 
-def keep_library(library: "Library") -> None:
-    """Keep a built library under its folder."""
-    _keep(_libraries, str(Path(library.folder).resolve()), library, KEPT_LIBRARIES)
+def keep_library(library: "Library", unit: float | None) -> None:
+    """Keep a built library under its folder and the unit (metres, None where guessed) that its clips were read with."""
+    _keep(_libraries, (str(Path(library.folder).resolve()), unit), library, KEPT_LIBRARIES)
 
 
-def library(folder: str) -> "Library | None":
-    """The library built from `folder` in this session, or None."""
-    return _libraries.get(str(Path(folder).resolve())) if folder else None
+def library(folder: str, unit: float | None) -> "Library | None":
+    """The library built from `folder` with that unit in this session, or None."""
+    return _libraries.get((str(Path(folder).resolve()), unit))
 
 
 def keep_take(plan: "Plan", take: "Take") -> str:
@@ -60,7 +60,7 @@ def clear() -> None:
     _takes.clear()
 
 
-def _keep(store: dict, name: str, value, limit: int) -> None:
+def _keep(store: dict, name, value, limit: int) -> None:
     store.pop(name, None)
     store[name] = value
     while len(store) > limit:

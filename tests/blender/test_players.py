@@ -99,7 +99,7 @@ def test_the_whole_road(extension, ready, core, session):
     assert f"{len(CLIPS)} clips" in settings.library_holds
     assert press(bpy.ops.beyond_mocap.synthesize) == {"FINISHED"}
     settings = bpy.context.scene.beyond_mocap
-    built = session.library(settings.library_folder)
+    built = session.library(settings.library_folder, None)
     for player in settings.players:
         made = session.made(player.take)
         again = core("synthesize").synthesize(built, made.plan)

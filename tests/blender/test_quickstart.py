@@ -1,0 +1,31 @@
+"""The file that an animator opens first: small, free of anybody's paths, and three buttons lead to two moving players."""
+
+import pathlib
+import shutil
+
+import bpy
+
+SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend"
+
+
+def test_three_buttons(tmp_path):
+    for folder in ("library", "match"):
+        shutil.copytree(SAMPLE / folder, tmp_path / folder, ignore=shutil.ignore_patterns(".beyond_mocap"))
+    shutil.copy(SAMPLE / "quickstart.blend", tmp_path)
+    assert (tmp_path / "quickstart.blend").stat().st_size < 1e6
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "quickstart.blend"))
+    settings = bpy.context.scene.beyond_mocap
+    paths = [settings.library_folder]
+    paths += [path for player in settings.players for path in (player.tracking_file, player.annotation_file)]
+    assert len(paths) == 5 and all(path.startswith("//") for path in paths)
+    for player in settings.players:
+        on_disk = pathlib.Path(bpy.path.abspath(player.annotation_file)).read_text("utf-8")
+        assert player.annotation_text.as_string().strip() == on_disk.strip(), "run sample_blend/make_quickstart.py again"
+    assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    assert bpy.ops.beyond_mocap.bake() == {"FINISHED"}
+    bodies = [player.body for player in settings.players]
+    before = [body.pose.bones[0].matrix.translation.copy() for body in bodies]
+    bpy.context.scene.frame_set(300)
+    assert all((body.pose.bones[0].matrix.translation - at).length > 1.0 for body, at in zip(bodies, before))
+    assert bpy.context.scene.camera.parent.animation_data.action is not None
