@@ -47,7 +47,7 @@ def arrays_of(library: Library) -> dict[str, np.ndarray]:
         found.update({f"{length}.{name}": getattr(clusters, name) for name in ("start", "label", "medoid")})
     for number, clip in enumerate(library.clips):
         found[f"{number}.root"], found[f"{number}.rotations"] = clip.motion.root_positions, clip.motion.rotations
-        found[f"{number}.contacts"] = clip.contacts
+        found[f"{number}.standing"] = clip.standing
     return found
 
 

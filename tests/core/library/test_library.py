@@ -30,7 +30,7 @@ def test_every_clip_stands_beside_its_mirror(library):
 
 def test_the_mirror_has_words_contacts_and_travel_of_the_other_side(library):
     for clip, twin in zip(library.clips[::2], library.clips[1::2]):
-        assert np.array_equal(clip.contacts, twin.contacts[:, ::-1])
+        assert np.array_equal(clip.standing, twin.standing[:, ::-1])
         assert np.allclose(clip.motion.root_positions * [1, -1, 1], twin.motion.root_positions, atol=1e-9)
     assert clip_of(library, "bows/turn.bvh", True).annotations[0].words == ("walking", "right")
     assert clip_of(library, "kick.bvh", True).words_at(156) == {"kick", "low", "inside", "left"}

@@ -1,0 +1,71 @@
+"""The search over the whole track: whatever it weighs, it plays clips forward, on time, at the asked speed."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import Cancelled
+from beyond_mocap.synthesis.path_search import PathSearch
+
+
+def found(library, asked):
+    return PathSearch(library, asked).run()
+
+
+def source_frame(library, edit, at):
+    return np.interp(edit.frame[at], np.arange(len(library.frames)), library.frames.source)
+
+
+@pytest.mark.parametrize("lines", [(), ((4.0, "kick"),), ((0.0, "kick"), (8.0, "kick left")), ((3.9, "kick"), (4.2, "kick left"))])
+def test_every_frame_shows_a_clip_played_forward(library, order, lines):
+    edit = found(library, order(*lines))
+    assert len(edit) == 241
+    for low, high in edit.pieces:
+        assert len(set(edit.clip[low:high])) == 1
+        steps = np.diff(edit.frame[low:high])
+        assert np.all((steps > 0.6) & (steps < 1.5))
+
+
+@pytest.mark.parametrize("time", [0.0, 0.5, 2.013, 4.0, 7.5, 8.0])
+def test_a_key_moment_is_on_time(library, order, time):
+    asked = order((time, "kick right"))
+    edit = found(library, asked)
+    assert [key.wanted for key in edit.keys] == [0]
+    at = asked.keys[0].frame
+    near = int(round(at))
+    assert edit.clip[near] == edit.keys[0].clip
+    step = edit.frame[near] + (at - near)
+    assert np.interp(step, np.arange(len(library.frames)), library.frames.source) == pytest.approx(edit.keys[0].clip_frame, abs=2.0)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.4, 2.8, 5.0])
+def test_the_clip_of_the_asked_speed_is_played(library, order, track_of, speed):
+    edit = found(library, order(track=track_of(speed)))
+    shown = library.frames.speed[np.clip(np.round(edit.frame).astype(int), 0, len(library.frames) - 1)]
+    assert np.median(np.abs(shown - speed)) < 0.4
+
+
+def test_a_turning_track_is_played_by_clips_that_turn(library, order, track_of):
+    edit = found(library, order(track=track_of(1.4, turn=0.9)))
+    bows = [library.clips[c].path == "bows/turn.bvh" and not library.clips[c].mirrored for c in edit.clip]
+    assert np.mean(bows) > 0.5
+    edit = found(library, order(track=track_of(1.4, turn=-0.9)))
+    bows = [library.clips[c].path == "bows/turn.bvh" and library.clips[c].mirrored for c in edit.clip]
+    assert np.mean(bows) > 0.5
+
+
+def test_without_mirrors_none_is_used(library, order, track_of):
+    edit = found(library, order((4.0, "kick"), track=track_of(1.4, turn=-0.9), mirror=False))
+    assert not any(library.clips[c].mirrored for c in set(edit.clip))
+
+
+def test_the_same_order_gives_the_same_frames(library, order):
+    a, b = (found(library, order((4.0, "kick"))) for _ in range(2))
+    assert np.array_equal(a.frame, b.frame) and np.array_equal(a.clip, b.clip) and a.keys == b.keys
+
+
+def test_it_can_be_stopped_and_tells_how_far_it_is(library, order):
+    told = []
+    PathSearch(library, order(), progress=lambda fraction, text: told.append(fraction)).run()
+    assert told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
+    with pytest.raises(Cancelled):
+        PathSearch(library, order(), cancelled=lambda: True).run()
