@@ -1,8 +1,9 @@
 """BVH in and out (Faustino §4.2.1, App. B): the border where a file's units, axes and Euler angles end.
 
-Inside stands a `Motion`: metres, Z up, the hips as root, quaternions. What a file had beyond that (channel orders, a root
-above the hips) is kept in a `BvhForm`, so that a motion can be written back in the form it came in. Frames are rigid:
-BVH's (X, Y, Z) with Y up is our (X, -Z, Y), rotations are conjugated by that quarter turn, so rest poses stay unrotated.
+Inside stands a `Motion`: metres, Z up, the hips as root, quaternions. What a file had beyond that (channel orders, a
+root above the hips) is kept in a `BvhForm`, so that a motion can be written back in the form it came in. Frames are
+rigid: BVH's (X, Y, Z) with Y up is our (X, -Z, Y), rotations are conjugated by that quarter turn, so rest poses stay
+unrotated.
 
     clip = bvh.read("walk.bvh")
     bvh.write("mirrored.bvh", mirror(clip.motion), clip.form)
@@ -38,8 +39,8 @@ class RootAbove:
 
     moves: whether it travelled with the body (LAFAN1's SimulationBone) instead of standing still (Bandai's joint_Root).
     position: (3,) metres, rotation: (4,), relative to the joint above it; constant, of the first frame where it moves.
-    heading: radians from the body's facing to this joint's, where it moves. carries: (3,) metres, the hips' place in it,
-    where it stands right above hips that have no position channels of their own.
+    heading: radians from the body's facing to this joint's, where it moves. carries: (3,) metres, the hips' place in
+    it, where it stands right above hips that have no position channels of their own.
     """
 
     name: str
@@ -55,8 +56,8 @@ class RootAbove:
 class BvhForm:
     """What writing back needs beyond the motion.
 
-    channels: each joint's channel names in order. above: joints above the hips. unit: metres per file unit, and up: "Y" or
-    "Z", as read (files are always written in centimetres with Y up).
+    channels: each joint's channel names in order. above: joints above the hips. unit: metres per file unit, and up: "Y"
+    or "Z", as read (files are always written in centimetres with Y up).
     """
 
     channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -94,7 +95,8 @@ def read(path, unit: float | None = None) -> BvhClip:
     rotations = np.stack([root_rotations.T] + [channels.rotation(joint) for joint in kept[1:]])
     _check_size(text, root, skeleton)
     motion = Motion(skeleton, root, rotations.transpose(2, 0, 1), _rate(text.frame_time))
-    form = BvhForm({text.names[j]: text.channels[j] for j in kept}, _headings(channels, above, motion), scale.unit, scale.up)
+    orders = {text.names[joint]: text.channels[joint] for joint in kept}
+    form = BvhForm(orders, _headings(channels, above, motion), scale.unit, scale.up)
     return BvhClip(motion, form, (*scale.notes, *_notes(text, kept, above, drift)))
 
 
@@ -102,13 +104,15 @@ def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
     """Write `motion` to `path` in centimetres with Y up; returns notes on what did not fit `form`.
 
     `form` keeps channel orders and the joints above the hips; without it the root has six channels (XYZ positions, ZXY
-    rotations) and other joints three. A joint whose motion needs a channel that its form lacks gets all of that kind.
-    A root above the hips that stood still is put back as it was; one that moved is put on the ground below the hips (where
-    the hips cannot move in it: where they are) and turned with the body's facing. The file is written beside and then renamed, so a half-written one is never seen.
-    Raises InputError where the folder cannot be written.
+    rotations) and other joints three. A joint whose motion needs a channel that its form lacks gets all of that kind. A
+    root above the hips that stood still is put back as it was; one that moved is put on the ground below the hips
+    (where the hips cannot move in it: where they are) and turned with the body's facing. The file is written beside and
+    then renamed, so a half-written one is never seen. Raises InputError where the folder cannot be written.
     """
-    pieces, notes = document(motion, form or BvhForm())
     target = Path(path)
+    if not target.name:
+        raise InputError(path, "no file name", "a BVH file to write")
+    pieces, notes = document(motion, form or BvhForm())
     beside = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         with open(beside, "w", encoding="utf-8", newline="\n") as file:
@@ -188,7 +192,7 @@ def _strays(positions: np.ndarray) -> float:
 
 
 def _skeleton(channels: _Channels, kept: list[int]) -> tuple[Skeleton, dict[str, float]]:
-    """The kept joints with their mean offsets, and how far in metres joints strayed from them where that is over 1 mm."""
+    """The kept joints with their mean offsets, and how far (metres) joints strayed from them where over 1 mm."""
     text, offsets, drift = channels.text, [np.zeros(3)], {}
     for joint in kept[1:]:
         places = channels.position(joint)
@@ -208,7 +212,7 @@ def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:
     too_far = np.flatnonzero(~(np.abs(root).max(axis=1) < _LARGEST_METRES))
     where = f"{text.path}:{text.first_row + too_far[0]}" if len(too_far) else text.path
     if len(too_far) or not np.abs(skeleton.offsets).max() < _LARGEST_METRES:
-        raise InputError(where, "a position beyond 1000 km", "a person's motion", "give the unit, or export the file again")
+        raise InputError(where, "a position beyond 1000 km", "a person's motion", "give the unit, or export again")
 
 
 def _headings(channels: _Channels, above: tuple[RootAbove, ...], motion: Motion) -> tuple[RootAbove, ...]:
@@ -237,7 +241,8 @@ def _notes(text: BvhText, kept: list[int], above: tuple[RootAbove, ...], drift: 
     """What was changed on the way in, one line per kind."""
     notes = [f"joint {old!r} stands twice, the second is called {new!r}" for old, new in text.renamed]
     for joint in above:
-        notes.append(f"{joint.name} ({'moving' if joint.moves else 'standing still'}) folded into {text.names[kept[0]]}")
+        how = "moving" if joint.moves else "standing still"
+        notes.append(f"{joint.name} ({how}) folded into {text.names[kept[0]]}")
     left_out = sorted(set(text.names) - {text.names[j] for j in kept} - {joint.name for joint in above})
     if left_out:
         notes.append(f"left out, not part of the body: {', '.join(left_out)}")

@@ -24,7 +24,7 @@ _SAMPLES = 64
 
 @dataclass(frozen=True)
 class Scale:
-    """unit: metres per file unit. up: "Y" or "Z". body: which joint is what, None for no humanoid. notes: what was decided."""
+    """What was decided, told in `notes`. unit: metres per file unit. up: "Y" or "Z". body: None for no humanoid."""
 
     unit: float
     up: str
@@ -38,10 +38,11 @@ def to_ours(vectors: np.ndarray, up: str) -> np.ndarray:
 
 
 def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> np.ndarray:
-    """A joint's rotations in our axes, components first (4, T), from `columns`: axis letters and columns of `values` (T, C).
+    """A joint's rotations in our axes, components first (4, T), from `columns`: axis letters and columns of `values`
+    (T, C).
 
-    Intrinsic, in the channels' order, degrees (Faustino §4.2.1 eq. 30-31). The turns are multiplied in closed form: each
-    has two components only.
+    Intrinsic, in the channels' order, degrees (Faustino §4.2.1 eq. 30-31). The turns are multiplied in closed form:
+    each has two components only.
     """
     out = np.zeros((4, len(values)))
     out[0] = 1.0
@@ -56,16 +57,17 @@ def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> 
         axis, sign = TURNS[up][letter]
         s = s * sign
         k, i, j = 1 + axis, 1 + (axis + 1) % 3, 1 + (axis + 2) % 3
-        out[[0, k, i, j]] = out[0] * c - out[k] * s, out[k] * c + out[0] * s, out[i] * c + out[j] * s, out[j] * c - out[i] * s
+        w, vk, vi, vj = out[0], out[k], out[i], out[j]
+        out[[0, k, i, j]] = w * c - vk * s, vk * c + w * s, vi * c + vj * s, vj * c - vi * s
     return out
 
 
 def guess(text: BvhText, unit: float | None) -> Scale:
     """The file's up axis, and its unit where `unit` is None.
 
-    Up is the axis, Y or Z, along which feet to head point (within 35 degrees) in more of 64 frames spread over the clip;
-    the rest pose has a say where most of the clip is lain down. The unit is the usual one that puts the hips 0.75 to
-    1.15 m above the feet, else the one that makes legs 0.88 m long. Without legs: centimetres, Y up.
+    Up is the axis, Y or Z, along which feet to head point (within 35 degrees) in more of 64 frames spread over the
+    clip; the rest pose has a say where most of the clip is lain down. The unit is the usual one that puts the hips 0.75
+    to 1.15 m above the feet, else the one that makes legs 0.88 m long. Without legs: centimetres, Y up.
     """
     rest = Skeleton(text.names, text.parents, to_ours(text.offsets, "Y"))
     try:
@@ -86,7 +88,7 @@ def _unturned(joints: int) -> np.ndarray:
 
 
 def _sampled(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
-    """The skeleton with its posed offsets, and joint positions (N, J, 3) in some frames, as if Y were up; file units."""
+    """The skeleton with its posed offsets, and places (N, J, 3) in some frames, as if Y were up; file units."""
     rows = text.values[np.unique(np.linspace(0, len(text.values) - 1, _SAMPLES).astype(int))]
     offsets, rotations, first = np.array(text.offsets), np.empty((len(rest), 4, len(rows))), 0
     for joint, channels in enumerate(text.channels):
@@ -115,7 +117,7 @@ def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
 
 
 def _hip_height(skeleton: Skeleton, body: Humanoid, heights: np.ndarray) -> float:
-    """How high the hips stand over the lower foot at most, file units, from heights (N, J); at least the legs' length."""
+    """How high the hips stand over the lower foot at most, from heights (N, J), file units; at least the leg."""
     feet = [body.left.foot, body.right.foot, body.left.toe_or_foot, body.right.toe_or_foot]
     posed = np.percentile(heights[:, body.hips] - heights[:, feet].min(axis=1), 95)
     return float(max(posed, leg_length(skeleton)))

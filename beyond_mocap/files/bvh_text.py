@@ -1,8 +1,8 @@
 """The text of a BVH file, as it stands: hierarchy and numbers in the file's own units and axes, nothing converted.
 
-BVH has no standard; this is the form that Meredith and Maddock (2001, "Motion Capture File Formats Explained") describe,
-read leniently where files differ (letter case, blanks, line ends, joint names with blanks), strictly where a body would
-come out wrong.
+BVH has no standard; this is the form that Meredith and Maddock (2001, "Motion Capture File Formats Explained")
+describe, read leniently where files differ (letter case, blanks, line ends, joint names with blanks), strictly where a
+body would come out wrong.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
 _CHANNELS = {name.lower(): name for name in POSITIONS + ROTATIONS}
 _LARGEST_ANGLE = 1e7  # degrees: damaged, whatever it was
 _EXPORT_AGAIN = "export the file again"
+_DAMAGED = f"the file is cut off or damaged; {_EXPORT_AGAIN}"
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,8 @@ class BvhText:
     """A file's content. J joints, parents before children; file units, file axes, degrees.
 
     names: J unique names. parents: J indices, -1 for joint 0. offsets: (J, 3). channels: J tuples of channel names.
-    end_parents (E,), end_offsets (E, 3): End Sites. frame_time: seconds. values: (T, C), joints' channels in file order.
-    first_row: line of the first frame. renamed: names that stood twice, with what they became.
+    end_parents (E,), end_offsets (E, 3): End Sites. frame_time: seconds. values: (T, C), joints' channels in file
+    order. first_row: line of the first frame. renamed: names that stood twice, with what they became.
     """
 
     path: Path
@@ -62,7 +63,9 @@ def parse(path) -> BvhText:
     values = _rows(path, data[body - 1 :], columns, line)  # from the line's end before: blanks around
     if len(values) != frames:
         raise InputError(
-            f"{path}:{line}", f"{len(values)} rows of motion", f"{frames} as Frames says",
+            f"{path}:{line}",
+            f"{len(values)} rows of motion",
+            f"{frames} as Frames says",
             f"the file is {'cut off' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)
@@ -117,7 +120,7 @@ class _Hierarchy:
             while words:
                 words = self._take(words)
         if self.stack:
-            raise self._error(f"{len(self.stack)} brackets are not closed", "a } for each {", "the hierarchy is cut off")
+            raise self._error(f"{len(self.stack)} brackets not closed", "a } for each {", "the hierarchy is cut off")
         if not self.names:
             raise self._error("no ROOT", "ROOT and a joint's name", _EXPORT_AGAIN)
         for joint, offset in enumerate(self.offsets):
@@ -129,9 +132,17 @@ class _Hierarchy:
         """The joints together with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
-            self.path, tuple(self.names), tuple(self.parents), np.array(self.offsets), tuple(self.channels),
-            tuple(joint for joint, _ in ends), np.array([offset for _, offset in ends]).reshape(-1, 3),
-            frame_time, values, first_row, tuple(self.renamed),
+            self.path,
+            tuple(self.names),
+            tuple(self.parents),
+            np.array(self.offsets),
+            tuple(self.channels),
+            tuple(joint for joint, _ in ends),
+            np.array([offset for _, offset in ends]).reshape(-1, 3),
+            frame_time,
+            values,
+            first_row,
+            tuple(self.renamed),
         )
 
     def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:
@@ -226,7 +237,8 @@ def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, f
     frames = int(frames_text) if re.fullmatch(r"\d{1,12}", frames_text) else 0
     if frames < 1:
         raise InputError(f"{path}:{line - 1}", f"Frames: {frames_text[:40]}", "a whole number above 0", _EXPORT_AGAIN)
-    time_text, start, line = _labelled(path, data, start, line, rb"Frame\s*Time\s*:", "Frame Time: and seconds per frame")
+    expected = "Frame Time: and seconds per frame"
+    time_text, start, line = _labelled(path, data, start, line, rb"Frame\s*Time\s*:", expected)
     frame_time = _number(time_text)
     if frame_time is None or not 1e-5 <= frame_time <= 1e3:
         raise InputError(f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0", "correct that line")
@@ -244,14 +256,14 @@ def _labelled(path: Path, data: bytes, start: int, line: int, label: bytes, expe
         start, line = stop + 1, line + 1
     match = re.match(label, text, re.I)
     if match is None:
-        raise InputError(f"{path}:{line}", f"{_decoded(text[:40])!r}", expected, f"the file is cut off or damaged; {_EXPORT_AGAIN}")
+        raise InputError(f"{path}:{line}", f"{_decoded(text[:40])!r}", expected, _DAMAGED)
     return _decoded(text[match.end() :].strip()), stop + 1, line + 1
 
 
 def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
     """The motion's numbers (T, columns); InputError with the first bad line."""
     if not text or text.isspace():
-        raise InputError(f"{path}:{line}", "no rows of motion", f"rows of {columns} numbers", f"the file is cut off; {_EXPORT_AGAIN}")
+        raise InputError(f"{path}:{line}", "no rows of motion", f"rows of {columns} numbers", _DAMAGED)
     try:
         values = read_table(text)
         if values.shape[1] == columns and -1e300 < values.min() and values.max() < 1e300:
@@ -272,14 +284,13 @@ def _check_angles(path: Path, joints: _Hierarchy, values: np.ndarray, line: int)
 
 
 def _row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:
-    for line, row in enumerate(_decoded(text).split("\n"), line - 1):
+    """The first bad row; `text` begins with the end of the line before `line`."""
+    for at, row in enumerate(_decoded(text).split("\n"), line - 1):
         words = row.split()
         bad = next((word for word in words if _number(word) is None or abs(float(word)) >= 1e300), None)
         if bad is not None:
-            return InputError(f"{path}:{line}", f"{bad[:30]!r}", "a number", _EXPORT_AGAIN)
+            return InputError(f"{path}:{at}", f"{bad[:30]!r}", "a number", _EXPORT_AGAIN)
         if words and len(words) != columns:
-            return InputError(
-                f"{path}:{line}", f"{len(words)} numbers", f"{columns}, one per channel of the hierarchy",
-                f"the file is cut off or damaged; {_EXPORT_AGAIN}",
-            )
+            expected = f"{columns}, one per channel of the hierarchy"
+            return InputError(f"{path}:{at}", f"{len(words)} numbers", expected, _DAMAGED)
     return InputError(f"{path}:{line}", "numbers that cannot be read", f"rows of {columns} numbers", _EXPORT_AGAIN)

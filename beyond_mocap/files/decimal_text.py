@@ -1,10 +1,10 @@
 """Long tables of plain decimal numbers, read about three times faster than numpy's own readers, to the same bits.
 
-A decimal number is an integer over a power of ten. Integers are what `numpy.fromstring` reads fast (60 ms for 1.8 million,
-against 400 ms as floats), so the points are cut out of the text, the digits read as integers, and each divided by ten to
-the number of digits that stood behind its point. One division of two exactly represented numbers is correctly rounded
-(IEEE 754), hence the same bits as the slow way, as long as the digits fit 53 bits and the power is at most 10^22;
-the few numbers that do not are read one by one. Text of another form (hexadecimal, nan, ...) goes the slow way.
+A decimal number is an integer over a power of ten. Integers are what `numpy.fromstring` reads fast (60 ms for 1.8
+million, against 400 ms as floats), so the points are cut out of the text, the digits read as integers, and each divided
+by ten to the number of digits that stood behind its point. One division of two exactly represented numbers is correctly
+rounded (IEEE 754), hence the same bits as the slow way, as long as the digits fit 53 bits and the power is at most
+10^22; the few numbers that do not are read one by one. Text of another form (hexadecimal, nan, ...) goes the slow way.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _points_and_ends(characters: np.ndarray, letters: bool) -> tuple[np.ndarray,
 
 
 def _hollow(characters: np.ndarray, points: np.ndarray, ends: np.ndarray) -> bool:
-    """Whether a number's mantissa lacks digits (`numpy.fromstring` takes "-" for zero) or has a sign behind its point."""
+    """Whether a mantissa lacks digits (`numpy.fromstring` takes "-" for zero) or has a sign behind its point."""
     last, behind = characters[ends - 1], characters[points[points >= 0] + 1]
     before_point = characters[ends[last == _POINT] - 2]
     return bool(
@@ -94,7 +94,7 @@ def _hollow(characters: np.ndarray, points: np.ndarray, ends: np.ndarray) -> boo
     )
 
 
-def _cut_exponents(characters: np.ndarray, mantissa_ends: np.ndarray, ends: np.ndarray) -> tuple[bytes, np.ndarray] | None:
+def _cut_exponents(characters: np.ndarray, mantissa_ends: np.ndarray, ends: np.ndarray):
     """The text with exponents blanked, and each number's exponent (numbers,); None unless all are e+dd or e-dd."""
     owner = np.flatnonzero(mantissa_ends < ends)
     letters = mantissa_ends[owner]

@@ -1,11 +1,11 @@
 """When a foot, or its heel or its toe, stands on the ground, seen from its joints alone.
 
-A point of the foot (ankle, toe) stands where it is low and slow, both judged by the clip itself. *Low* is near the lower
-envelope of the point's own height, because floors drift in real recordings: by centimetres in optical ones (a tilted volume),
-by decimetres in inertial suits, which integrate height. *Slow* is near the lower envelope of its own speed, by a share of how
-fast it swings around that moment: a planted foot slides 2 cm/s in a good walk, 0.5 m/s in a suit, and the ankle of a sprinter
-hardly falls below 1 m/s.
-Two thresholds each (enter, leave) and shortest durations keep the labels from flickering.
+A point of the foot (ankle, toe) stands where it is low and slow, both judged by the clip itself. *Low* is near the
+lower envelope of the point's own height, because floors drift in real recordings: by centimetres in optical ones (a
+tilted volume), by decimetres in inertial suits, which integrate height. *Slow* is near the lower envelope of its own
+speed, by a share of how fast it swings around that moment: a planted foot slides 2 cm/s in a good walk, 0.5 m/s in a
+suit, and the ankle of a sprinter hardly falls below 1 m/s. Two thresholds each (enter, leave) and shortest durations
+keep the labels from flickering.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ def floor_height(motion: Motion) -> float:
 def detect(motion: Motion) -> np.ndarray:
     """Which foot stands flat on the ground: (T, 2) bool, left and right; any rate from 25 fps up.
 
-    Flat is heel and toe (../shared/metrics.md averages the speed of both): while a foot rolls over one of them moves. On
-    recordings without sliding such stances travel a few millimetres.
+    Flat is heel and toe (../shared/metrics.md averages the speed of both): while a foot rolls over one of them moves.
+    On recordings without sliding such stances travel a few millimetres.
     """
     return points(motion).all(axis=2)
 
 
 def points(motion: Motion) -> np.ndarray:
-    """Which point of which foot stands: (T, 2, 2) bool, left and right, heel (ankle joint) and toe; any rate from 25 fps up.
+    """Which point of which foot stands: (T, 2, 2) bool, left and right, heel (ankle joint) and toe.
 
-    A skeleton without toe joints has its ankles in both columns.
+    Any rate from 25 fps up. A skeleton without toe joints has its ankles in both columns.
     """
     body = identify(motion.skeleton)
     positions, _ = forward_kinematics(motion)
@@ -76,7 +76,7 @@ def _points_down(positions: np.ndarray, joints: tuple[int, int], body: Humanoid,
 
 
 def _standing_heights(heights: np.ndarray, hips: np.ndarray, leg: float, fps: float) -> np.ndarray:
-    """How high each point is when it stands, around each moment: (T, 2) metres from heights (T, 2) and hip heights (T,).
+    """How high each point is when it stands, around each moment: (T, 2) metres; from heights (T, 2) and hips' (T,).
 
     Upright: the lower envelope, a morphological opening, which follows a drifting floor without lag. Where the hips are
     low (lying, getting up) a resting foot need not stand, so there it is the clip's own standing height.

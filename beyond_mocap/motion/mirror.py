@@ -1,23 +1,25 @@
 """Mirroring: left becomes right, so that each recording serves twice (Faustino §3.1.2).
 
-Faustino mirrors joint by joint in the world: a bone points where the mirrored child lies (his X axis, eq. in A), and a second
-axis takes the mirrored direction of the body's facing (his Y or Z axis, B). That fits the one skeleton he had, whose X axes
-all point along the bones; CMU's, LAFAN1's and Bandai-Namco's axes lie otherwise, and differ from joint to joint and from left
-to right. The same idea without axes: a body segment is a rigid thing, and its mirror image is the partner's segment.
+Faustino mirrors joint by joint in the world: a bone points where the mirrored child lies (his X axis, eq. in A), and a
+second axis takes the mirrored direction of the body's facing (his Y or Z axis, B). That fits the one skeleton he had,
+whose X axes all point along the bones; CMU's, LAFAN1's and Bandai-Namco's axes lie otherwise, and differ from joint to
+joint and from left to right. The same idea without axes: a body segment is a rigid thing, and its mirror image is the
+partner's segment.
 
-Let M = diag(1, -1, 1) mirror the world, R_p the world rotation of joint j's partner p (itself on the centre line), and C_j the
-orthogonal matrix of determinant -1 that takes a point of segment j, in j's axes, to the matching point of segment p, in p's.
-Then the mirrored body has, for every joint,
+Let M = diag(1, -1, 1) mirror the world, R_p the world rotation of joint j's partner p (itself on the centre line), and
+C_j the orthogonal matrix of determinant -1 that takes a point of segment j, in j's axes, to the matching point of
+segment p, in p's. Then the mirrored body has, for every joint,
 
     R'_j = M R_p C_j,     root' = M root,
 
-two improper matrices and a rotation, hence a rotation. C_j follows from the skeleton: it takes the bones that start in j to
-those that start in p (orthogonal Procrustes; left and right may differ in length and, by some degrees, in direction; lengths
-stay those of the skeleton). One bone leaves the turn about itself open, so C_j is pulled slightly towards a usual matrix D_j.
-Where the rest pose is its own mirror image (nearly all rigs), D is that mirror for all joints. Where it is not (Bandai-Namco's
-limbs have axes of mirrored behaviour, left bones along +X, right ones along -X), D_j is a mirror along an axis or the
-inversion -1: the one that carries bones to bones and makes the joint's mean rotation relative to its parent come out alike
-left and right; the candidates differ by half turns, far more than left and right do in any movement.
+two improper matrices and a rotation, hence a rotation. C_j follows from the skeleton: it takes the bones that start in
+j to those that start in p (orthogonal Procrustes; left and right may differ in length and, by some degrees, in
+direction; lengths stay those of the skeleton). One bone leaves the turn about itself open, so C_j is pulled slightly
+towards a usual matrix D_j. Where the rest pose is its own mirror image (nearly all rigs), D is that mirror for all
+joints. Where it is not (Bandai-Namco's limbs have axes of mirrored behaviour, left bones along +X, right ones along
+-X), D_j is a mirror along an axis or the inversion -1: the one that carries bones to bones and makes the joint's mean
+rotation relative to its parent come out alike left and right; the candidates differ by half turns, far more than left
+and right do in any movement.
 
 C_p is the inverse of C_j, therefore mirroring twice gives back the motion, on any skeleton, to rounding.
 """
@@ -43,8 +45,8 @@ _FRAMES = 256
 def mirror(motion: Motion) -> Motion:
     """The same skeleton doing with its left what `motion` does with its right, mirrored at the plane y = 0.
 
-    Travel along X and heights stay, Y turns its sign. Bones keep their lengths; where left and right ones differ, feet and
-    hands end up off the exact mirror image by that difference. Raises InputError where the skeleton has no legs.
+    Travel along X and heights stay, Y turns its sign. Bones keep their lengths; where left and right ones differ, feet
+    and hands end up off the exact mirror image by that difference. Raises InputError where the skeleton has no legs.
     """
     body = identify(motion.skeleton)
     corrections = quaternion.from_matrix(_WORLD @ _correspondence(motion, body))
@@ -123,7 +125,7 @@ def _choose(usual, bones, images, before, mean, partner_mean) -> np.ndarray:
 
 
 def _procrustes(bones: np.ndarray, images: np.ndarray, pull: np.ndarray) -> np.ndarray:
-    """The orthogonal matrix of determinant -1 that carries `bones` (B, 3) to `images` best; `pull` decides what is open."""
+    """The orthogonal matrix of determinant -1 that carries bones (B, 3) to images best; `pull` decides the rest."""
     # the same scale for joint and partner, so that theirs are inverse to each other
     scale = np.sqrt(np.sum(bones**2) * np.sum(images**2)) or 1.0
     u, _, v = np.linalg.svd(images.T @ bones / scale + _PULL * pull)

@@ -1,8 +1,8 @@
 """Rotations as unit quaternions (w, x, y, z); every function takes free leading axes.
 
 Conventions: `multiply(a, b)` rotates by b first, then by a; `rotate(q, v)` turns column vectors; angles are radians.
-Euler angles are intrinsic, in the order of their letters ("ZXY": about Z, then the turned X, then the turned Y), which is
-how BVH channels are read (Faustino §4.2.1 eq. 30-31 is the case "ZXY").
+Euler angles are intrinsic, in the order of their letters ("ZXY": about Z, then the turned X, then the turned Y), which
+is how BVH channels are read (Faustino §4.2.1 eq. 30-31 is the case "ZXY").
 """
 
 from __future__ import annotations
@@ -111,8 +111,8 @@ def from_euler(angles: np.ndarray, order: str) -> np.ndarray:
 def to_euler(q: np.ndarray, order: str) -> np.ndarray:
     """Intrinsic Tait-Bryan angles (..., 3) in radians of rotations (..., 4); `order` is a permutation of XYZ.
 
-    The middle angle is within +-90 degrees. At the pole, where only the sum of the outer angles is determined, the third
-    is zero; the rotation is the same.
+    The middle angle is within +-90 degrees. At the pole, where only the sum of the outer angles is determined, the
+    third is zero; the rotation is the same.
     """
     i, j, k = (_AXES[letter] for letter in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
@@ -124,7 +124,7 @@ def to_euler(q: np.ndarray, order: str) -> np.ndarray:
     first = np.arctan2(-sign * m[..., j, k], m[..., k, k])
     pole = cosine < 1e-9
     first = np.where(pole, np.arctan2(sign * m[..., k, j], m[..., j, j]), first)
-    # from what is left when the first turn is taken back: near the pole both outer angles are uncertain, their sum is not
+    # from what is left when the first turn is taken back: near the pole both outer angles are noise, their sum is not
     left = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
     third = np.where(pole, 0.0, np.arctan2(sign * left[..., i], left[..., j]))
     return np.stack([first, middle, third], axis=-1)
@@ -166,7 +166,7 @@ def from_matrix(m: np.ndarray) -> np.ndarray:
 
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The shortest rotation that turns vectors a onto b: (..., 3), (..., 3) -> (..., 4); opposite ones turn about any axis."""
+    """The shortest rotation that turns vectors a onto b: (..., 3), (..., 3) -> (..., 4); opposites about any axis."""
     a = np.asarray(a, dtype=float)
     b = np.asarray(b, dtype=float)
     a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)

@@ -40,7 +40,7 @@ class Node:
             yield from child.walk()
 
     def places(self, row, at=(0.0, 0.0, 0.0), turned=None) -> dict:
-        """World positions in the file's axes and units for one row (an iterator of numbers): the format's meaning, naively."""
+        """World positions, file axes and units, for one row (an iterator of numbers): the format's meaning, naively."""
         turned = turned or Rotation.identity()
         offset, turn = np.array(self.offset, dtype=float), Rotation.identity()
         for channel in self.channels:
@@ -91,7 +91,9 @@ def rows_for(root: Node, count=6, seed=0, height=95.0, spread=20.0) -> np.ndarra
             column = random.uniform(-spread, spread, count)
             if channel.endswith("position"):
                 fixed = node.offset["XYZ".index(channel[0])]
-                column = np.full(count, fixed) if node is not root else np.linspace(0, 50, count) + height * (channel[0] == "Y")
+                column = np.full(count, fixed)
+                if node is root:
+                    column = np.linspace(0, 50, count) + height * (channel[0] == "Y")
             rows = np.column_stack([rows, column])
     return rows
 
@@ -188,7 +190,9 @@ def test_a_skeleton_in_any_order_is_nested_and_read_back_alike(tmp_path):
     depth = [len([1 for _ in iter(_climb(old, i))]) for i in range(len(old))]
     order = sorted(range(len(old)), key=lambda i: (depth[i], i))  # breadth first
     place = {joint: i for i, joint in enumerate(order)}
-    skeleton = type(old)([old.names[i] for i in order], [-1] + [place[old.parents[i]] for i in order[1:]], old.offsets[order])
+    skeleton = type(old)(
+        [old.names[i] for i in order], [-1] + [place[old.parents[i]] for i in order[1:]], old.offsets[order]
+    )
     mixed = type(motion)(skeleton, motion.root_positions, motion.rotations[:, order], motion.fps)
     bvh.write(tmp_path / "a.bvh", mixed)
     back = bvh.read(tmp_path / "a.bvh").motion
@@ -235,7 +239,15 @@ def test_an_odd_unit_gives_legs_of_an_adult_and_a_given_one_is_kept(tmp_path):
 
 @pytest.mark.parametrize(
     "frame_time, fps",
-    [("0.016667", 60), ("0.0083333", 120), (".033333", 30), ("0.04", 25), ("0.0417083", 24000 / 1001), ("0.033", 1 / 0.033), ("1", 1)],
+    [
+        ("0.016667", 60),
+        ("0.0083333", 120),
+        (".033333", 30),
+        ("0.04", 25),
+        ("0.0417083", 24000 / 1001),
+        ("0.033", 1 / 0.033),
+        ("1", 1),
+    ],
 )
 def test_rates_snap_to_whole_and_ntsc_ones(tmp_path, frame_time, fps):
     clip = bvh.read(save(tmp_path, document(body(), rows_for(body()), frame_time)))
@@ -249,7 +261,9 @@ def test_a_standing_root_above_the_hips_is_folded_and_put_back(tmp_path):
     rows[:, 6:9] = np.linspace([0, 95, 0], [0, 96, 80], len(rows))
     path = save(tmp_path, document(root, rows))
     clip = bvh.read(path)
-    assert clip.motion.skeleton.names[0] == "Hips" and clip.form.above[0].name == "World" and not clip.form.above[0].moves
+    assert (
+        clip.motion.skeleton.names[0] == "Hips" and clip.form.above[0].name == "World" and not clip.form.above[0].moves
+    )
     assert any("World" in note and "standing still" in note for note in clip.notes)
     hips = root.places(iter(rows[2]))["Hips"]
     assert np.allclose(clip.motion.root_positions[2], ours(hips) * 0.01, atol=1e-9)
@@ -335,7 +349,9 @@ def test_two_joints_of_one_name_are_told_apart_and_told(tmp_path):
 
 def test_two_thousand_joints_in_a_row(tmp_path):
     count = 2000
-    joints = "".join(f"{'JOINT' if i else 'ROOT'} j{i}\n{{\nOFFSET 0 1 0\nCHANNELS 3 {' '.join(ROOT[3:])}\n" for i in range(count))
+    joints = "".join(
+        f"{'JOINT' if i else 'ROOT'} j{i}\n{{\nOFFSET 0 1 0\nCHANNELS 3 {' '.join(ROOT[3:])}\n" for i in range(count)
+    )
     rows = ("0 " * (3 * count) + "\n") * 2
     data = f"HIERARCHY\n{joints}{'}' * count}\nMOTION\nFrames: 2\nFrame Time: .01\n{rows}".encode()
     clip = bvh.read(save(tmp_path, data))
@@ -433,7 +449,9 @@ def test_damaged_files_are_read_or_refused(tmp_path_factory, data):
     for _ in range(data.draw(st.integers(1, 4))):
         start = data.draw(st.integers(0, len(mangled)))
         stop = min(start + data.draw(st.integers(0, 30)), len(mangled))
-        filler = st.one_of(st.binary(max_size=4), st.sampled_from([b"{", b"}", b"-", b"e", b"1e", b".", b"\n", b"nan ", b"JOINT "]))
+        filler = st.one_of(
+            st.binary(max_size=4), st.sampled_from([b"{", b"}", b"-", b"e", b"1e", b".", b"\n", b"nan ", b"JOINT "])
+        )
         mangled[start:stop] = data.draw(filler)
     try:
         clip = bvh.read(save(folder, bytes(mangled), "fuzz.bvh"))
@@ -449,7 +467,9 @@ number = st.one_of(
     st.floats(-1e4, 1e4).map("{:.6f}".format),
     st.floats(-1e-9, 1e9).map("{:g}".format),
     st.integers(-(10**20), 10**20).map(str),
-    st.sampled_from(["0", "-0", "-0.0000", "+5", ".5", "5.", "-.5", "1e5", "1E-05", "1.5e+17", "00012.500", "9007199254740993"]),
+    st.sampled_from(
+        ["0", "-0", "-0.0000", "+5", ".5", "5.", "-.5", "1e5", "1E-05", "1.5e+17", "00012.500", "9007199254740993"]
+    ),
 )
 
 
@@ -461,7 +481,23 @@ def test_fast_numbers_are_the_same_bits(rows):
     assert np.array_equal(values, [[float(word) for word in row] for row in rows])
 
 
-@pytest.mark.parametrize("text", [b"1 2\n3\n", b"1 x\n", b"1 2-3\n", b"1 .-3\n", b"1 --3\n", b"1 1.2.3\n", b"1 -\n", b"1 .\n", b"1 -.\n", b"1 +\n", b"1 1e\n", b"e 1\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"1 2\n3\n",
+        b"1 x\n",
+        b"1 2-3\n",
+        b"1 .-3\n",
+        b"1 --3\n",
+        b"1 1.2.3\n",
+        b"1 -\n",
+        b"1 .\n",
+        b"1 -.\n",
+        b"1 +\n",
+        b"1 1e\n",
+        b"e 1\n",
+    ],
+)
 def test_what_is_no_number_is_no_number(text):
     with pytest.raises(ValueError):
         decimal_text.read_table(text)
@@ -471,12 +507,19 @@ def test_what_is_no_number_is_no_number(text):
 @pytest.mark.parametrize(
     "pattern, unit, fps",
     [
-        ("cmu10/10_01.bvh", 0.05644, 120), ("cmu_jumps/118_01.bvh", 0.05644, 120), ("cmu_pitch/*.bvh", 0.05644, 120),
-        ("lmd/Player1/P1_S01*.bvh", 0.01, 120), ("lafan1/walk1_subject1*.bvh", 0.01, 60), ("runs15/*left1*.bvh", 0.01, 120),
-        ("bandai/*dash_[an]*.bvh", 0.01, 30), ("sprinter/*.bvh", 0.01, 250), ("keeper/GK01_trial01*.bvh", 0.01, 200),
-        ("getup/*face*.bvh", 0.01, 60), ("getup/*roll.bvh", 0.01, None),
+        ("cmu10/10_01.bvh", 0.05644, 120),
+        ("cmu_jumps/118_01.bvh", 0.05644, 120),
+        ("cmu_pitch/*.bvh", 0.05644, 120),
+        ("lmd/Player1/P1_S01*.bvh", 0.01, 120),
+        ("lafan1/walk1_subject1*.bvh", 0.01, 60),
+        ("runs15/*left1*.bvh", 0.01, 120),
+        ("bandai/*dash_[an]*.bvh", 0.01, 30),
+        ("sprinter/*.bvh", 0.01, 250),
+        ("keeper/GK01_trial01*.bvh", 0.01, 200),
+        ("getup/*face*.bvh", 0.01, 60),
+        ("getup/*roll.bvh", 0.01, None),
     ],
-)  # fmt: skip
+)
 def test_recordings_come_back(tmp_path, pattern, unit, fps):
     paths = sorted(MOCAP.glob(pattern))
     assert paths

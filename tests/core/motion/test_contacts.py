@@ -84,7 +84,9 @@ def test_a_foot_held_up_for_long_does_not_stand():
     body, rotations = identify(motion.skeleton), motion.rotations.copy()
     swing = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), np.radians(-80.0))
     rotations[:, body.left.upper_leg] = quaternion.multiply(rotations[:, body.left.upper_leg], swing)
-    rotations[:, body.left.lower_leg] = quaternion.multiply(rotations[:, body.left.lower_leg], quaternion.inverse(swing))
+    rotations[:, body.left.lower_leg] = quaternion.multiply(
+        rotations[:, body.left.lower_leg], quaternion.inverse(swing)
+    )
     found = contacts.detect(replace(motion, rotations=rotations))
     assert not found[:, 0].any() and found[:, 1].all()
     assert not contacts.points(replace(motion, rotations=rotations))[:, 0].any()
@@ -123,10 +125,14 @@ def test_the_floor_is_where_the_toes_are_lowest():
 @pytest.mark.parametrize(
     "pattern, low, high, in_the_air",
     [
-        ("cmu10/train_walking_*.bvh", 0.4, 0.7, 0.0), ("lafan1/walk2_*.bvh", 0.55, 0.8, 0.0), ("cmu10/train_running_*.bvh", 0.18, 0.4, 0.25),
-        ("runs15/*forward0[2468].bvh", 0.18, 0.4, 0.25), ("sprinter/run0900cms.bvh", 0.05, 0.22, 0.6), ("cmu10/train_jumping_*.bvh", 0.35, 0.9, 0.1),
+        ("cmu10/train_walking_*.bvh", 0.4, 0.7, 0.0),
+        ("lafan1/walk2_*.bvh", 0.55, 0.8, 0.0),
+        ("cmu10/train_running_*.bvh", 0.18, 0.4, 0.25),
+        ("runs15/*forward0[2468].bvh", 0.18, 0.4, 0.25),
+        ("sprinter/run0900cms.bvh", 0.05, 0.22, 0.6),
+        ("cmu10/train_jumping_*.bvh", 0.35, 0.9, 0.1),
     ],
-)  # fmt: skip
+)
 def test_shares_of_contact_in_recordings(pattern, low, high, in_the_air):
     for path in sorted(MOCAP.glob(pattern)):
         found = stances(bvh.read(path).motion)

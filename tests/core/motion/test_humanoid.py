@@ -9,15 +9,19 @@ from beyond_mocap.motion.humanoid import heading, identify, leg_length, rest_ali
 from beyond_mocap.motion.motion import Motion, place
 from beyond_mocap.motion.skeleton import Skeleton
 
-# hips; spine ... ; neck, head; then one side's arm (shoulder, upper, lower, hand) and leg (upper, lower, foot, toe), {} the side
+# hips, spine, neck, head, then an arm (shoulder, upper, lower, hand) and a leg (upper, lower, foot, toe); {} the side
 FAMILIES = {
     "CMU": "Hips Spine,Spine1 Neck Head {Left|Right}Shoulder,Arm,ForeArm,Hand {Left|Right}UpLeg,Leg,Foot,ToeBase",
-    "Mixamo": "mixamorig:Hips mixamorig:Spine mixamorig:Neck mixamorig:Head mixamorig:{Left|Right}Shoulder,Arm,ForeArm,Hand mixamorig:{Left|Right}UpLeg,Leg,Foot,ToeBase",
+    "Mixamo": "mixamorig:Hips mixamorig:Spine mixamorig:Neck mixamorig:Head "
+    "mixamorig:{Left|Right}Shoulder,Arm,ForeArm,Hand mixamorig:{Left|Right}UpLeg,Leg,Foot,ToeBase",
     "Bandai": "Hips Spine,Chest Neck Head Shoulder,UpperArm,LowerArm,Hand{_L|_R} UpperLeg,LowerLeg,Foot,Toes{_L|_R}",
-    "Unreal": "pelvis spine_01,spine_02 neck_01 head clavicle,upperarm,lowerarm,hand{_l|_r} thigh,calf,foot,ball{_l|_r}",
-    "Rigify": "DEF-hips DEF-spine DEF-neck DEF-head DEF-shoulder,upper_arm,forearm,hand{.L|.R} DEF-thigh,shin,foot,toe{.L|.R}",
+    "Unreal": "pelvis spine_01,spine_02 neck_01 head "
+    "clavicle,upperarm,lowerarm,hand{_l|_r} thigh,calf,foot,ball{_l|_r}",
+    "Rigify": "DEF-hips DEF-spine DEF-neck DEF-head "
+    "DEF-shoulder,upper_arm,forearm,hand{.L|.R} DEF-thigh,shin,foot,toe{.L|.R}",
     "LAFAN1": "Hips Spine,Spine1,Spine2 Neck Head {Left|Right}Shoulder,Arm,ForeArm,Hand {Left|Right}UpLeg,Leg,Foot,Toe",
-    "blanks": "Hips Spine Neck Head {Left_|Right_}Shoulder,Upper_Arm,Lower_Arm,Hand {Left_|Right_}Upper_Leg,Lower_Leg,Foot,Toe",
+    "blanks": "Hips Spine Neck Head "
+    "{Left_|Right_}Shoulder,Upper_Arm,Lower_Arm,Hand {Left_|Right_}Upper_Leg,Lower_Leg,Foot,Toe",
 }
 
 
@@ -53,8 +57,9 @@ def test_families_of_names(family):
     assert skeleton.names[body.hips] == hips and skeleton.names[body.neck] == neck and skeleton.names[body.head] == head
     assert [skeleton.names[j] for j in body.spine] == spine.split(",") and body.chest == body.spine[-1]
     for side, found in ((0, body.left), (1, body.right)):
-        joints = (found.shoulder, found.upper_arm, found.lower_arm, found.hand, found.upper_leg, found.lower_leg, found.foot, found.toe)
-        assert [skeleton.names[j] for j in joints] == limb(arm, side) + limb(leg, side)
+        arm_joints = (found.shoulder, found.upper_arm, found.lower_arm, found.hand)
+        leg_joints = (found.upper_leg, found.lower_leg, found.foot, found.toe)
+        assert [skeleton.names[j] for j in arm_joints + leg_joints] == limb(arm, side) + limb(leg, side)
     assert [body.mirror[j] for j in body.mirror] == list(range(len(skeleton)))
     assert body.mirror[body.left.hand] == body.right.hand and body.mirror[body.hips] == body.hips
 
@@ -62,11 +67,21 @@ def test_families_of_names(family):
 @pytest.mark.parametrize(
     "name, side, part",
     [
-        ("LeftUpLeg", "left", "upleg"), ("LHipJoint", "left", "hipjoint"), ("RThumb", "right", "thumb"), ("upperarm_r", "right", "upperarm"),
-        ("Leg", "", "leg"), ("LowerBack", "", "lowerback"), ("Root", "", "root"), ("Hand_L", "left", "hand"), ("thigh.R", "right", "thigh"),
-        ("mixamorig:RightFoot", "right", "foot"), ("Bip01 L Thigh", "left", "thigh"), ("Neck", "", "neck"), ("Ribs", "", "ribs"),
+        ("LeftUpLeg", "left", "upleg"),
+        ("LHipJoint", "left", "hipjoint"),
+        ("RThumb", "right", "thumb"),
+        ("upperarm_r", "right", "upperarm"),
+        ("Leg", "", "leg"),
+        ("LowerBack", "", "lowerback"),
+        ("Root", "", "root"),
+        ("Hand_L", "left", "hand"),
+        ("thigh.R", "right", "thigh"),
+        ("mixamorig:RightFoot", "right", "foot"),
+        ("Bip01 L Thigh", "left", "thigh"),
+        ("Neck", "", "neck"),
+        ("Ribs", "", "ribs"),
     ],
-)  # fmt: skip
+)
 def test_sides_and_parts(name, side, part):
     assert side_and_part(name) == (side, part)
 
@@ -80,7 +95,9 @@ def test_toes_and_arms_may_be_missing():
     full = family_skeleton("LAFAN1")
     keep = [i for i, n in enumerate(full.names) if not any(word in n for word in ("Toe", "Arm", "Hand", "Shoulder"))]
     new = {old: i for i, old in enumerate(keep)}
-    body = identify(Skeleton([full.names[i] for i in keep], [new.get(full.parents[i], -1) for i in keep], full.offsets[keep]))
+    body = identify(
+        Skeleton([full.names[i] for i in keep], [new.get(full.parents[i], -1) for i in keep], full.offsets[keep])
+    )
     assert body.left.toe is None and body.left.toe_or_foot == body.left.foot and body.right.hand is None
 
 

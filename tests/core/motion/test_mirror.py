@@ -21,7 +21,7 @@ MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
 def with_axes(motion: Motion, axes: np.ndarray) -> Motion:
-    """The same movement on a skeleton whose joints have other axes: axes (J, 4), each joint's new ones seen from the old."""
+    """The same movement on a skeleton with other axes: axes (J, 4), each joint's new ones seen from the old."""
     old, back = motion.skeleton, quaternion.inverse(axes)
     parents = np.array(old.parents)
     offsets = old.offsets.copy()
@@ -29,7 +29,9 @@ def with_axes(motion: Motion, axes: np.ndarray) -> Motion:
     tips = quaternion.rotate(back[list(old.end_parents)], old.end_offsets)
     rotations = quaternion.multiply(motion.rotations, axes)
     rotations[:, 1:] = quaternion.multiply(back[parents[1:]], rotations[:, 1:])
-    return Motion(Skeleton(old.names, old.parents, offsets, old.end_parents, tips), motion.root_positions, rotations, motion.fps)
+    return Motion(
+        Skeleton(old.names, old.parents, offsets, old.end_parents, tips), motion.root_positions, rotations, motion.fps
+    )
 
 
 def alike(skeleton: Skeleton) -> np.ndarray:
@@ -54,10 +56,10 @@ def image(motion: Motion, positions: np.ndarray) -> np.ndarray:
 def tips_image(motion: Motion) -> np.ndarray:
     """The reflected tips (T, E, 3) in the order of their partners."""
     skeleton, partner = motion.skeleton, identify(motion.skeleton).mirror
-    order = []
-    for joint in sorted(set(skeleton.end_parents), key=skeleton.end_parents.index):
+    own, order = [], []
+    for joint in dict.fromkeys(skeleton.end_parents):
+        own += [i for i, p in enumerate(skeleton.end_parents) if p == joint]
         order += [i for i, p in enumerate(skeleton.end_parents) if p == partner[joint]]
-    own = [i for joint in sorted(set(skeleton.end_parents), key=skeleton.end_parents.index) for i, p in enumerate(skeleton.end_parents) if p == joint]
     out = np.empty((len(motion), len(order), 3))
     out[:, own] = end_positions(motion)[:, order] * (1.0, -1.0, 1.0)
     return out
@@ -103,7 +105,12 @@ def test_uneven_bones_point_where_the_partner_reflected_points(walk):
     mirrored, body = mirror(motion), identify(motion.skeleton)
     before, after = forward_kinematics(motion)[0], forward_kinematics(mirrored)[0]
     for limb, other in ((body.left, body.right), (body.right, body.left)):
-        for upper, lower in (("upper_leg", "lower_leg"), ("lower_leg", "foot"), ("upper_arm", "lower_arm"), ("lower_arm", "hand")):
+        for upper, lower in (
+            ("upper_leg", "lower_leg"),
+            ("lower_leg", "foot"),
+            ("upper_arm", "lower_arm"),
+            ("lower_arm", "hand"),
+        ):
             bone = after[:, getattr(limb, lower)] - after[:, getattr(limb, upper)]
             wanted = (before[:, getattr(other, lower)] - before[:, getattr(other, upper)]) * (1.0, -1.0, 1.0)
             cosine = np.sum(bone * wanted, axis=-1) / np.linalg.norm(bone, axis=-1) / np.linalg.norm(wanted, axis=-1)
@@ -113,9 +120,10 @@ def test_uneven_bones_point_where_the_partner_reflected_points(walk):
 
 def test_the_left_foot_kicks_what_the_right_one_kicked(walk):
     body = identify(walk.skeleton)
-    limb = walk.rotations.copy()
-    limb[20:30, body.right.upper_leg] = quaternion.multiply(limb[20:30, body.right.upper_leg], quaternion.about_axis(np.array([0.0, 1, 0]), -1.0))
-    kick = replace(walk, rotations=limb)
+    rotations, hip = walk.rotations.copy(), body.right.upper_leg
+    forward = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), -1.0)
+    rotations[20:30, hip] = quaternion.multiply(rotations[20:30, hip], forward)
+    kick = replace(walk, rotations=rotations)
     (before, _), (after, _) = forward_kinematics(kick), forward_kinematics(mirror(kick))
     assert np.allclose(after[:, body.left.foot, 2], before[:, body.right.foot, 2])
     assert after[:, body.left.foot, 2].max() > after[:, body.right.foot, 2].max() + 0.1
@@ -132,10 +140,17 @@ def test_one_frame_is_enough_and_nothing_given_changes(walk):
 @pytest.mark.parametrize(
     "pattern, centimetres",
     [
-        ("bandai/*_001.bvh", 0.01), ("lafan1/*_subject1_*.bvh", 0.01), ("getup/*.bvh", 0.01), ("runs15/*1.bvh", 0.01), ("lmd/*/*1_*.bvh", 0.3),
-        ("sprinter/*.bvh", 0.8), ("cmu_jumps/*1.bvh", 2.5), ("cmu10/10_0*.bvh", 5.5), ("keeper/*1_*.bvh", 5.0),
+        ("bandai/*_001.bvh", 0.01),
+        ("lafan1/*_subject1_*.bvh", 0.01),
+        ("getup/*.bvh", 0.01),
+        ("runs15/*1.bvh", 0.01),
+        ("lmd/*/*1_*.bvh", 0.3),
+        ("sprinter/*.bvh", 0.8),
+        ("cmu_jumps/*1.bvh", 2.5),
+        ("cmu10/10_0*.bvh", 5.5),
+        ("keeper/*1_*.bvh", 5.0),
     ],
-)  # fmt: skip
+)
 def test_recordings_are_off_their_image_by_their_bodies_asymmetry_only(pattern, centimetres):
     for path in sorted(MOCAP.glob(pattern))[:12]:
         motion = bvh.read(path).motion

@@ -6,11 +6,23 @@ from scipy.spatial.transform import Rotation
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.motion import Motion, at_frames, concatenate, end_positions, forward_kinematics, place, resample
+from beyond_mocap.motion.motion import (
+    Motion,
+    at_frames,
+    concatenate,
+    end_positions,
+    forward_kinematics,
+    place,
+    resample,
+)
 from beyond_mocap.motion.skeleton import Skeleton
 
 TREE = Skeleton(
-    ("root", "a", "b", "c"), (-1, 0, 1, 0), [[0, 0, 0], [0.1, 0, 0.4], [0, 0.2, 0.3], [0, -0.1, 0]], (2, 3), [[0, 0, 0.1], [0.1, 0, 0]]
+    ("root", "a", "b", "c"),
+    (-1, 0, 1, 0),
+    [[0, 0, 0], [0.1, 0, 0.4], [0, 0.2, 0.3], [0, -0.1, 0]],
+    (2, 3),
+    [[0, 0, 0.1], [0.1, 0, 0]],
 )
 
 
@@ -27,7 +39,11 @@ def test_forward_kinematics_is_the_chain_of_its_parents(motion):
         for joint, parent in enumerate(TREE.parents):
             turn = Rotation.from_quat(np.roll(motion.rotations[frame, joint], -1))
             turns.append(turn if parent < 0 else turns[parent] * turn)
-            at = motion.root_positions[frame] if parent < 0 else places[parent] + turns[parent].apply(TREE.offsets[joint].copy())
+            at = (
+                motion.root_positions[frame]
+                if parent < 0
+                else places[parent] + turns[parent].apply(TREE.offsets[joint].copy())
+            )
             places.append(at)
         assert np.allclose(positions[frame], places)
         assert np.allclose(quaternion.to_matrix(rotations[frame]), [turn.as_matrix() for turn in turns])
@@ -46,7 +62,9 @@ def test_rotations_are_unit_continuous_and_read_only(motion):
 
 def test_whole_frames_are_themselves_and_halves_lie_between(motion):
     root, rotations = at_frames(motion, np.array([3.0, 7.0, 99.0, -5.0]))
-    assert np.allclose(root, motion.root_positions[[3, 7, 19, 0]]) and np.allclose(rotations, motion.rotations[[3, 7, 19, 0]])
+    assert np.allclose(root, motion.root_positions[[3, 7, 19, 0]]) and np.allclose(
+        rotations, motion.rotations[[3, 7, 19, 0]]
+    )
     root, rotations = at_frames(motion, np.array([3.5]))
     assert np.allclose(root[0], motion.root_positions[3:5].mean(axis=0))
     assert np.allclose(rotations[0], quaternion.slerp(motion.rotations[3], motion.rotations[4], 0.5))

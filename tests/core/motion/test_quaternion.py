@@ -64,14 +64,21 @@ def test_matrices_of_half_turns_come_back():
 
 def test_between_turns_one_vector_onto_another_even_the_opposite():
     turned = quaternion.rotate(quaternion.between(V, V[::-1]), V)
-    assert np.allclose(quaternion.cross(turned, V[::-1]), 0.0, atol=1e-9) and np.all(np.sum(turned * V[::-1], axis=-1) > 0)
+    assert np.allclose(quaternion.cross(turned, V[::-1]), 0.0, atol=1e-9) and np.all(
+        np.sum(turned * V[::-1], axis=-1) > 0
+    )
     assert np.allclose(quaternion.rotate(quaternion.between(V, -V), V), -V)
 
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_euler_angles_are_intrinsic_in_the_order_of_their_letters(order):
     angles = np.random.default_rng(4).uniform(-np.pi, np.pi, (200, 3))
-    assert same_rotation(quaternion.from_euler(angles, order), np.roll(Rotation.from_euler(order, angles).as_quat(), 1, -1)).max() < 1e-12
+    assert (
+        same_rotation(
+            quaternion.from_euler(angles, order), np.roll(Rotation.from_euler(order, angles).as_quat(), 1, -1)
+        ).max()
+        < 1e-12
+    )
 
 
 @pytest.mark.parametrize("order", ORDERS)
