@@ -86,15 +86,21 @@ def synthesize(load, settings, steps) -> list[dict]:
     plans, session = load("scene.plans"), load("scene.session")
     order, recipe = load("operators.synthesize"), load("beyond_mocap.synthesize")
     steps.enter("Library")
+    begun = time.perf_counter()
     clips = load("beyond_mocap.library.library").build(settings.library_folder, progress=steps.progress)
+    library_seconds = time.perf_counter() - begun
     session.keep_library(clips, None)
     settings.library_holds = load("operators.build_library").summary(clips)
     reports = []
     for player in settings.players:
         steps.enter(player.name)
+        begun = time.perf_counter()
         plan, _ = plans.plan_of(settings, player)
+        load_seconds = time.perf_counter() - begun
         take = recipe.synthesize(clips, plan, progress=steps.progress)
+        total = time.perf_counter() - begun + library_seconds
         reports.append(load("beyond_mocap.evaluation.report").evaluate(take, plan.track, clips))
+        reports[-1]["seconds"].update(load=load_seconds, library=library_seconds, total=total)
         player.take = session.keep_take(plan, take)
         player.quality = order.quality(reports[-1])
     return reports
@@ -222,7 +228,6 @@ def run(out: pathlib.Path) -> None:
     load, switch_off = load_extension()
     import bpy
 
-    out.mkdir(parents=True, exist_ok=True)
     told = load("beyond_mocap.__main__").Told(False)
     steps = Steps(told, {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Bake": 0.03, "Render": 0.65, "Save": 0.02})
     with quiet():
@@ -259,6 +264,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Two players and a ball, from the sample's dots and words to Blender.")
     parser.add_argument("--out", type=pathlib.Path, default=HERE.parent / "build" / "demo", help="folder to write into")
     options = parser.parse_args()
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        print(f"{options.out}: {error.strerror}; choose another folder with --out", file=sys.stderr)
+        return 2
     run(options.out.resolve())
     return 0
 
