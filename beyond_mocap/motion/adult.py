@@ -15,11 +15,11 @@ from .skeleton import Skeleton
 # joint, parent, offset in thousandths of the stature (forward, left, up); limbs are given for the left side
 _CENTRE = (
     ("Hips", None, (0, 0, 0)),
-    ("Spine", "Hips", (-6, 0, 48)),
+    ("Spine", "Hips", (-3, 0, 48)),
     ("Spine1", "Spine", (4, 0, 72)),
     ("Spine2", "Spine1", (-5, 0, 75)),
-    ("Neck", "Spine2", (-14, 0, 118)),
-    ("Head", "Neck", (9, 0, 52)),
+    ("Neck", "Spine2", (-6, 0, 118)),
+    ("Head", "Neck", (11, 0, 52)),
 )
 _ARM = (
     ("Shoulder", "Spine2", (2, 14, 92)),

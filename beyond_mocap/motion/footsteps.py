@@ -25,10 +25,11 @@ _FULL_STEP = 0.55
 class Footsteps:
     """The K stances of one foot in order of time.
 
-    on, off (K,): seconds. place (K, 2): metres, below the ankle of the flat foot. yaw (K,): radians. speed (K,): m/s of
+    side: 0 left, 1 right. on, off (K,): seconds. place (K, 2): metres, below the ankle of the flat foot. yaw (K,): radians. speed (K,): m/s of
     travel for an adult's leg, which picks the way of rolling. direction (K,): travel relative to the foot, radians.
     """
 
+    side: int
     on: np.ndarray
     off: np.ndarray
     place: np.ndarray
@@ -68,7 +69,7 @@ def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutr
     amount = before + (after - before) * smooth_step((share - 0.2) / 0.3)
     pitch = amount * _directed_pitch(share, steps.speed[which], steps.direction[which])
     tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFTS, 0.0)
-    forward, up = _roll(pitch, tip_pitch, neutral)
+    forward, up = _roll(pitch, tip_pitch, neutral, steps.side)
     yaw = steps.yaw[which]
     ankle = np.stack(
         [steps.place[which, 0] + forward * np.cos(yaw), steps.place[which, 1] + forward * np.sin(yaw), up], axis=-1
@@ -84,9 +85,9 @@ def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray)
     return ahead * forward_roll + 0.5 * back * backward_roll + 0.25 * np.sin(direction) ** 2 * np.maximum(forward_roll, 0.0)
 
 
-def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
+def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int) -> tuple[np.ndarray, np.ndarray]:
     """How far ahead of its flat place and how high above the ground (T,), (T,) metres the ankle is when the sole pitches."""
-    ball_ahead, drop = neutral.ball[0, 0], -neutral.ball[0, 2]
+    ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
     # on the ball (and, beyond, on the toe tip)
     tip = neutral.tip
@@ -212,10 +213,17 @@ def _small_step(share, leave, land, lift) -> np.ndarray:
 
 def _clearance(ankle_up, pitch, share, size, neutral: Neutral) -> np.ndarray:
     """How much (N,) metres the swinging foot has to be lifted so that toes and heel pass above the ground."""
+    wanted = 0.014 * size * np.sin(np.pi * share) ** 2
+    return lift_off_ground(ankle_up, pitch, neutral, wanted) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
+
+
+def lift_off_ground(ankle_up: np.ndarray, pitch: np.ndarray, neutral: Neutral, clearance: float | np.ndarray = 0.0) -> np.ndarray:
+    """How much (T,) metres a foot has to be raised for its lowest point to be `clearance` above the ground, softly.
+
+    ankle_up (T,): height of the ankle, metres; pitch (T,): of the sole, toes down positive.
+    """
     ball_ahead, drop, ball_up = neutral.ball[0, 0], -neutral.ball[0, 2], neutral.ankle_height + neutral.ball[0, 2]
     toe = ankle_up - (ball_ahead + neutral.tip) * np.sin(pitch) - drop * np.cos(pitch) - ball_up
     heel = ankle_up + neutral.heel * np.sin(pitch) - neutral.ankle_height * np.cos(pitch)
-    wanted = 0.014 * size * np.sin(np.pi * share) ** 2
-    lowest = np.minimum(toe, heel) - wanted
     soft = 0.006
-    return np.where(share * (1 - share) > 0, soft * np.logaddexp(0.0, -lowest / soft), 0.0) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
+    return soft * np.logaddexp(0.0, (clearance - np.minimum(toe, heel)) / soft)

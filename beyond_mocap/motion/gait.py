@@ -30,8 +30,10 @@ from .skeleton import Skeleton
 _PAD = 2.5
 # feet are planned at this rate or a multiple of it
 _PLAN_RATE = 120.0
+# how far ahead of and behind the hips a flat foot stands at most, shares of the leg's length
+_AHEAD, _BEHIND = 0.41, 0.72
 # how far a leg is straightened at most in stance, share of its length
-_STRAIGHTEST = 0.994
+_STRAIGHTEST = 0.9955
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def plan(
     times = (np.arange((count - 1) * stride + 1 + 2 * pad) - pad) / rate
     speed, turn_rate, direction = (_at(values, times, fps, count) for values in (speed, turn_rate, direction))
     if np.any(speed < 0.0) or np.any(speed > tables.FASTEST + 1e-9) or not np.all(np.isfinite(speed)):
-        raise InputError("gait", f"speed {np.nanmin(speed):.3g} .. {np.nanmax(speed):.3g} m/s", "0 .. 9.5")
+        raise InputError("gait", f"speed {np.min(speed):.3g} .. {np.max(speed):.3g} m/s", "0 .. 9.5")
     heading = _integral(turn_rate, rate, pad)
     way = heading + direction
     velocity = speed[:, None] * np.stack([np.cos(way), np.sin(way)], axis=-1)
@@ -170,7 +172,21 @@ def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> 
     place = place + np.stack([ahead * np.cos(heading) - left * np.sin(heading), ahead * np.sin(heading) + left * np.cos(heading)], -1)
     place = place - _lean_shift(course, neutral, middle)
     toe_out = sign * (np.radians(at_speed("toe_out", gear)) + style.toe_out)
-    return Footsteps(on, off, place, heading + toe_out, gear, direction)
+    on, off = _within_reach(course, place, on, off, neutral.leg)
+    return Footsteps(side, on, off, place, heading + toe_out, gear, direction)
+
+
+def _within_reach(course: Course, place: np.ndarray, on: np.ndarray, off: np.ndarray, leg: float) -> tuple[np.ndarray, np.ndarray]:
+    """Stances (K,) cut where the hips are too far from the foot: when speed changes within a stance, feet lift earlier."""
+    share = np.linspace(0.0, 0.5, 26)
+    ends = []
+    for edge, sign in ((on, -1.0), (off, 1.0)):
+        at = 0.5 * (on + off)[:, None] + sign * share * (off - on)[:, None]
+        hips = np.stack([np.interp(at, course.times, course.path[:, axis]) for axis in (0, 1)], axis=-1)
+        near = np.linalg.norm(hips - place[:, None], axis=-1) <= (_AHEAD if sign < 0 else _BEHIND) * leg
+        last = np.where(near.all(axis=1), len(share) - 1, np.argmin(near, axis=1))
+        ends.append(np.where(near.all(axis=1), edge, np.take_along_axis(at, np.maximum(last, 8)[:, None], axis=1)[:, 0]))
+    return ends[0], ends[1]
 
 
 def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
@@ -188,7 +204,7 @@ def posture_over(course: Course, steps: tuple[Footsteps, Footsteps], neutral: Ne
     count = len(course.times)
     rate = 1.0 / (course.times[1] - course.times[0])
     posture = Posture(
-        fps=rate / course.stride,
+        fps=round(rate / course.stride, 6),
         heading=course.heading,
         arms=_arms(course, style, seed),
         wrists=np.full((count, 2), np.radians(8.0)),

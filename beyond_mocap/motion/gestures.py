@@ -14,15 +14,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from . import gait_tables as tables
+from . import quaternion
 from .adult import adult_skeleton
-from .footsteps import Footsteps
+from .footsteps import Footsteps, lift_off_ground
 from .gait import Course, GaitStyle, footsteps, plan, posture_over, with_feet
 from .gait_tables import smooth_step
 from .motion import Motion
 from .neutral import Neutral, neutral_stance
-from .posture import Posture, foot_rotation, to_motion
+from .posture import Posture, to_motion
 from .skeleton import Skeleton
-from . import quaternion
 
 LEFT, RIGHT = 0, 1
 
@@ -59,14 +59,14 @@ class Strike:
     head: float = 14.0
 
 
-_KICK_SPEEDS = ((-2.6, 2.4), (-1.4, 2.8), (-0.5, 2.7), (0.0, 1.5), (0.45, 1.1), (1.0, 1.5), (2.2, 2.2))
+_KICK_SPEEDS = ((-2.6, 2.4), (-1.4, 2.9), (-0.6, 2.8), (0.0, 1.9), (0.45, 1.3), (1.0, 1.6), (2.2, 2.3))
 STRIKES = {
     "kick low inside": Strike(
         foot=(
-            (-0.15, -0.42, -0.12, 0.34, 45, -35, 0),
-            (0.0, 0.30, -0.06, 0.105, 2, -68, -6),
-            (0.09, 0.60, 0.00, 0.22, -4, -62, -8),
-            (0.20, 0.62, 0.02, 0.32, 0, -40, -4),
+            (-0.15, -0.42, -0.14, 0.34, 45, -35, 0),
+            (0.0, 0.30, -0.11, 0.105, 2, -68, -6),
+            (0.09, 0.58, -0.08, 0.22, -4, -62, -8),
+            (0.20, 0.60, -0.09, 0.32, 0, -40, -4),
         ),
         pelvis=((-0.15, 4, 4, -20), (0.0, 5, -2, 6), (0.18, 3, -4, 16)),
         spine=((-0.15, -10, 8, 24), (0.0, -9, 10, -4), (0.18, -4, 12, -16)),
@@ -75,12 +75,12 @@ STRIKES = {
         speeds=_KICK_SPEEDS,
         pace=0.86,
         at=0.46,
-        sink=((-0.1, 0.03), (0.0, 0.03), (0.2, 0.01)),
+        sink=((-0.1, 0.01), (0.0, 0.015), (0.2, 0.005)),
     ),
     "kick low top": Strike(
         foot=(
             (-0.14, -0.52, -0.16, 0.50, 88, -8, 0),
-            (0.0, 0.24, -0.07, 0.145, 42, -10, 6),
+            (0.0, 0.24, -0.09, 0.175, 36, -10, 6),
             (0.07, 0.66, 0.02, 0.42, 18, 2, 4),
             (0.17, 0.70, 0.10, 0.72, -10, 10, 0),
             (0.30, 0.56, 0.06, 0.48, -2, 6, 0),
@@ -92,14 +92,14 @@ STRIKES = {
         speeds=_KICK_SPEEDS,
         pace=0.80,
         at=0.42,
-        sink=((-0.1, 0.045), (0.0, 0.04), (0.2, 0.0)),
+        sink=((-0.1, 0.015), (0.0, 0.02), (0.2, 0.0)),
     ),
     "receive foot low inside": Strike(
         foot=(
-            (-0.16, 0.26, -0.06, 0.16, 0, -48, 0),
-            (0.0, 0.34, -0.05, 0.15, -4, -70, -6),
-            (0.16, 0.10, -0.08, 0.13, 2, -66, -4),
-            (0.26, 0.10, -0.10, 0.11, 2, -45, 0),
+            (-0.16, 0.26, -0.14, 0.16, 0, -48, 0),
+            (0.0, 0.34, -0.14, 0.15, -4, -70, -6),
+            (0.16, 0.10, -0.15, 0.13, 2, -66, -4),
+            (0.26, 0.10, -0.13, 0.11, 2, -45, 0),
         ),
         pelvis=((-0.16, 4, 2, -4), (0.0, 5, 0, 2), (0.16, 4, 2, -10)),
         spine=((-0.16, -6, 9, 4), (0.0, -7, 12, -2), (0.16, -5, 14, 6)),
@@ -138,7 +138,7 @@ def strike(kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed
 def _in_step(course: Course, key: float, recipe: Strike) -> Course:
     """The course with a cadence that dips around the touch, and a phase at which the right foot is in its swing there."""
     rate = np.gradient(course.phase, course.times)
-    dip = 1.0 - (1.0 - recipe.pace) * np.exp(-(((course.times - key) / 0.42) ** 2))
+    dip = 1.0 - (1.0 - recipe.pace) * np.exp(-(((course.times - key - 0.1) / 0.33) ** 2))
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate * dip)[1:] + 0.5 * (rate * dip)[:-1])])
     phase = phase * (course.times[1] - course.times[0])
     duty = float(tables.at_speed("duty", np.interp(key - 0.2, course.times, course.gear)))
@@ -166,11 +166,12 @@ def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Stri
     for side, rows in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm)):
         arms[:, side, :4] = _mixed(arms[:, side, :4], np.radians(_keyed(rows, times)), ease)
     posture = posture.changed(pelvis=pelvis, spine=spine, head=head, arms=arms)
-    return _kicking_foot(posture, course, _swing_around(steps[RIGHT], key), key, recipe.foot, scale)
+    return _kicking_foot(posture, course, _swing_around(steps[RIGHT], key), key, recipe.foot, neutral)
 
 
-def _kicking_foot(posture: Posture, course: Course, swing: tuple[float, float], key: float, rows, scale: float) -> Posture:
+def _kicking_foot(posture: Posture, course: Course, swing: tuple[float, float], key: float, rows, neutral: Neutral) -> Posture:
     """The right foot's swing between `swing` seconds led through the rows of a Strike; its ends stay as they were."""
+    scale = neutral.leg / tables.LEG
     inside = (course.times > swing[0]) & (course.times < swing[1])
     edges = np.flatnonzero(inside)[[0, -1]] + [-1, 1]
     ground = posture.hips * [1.0, 1.0, 0.0]
@@ -186,6 +187,8 @@ def _kicking_foot(posture: Posture, course: Course, swing: tuple[float, float], 
     ankles, feet = posture.ankles.copy(), posture.feet.copy()
     back = quaternion.about_up(posture.heading[inside])
     ankles[inside, RIGHT] = ground[inside] + quaternion.rotate(back, path[:, :3])
+    edge = np.sin(np.pi * (course.times[inside] - swing[0]) / (swing[1] - swing[0]))
+    ankles[inside, RIGHT, 2] += lift_off_ground(ankles[inside, RIGHT, 2], path[:, 4], neutral) * np.sqrt(np.maximum(edge, 0.0))
     feet[inside, RIGHT] = path[:, 3:] + np.stack([0 * path[:, 0], 0 * path[:, 0], posture.heading[inside]], axis=-1)
     return posture.changed(ankles=ankles, feet=feet)
 
@@ -210,6 +213,7 @@ def dribble(speed: float, duration: float, skeleton: Skeleton | None = None, fps
     ankles[:, RIGHT] += 0.05 * scale * touch[:, None] * ahead
     feet[:, RIGHT, 1] += np.radians(16) * touch
     feet[:, RIGHT, 2] -= np.radians(22) * touch
+    ankles[:, RIGHT, 2] += touch * lift_off_ground(ankles[:, RIGHT, 2], feet[:, RIGHT, 1], neutral)
     posture = posture.changed(ankles=ankles, feet=feet)
     return to_motion(posture.frames(course.asked), neutral)
 
@@ -241,7 +245,7 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
     air = _FLIGHT * np.sqrt(scale)
     trunk, arms = np.radians(_keyed(_HEADER["trunk"], times)), np.radians(_keyed(_HEADER["arms"], times))
     ease = _envelope(times, -1.1, -0.8, 0.9, 1.4)
-    pitch = np.radians(62) * _bump(times, -air - 0.14, -air, air, air + 0.12)
+    pitch = np.radians(62) * _envelope(times, -air - 0.14, -air, air, air + 0.12)
     hips, ankles, feet, toes = posture.hips.copy(), posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
     rise, tuck = _jump(times, air, hips[:, 2], neutral, pitch)
     hips[:, 2] = rise
@@ -311,7 +315,7 @@ _THROW = {
         (0.6, 10, 18, -12), (1.3, 0, 2, 4),
     ),
     "arms": (  # flexion, abduction, inward, elbow, palm
-        (-1.9, 28, -2, 42, 72, 20), (-1.2, 60, -4, 40, 80, 20), (-0.42, 168, 4, 24, 118, 10), (-0.22, 172, 4, 22, 112, 10),
+        (-1.9, 28, 2, 18, 72, 20), (-1.2, 60, 2, 18, 80, 20), (-0.42, 168, 2, 14, 118, 10), (-0.22, 172, 2, 14, 112, 10),
         (0.0, 150, 2, 18, 32, 10), (0.2, 84, 2, 18, 14, 15), (0.6, 36, 6, 18, 22, 18), (1.3, 2, 9, 12, 16, 18),
     ),
     "hips": ((-1.9, 0.0, 0.0), (-0.9, -0.06, 0.02), (-0.42, 0.02, 0.05), (0.0, 0.34, 0.05), (0.3, 0.46, 0.04), (1.2, 0.46, 0.0)),
@@ -359,22 +363,23 @@ def _walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves
     places = np.array(places + places[-1:])
     count = len(on)
     yaw = np.full(count, sign * np.radians(tables.at_speed("toe_out", 0.3)))
-    return Footsteps(on, off, np.stack([places, np.full(count, left)], -1), yaw, np.full(count, 1.2), np.zeros(count))
+    return Footsteps(side, on, off, np.stack([places, np.full(count, left)], -1), yaw, np.full(count, 1.2), np.zeros(count))
 
 
 # seconds from the beginning; hips ahead, height; tilt of pelvis, spine, head; ankles ahead (left, right), height; foot pitch
 _UP = {
-    "hips": ((0, 0.0, 0.115), (0.7, 0.0, 0.115), (1.25, 0.02, 0.12), (1.75, 0.18, 0.22), (2.15, 0.42, 0.44), (2.7, 0.52, 0.72),
+    "hips": ((0, 0.0, 0.125), (0.7, 0.0, 0.125), (1.25, 0.02, 0.125), (1.75, 0.18, 0.22), (2.15, 0.42, 0.44), (2.7, 0.52, 0.72),
              (3.3, 0.56, 0.90), (3.9, 0.57, 0.93)),
     "tilt": ((0, -88, -4, 6), (0.55, -84, 16, 20), (1.25, -34, 38, 10), (1.75, 12, 44, -16), (2.15, 40, 40, -34),
              (2.7, 38, 28, -30), (3.3, 10, 10, -8), (3.9, 0, 2, 4)),
     "left": ((0, 0.80, 0.075, -55), (0.5, 0.80, 0.075, -50), (1.1, 0.54, 0.074, -4), (1.4, 0.52, 0.0732, 0), (3.9, 0.52, 0.0732, 0)),
     "right": ((0, 0.82, 0.075, -60), (0.6, 0.80, 0.075, -55), (1.25, 0.46, 0.078, 0), (1.6, 0.44, 0.0732, 0), (2.6, 0.44, 0.0732, 6),
               (2.85, 0.50, 0.12, 18), (3.15, 0.54, 0.0732, 0), (3.9, 0.54, 0.0732, 0)),
-    "left_arm": ((0, -4, 22, 0, 10), (0.7, -38, 24, -10, 55), (1.25, -46, 22, -10, 24), (1.75, 8, 24, 10, 40), (2.2, 62, 8, 20, 20),
+    "wrists": ((0, 8), (0.75, 0), (1.0, -66), (1.25, -72), (1.6, -15), (1.85, -25), (2.05, -55), (2.35, -10), (2.8, 8)),
+    "left_arm": ((0, 2, 26, 0, 12), (0.7, -6, 30, -8, 32), (1.25, -38, 22, -10, 24), (1.75, 8, 24, 10, 40), (2.2, 62, 8, 20, 20),
                  (2.7, 48, 6, 20, 16), (3.3, 12, 10, 14, 22), (3.9, 2, 9, 12, 15)),
-    "right_arm": ((0, -2, 20, 0, 12), (0.7, -36, 24, -10, 60), (1.25, -44, 24, -10, 20), (1.9, -30, 22, -5, 10), (2.25, 20, 16, 10, 26),
-                  (2.7, 40, 8, 18, 22), (3.3, 10, 10, 14, 20), (3.9, 1, 9, 12, 15)),
+    "right_arm": ((0, 4, 26, 0, 14), (0.7, -4, 30, -8, 30), (1.25, -36, 24, -10, 20), (1.6, -34, 24, -5, 12), (1.95, 16, 24, 5, 24),
+                  (2.3, 50, 12, 15, 24), (2.7, 42, 8, 18, 22), (3.3, 10, 10, 14, 20), (3.9, 1, 9, 12, 15)),
 }
 _UP_TIME = 3.9
 
@@ -409,6 +414,7 @@ def getting_up(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 
         spine=np.stack([nothing, trunk[:, 1], nothing], -1),
         head=np.stack([nothing, trunk[:, 2], nothing], -1),
         arms=arms,
+        wrists=np.radians(np.repeat(_keyed(_UP["wrists"], times), 2, axis=1)),
         ankles=ankles,
         feet=feet,
         toes=np.zeros_like(posture.toes),
@@ -451,10 +457,6 @@ def _keyed(rows, times: np.ndarray) -> np.ndarray:
 def _envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
     """0 before `begin`, 1 from `full` to `fade`, 0 after `end` (T,)."""
     return smooth_step((times - begin) / (full - begin)) * (1.0 - smooth_step((times - fade) / (end - fade)))
-
-
-def _bump(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
-    return _envelope(times, begin, full, fade, end)
 
 
 def _mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:

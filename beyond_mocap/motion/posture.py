@@ -15,7 +15,8 @@ from .humanoid import Humanoid, Limb, identify
 from .motion import Motion, pose_kinematics
 from .neutral import Neutral
 
-FLEX, ABDUCT, INWARD, ELBOW, PRONATE = range(5)
+# metres below full stretch from where a leg eases: less than what `gait` leaves, so that standing feet are met exactly
+_SOFT = 0.003
 _X, _Y, _Z = np.eye(3)
 
 
@@ -152,7 +153,7 @@ def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[in
     top = hip_joints(posture, neutral)[:, side]
     ankle = posture.ankles[:, side]
     pole = knee_pole(posture, top, side)
-    knee, end, hinge = limb.bend(top, ankle, np.array(upper), np.array(lower), pole)
+    knee, end, hinge = limb.bend(top, ankle, np.array(upper), np.array(lower), pole, _SOFT)
     thigh = limb.bone_frame(limb.unit(knee - top, -_Z), hinge)
     shank = limb.bone_frame(limb.unit(end - knee, -_Z), hinge)
     foot = foot_rotation(posture.feet[:, side])
