@@ -1,0 +1,156 @@
+"""Feet held where they stand: a planted slide is taken out, and nothing else is broken by it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.motion import contacts
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.motion import place, pose_kinematics
+from beyond_mocap.polish.foot_plant import MOST_DROP, plant, shift
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """A clean walk along +x, toes on the ground, and which of its heels and toes stand."""
+    return grounded(gait(1.4, 4.0, 30.0))
+
+
+def grounded(motion):
+    down = motion.root_positions - [0.0, 0.0, contacts.floor_height(motion)]
+    return replace(motion, root_positions=down), contacts.points(motion)
+
+
+def feet_of(motion, root, rotations):
+    """Heels and toes (T, 2 sides, 2, 3)."""
+    body = identify(motion.skeleton)
+    places, _ = pose_kinematics(motion.skeleton, root, rotations)
+    return np.stack([places[:, [limb.foot, limb.toe_or_foot]] for limb in (body.left, body.right)], axis=1)
+
+
+def slide(motion, root, rotations, stands):
+    """Mean speed over ground in m/s of heels and toes in frames where both of a foot stand, now and in the next frame."""
+    feet = feet_of(motion, root, rotations)
+    speed = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1).mean(axis=2) * motion.fps
+    flat = stands.all(axis=2)
+    return speed[flat[1:] & flat[:-1]].mean()
+
+
+def planted(motion, stands, moved=0.0):
+    """The motion with `moved` (T, 3) added to its root, before and after planting."""
+    root = motion.root_positions + moved
+    return root, plant(motion.skeleton, root, motion.rotations, stands, motion.fps)
+
+
+@pytest.mark.parametrize("velocity", [(0.3, 0.0), (0.0, 0.2), (-0.3, 0.1)])
+def test_a_planted_slide_is_removed(walk, velocity):
+    motion, stands = walk
+    moved = np.outer(np.arange(len(motion)) / 30.0, (*velocity, 0.0))
+    root, out = planted(motion, stands, moved)
+    before, own = slide(motion, root, motion.rotations, stands), slide(motion, motion.root_positions, motion.rotations, stands)
+    after = slide(motion, out.root, out.rotations, stands)
+    assert before > 0.8 * np.hypot(*velocity) and own < 0.06
+    assert after < own + 0.01
+    assert np.array_equal(out.root[:, :2], root[:, :2])
+
+
+def test_turning_on_a_standing_foot_is_removed(walk):
+    motion, stands = walk
+    turned = place(motion, 0.3 * np.sin(np.arange(len(motion)) / 10.0))
+    out = plant(motion.skeleton, turned.root_positions, turned.rotations, stands, 30.0)
+    before = slide(motion, turned.root_positions, turned.rotations, stands)
+    assert slide(motion, out.root, out.rotations, stands) < 0.25 * before
+
+
+def test_a_clean_walk_stays_as_it_is(walk):
+    motion, stands = walk
+    root, out = planted(motion, stands)
+    change = feet_of(motion, out.root, out.rotations) - feet_of(motion, root, motion.rotations)
+    assert np.median(np.linalg.norm(change, axis=-1)) < 0.01 and np.abs(change).max() < 0.05
+    assert np.abs(out.root - root).max() < 0.04
+
+
+@pytest.mark.parametrize("height", [0.0, -0.03, -0.06])
+def test_feet_that_sank_stand_on_the_ground(walk, height):
+    motion, stands = walk
+    _, out = planted(motion, stands, np.array([0.0, 0.0, height]))
+    toes = feet_of(motion, out.root, out.rotations)[:, :, 1, 2]
+    assert toes.min() > -0.012 and np.percentile(toes, 2) > -0.006
+    assert np.median(np.abs(toes[stands.all(axis=2)])) < 0.006
+
+
+def test_bones_keep_their_length_and_rotations_are_unit(walk):
+    motion, stands = walk
+    _, out = planted(motion, stands, np.outer(np.arange(len(motion)) / 30.0, (0.4, 0.0, 0.0)))
+    assert np.allclose(np.linalg.norm(out.rotations, axis=-1), 1.0, atol=1e-9)
+    places, _ = pose_kinematics(motion.skeleton, out.root, out.rotations)
+    for joint, parent in enumerate(motion.skeleton.parents):
+        if parent >= 0:
+            length = np.linalg.norm(places[:, joint] - places[:, parent], axis=1)
+            assert np.allclose(length, np.linalg.norm(motion.skeleton.offsets[joint]), atol=1e-9)
+
+
+def test_only_legs_and_the_hips_height_move(walk):
+    motion, stands = walk
+    root, out = planted(motion, stands, np.outer(np.arange(len(motion)) / 30.0, (0.4, 0.0, 0.0)))
+    body = identify(motion.skeleton)
+    legs = {j for limb in (body.left, body.right) for j in (limb.upper_leg, limb.lower_leg, limb.foot)}
+    others = [j for j in range(len(motion.skeleton)) if j not in legs]
+    assert np.array_equal(out.rotations[:, others], motion.rotations[:, others])
+    drop = root[:, 2] - out.root[:, 2]
+    assert drop.min() > -1e-9 and drop.max() <= MOST_DROP + 1e-9
+
+
+def test_what_was_moved_is_told(walk):
+    motion, stands = walk
+    root, out = planted(motion, stands, np.outer(np.arange(len(motion)) / 30.0, (0.2, 0.0, 0.0)))
+    change = feet_of(motion, out.root, out.rotations)[:, :, 0] - feet_of(motion, root, motion.rotations)[:, :, 0]
+    reached = out.miss < 1e-4
+    assert reached.mean() > 0.8
+    assert np.allclose(np.linalg.norm(change, axis=-1)[reached], out.correction[reached], atol=2e-3)
+    assert np.all(out.miss >= 0.0) and np.all(out.correction >= 0.0)
+
+
+@pytest.mark.parametrize("stands", [False, True])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 40])
+def test_never_or_always_standing_and_few_frames(walk, stands, count):
+    motion = walk[0].frames(0, count)
+    out = plant(motion.skeleton, motion.root_positions, motion.rotations, np.full((count, 2, 2), stands), 30.0)
+    for values in (out.root, out.rotations, out.correction, out.miss):
+        assert np.all(np.isfinite(values))
+    assert out.rotations.shape == motion.rotations.shape and out.correction.shape == (count, 2)
+
+
+def test_a_foot_that_never_stands_is_left_where_it_is(walk):
+    motion, _ = walk
+    high = np.array([0.0, 0.0, 0.5])
+    root, out = planted(motion, np.zeros((len(motion), 2, 2), bool), high)
+    change = feet_of(motion, out.root, out.rotations) - feet_of(motion, root, motion.rotations)
+    assert np.abs(change).max() < 0.01
+
+
+@pytest.mark.parametrize("fps", [24.0, 60.0, 120.0])
+def test_at_any_rate(fps):
+    motion, stands = grounded(gait(1.4, 4.0, fps))
+    moved = np.outer(np.arange(len(motion)) / fps, (0.3, 0.0, 0.0))
+    root, out = planted(motion, stands, moved)
+    assert slide(motion, out.root, out.rotations, stands) < 0.07 and slide(motion, root, motion.rotations, stands) > 0.25
+
+
+def test_the_input_is_left_alone(walk):
+    motion, stands = walk
+    root, rotations = motion.root_positions.copy(), motion.rotations.copy()
+    plant(motion.skeleton, root, rotations, stands, 30.0)
+    assert np.array_equal(root, motion.root_positions) and np.array_equal(rotations, motion.rotations)
+
+
+def test_the_shift_cancels_velocity_where_it_has_weight_and_is_gentle_elsewhere():
+    velocity = np.full((89, 1), 0.01)
+    weight = np.zeros((90, 1))
+    weight[20:40] = weight[60:80] = 1.0
+    found = shift(velocity, weight)[:, 0]
+    assert np.allclose(np.diff(found)[22:37], -0.01, atol=1e-3) and np.allclose(np.diff(found)[62:77], -0.01, atol=1e-3)
+    assert np.abs(np.diff(found, 3)).max() < 0.01 and np.abs(found).max() < 0.25
+    assert np.allclose(shift(velocity, weight * 0.0), 0.0)
