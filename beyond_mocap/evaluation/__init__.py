@@ -6,7 +6,7 @@
 - `jerk`       seams against uncut recordings of the same speed
 - `words`      annotation similarity (Faustino §3.2.2 eq. 18)
 - `realism`    distance to the nearest recorded pose; the smoothness curve (Faustino App. D)
-- `contact`    striking surface to ball; `moments` what became of each key moment
+- `moments`    what became of each key moment, and how near the striking surface was to the ball
 - `played`     what was played, from a take in memory or from files
 - `reference`  a library's own scores, once per library and rate
 - `view`, `figures`, `report`  the Report JSON, and reports side by side as a table

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..annotation import KeyMoment
 from ..library.library import Library
+from ..motion.striking import contact_gap, striking_part
 from ..motion.track import Track
 from . import pieces
-from .contact import contact_gap, striking_part
 from .played import Played
 
 
@@ -103,23 +103,15 @@ def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> fl
 
 def ball_gap(played: Played, moment: Moment) -> float:
     """Distance in metres between the striking surface and the surface of the ball as written out, at the output frame
-    nearest to the asked time (`contact.contact_gap`, overlap counted as distance too); NaN without ball or part.
+    nearest to the asked time (`striking.contact_gap`, overlap counted as distance too); NaN without ball or part.
 
     The part is that of the words which are played there; of the asked ones where those touch no ball.
     """
     if played.ball is None:
         return np.nan
     words = moment.words if striking_part(moment.words) else moment.asked.words
-    return abs(
-        contact_gap(
-            played.motion.skeleton,
-            played.body,
-            played.positions[moment.frame],
-            played.tips(moment.frame),
-            words,
-            written_ball(played, moment.frame),
-        )
-    )
+    pose = played.positions[moment.frame], played.rotations[moment.frame]
+    return abs(float(contact_gap(played.motion.skeleton, *pose, words, written_ball(played, moment.frame))))
 
 
 def written_ball(played: Played, frame: int) -> np.ndarray:

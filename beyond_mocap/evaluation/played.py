@@ -11,7 +11,6 @@ from ..errors import InputError
 from ..motion import contacts as foot_contacts
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, forward_kinematics
-from ..motion.quaternion import rotate
 from ..take import BallPath, KeyResult, Take
 from .feet import foot_joints
 
@@ -59,6 +58,11 @@ class Played:
         return self._kinematics[0]
 
     @property
+    def rotations(self) -> np.ndarray:
+        """World rotations (T, J, 4) of the joints."""
+        return self._kinematics[1]
+
+    @property
     def pelvis(self) -> np.ndarray:
         """Ground positions (T, 2) m of the hips joint."""
         return self.positions[:, self.body.hips, :2]
@@ -67,12 +71,6 @@ class Played:
     def feet(self) -> np.ndarray:
         """World positions (T, 2, 2, 3) m: side, (heel, toe)."""
         return self.positions[:, foot_joints(self.motion.skeleton)]
-
-    def tips(self, frame: int) -> np.ndarray:
-        """World positions (E, 3) m of the skeleton's end sites at one frame."""
-        skeleton, (positions, rotations) = self.motion.skeleton, self._kinematics
-        parents = list(skeleton.end_parents)
-        return positions[frame, parents] + rotate(rotations[frame, parents], skeleton.end_offsets)
 
 
 def played_from_take(take: Take) -> Played:

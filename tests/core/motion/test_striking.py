@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.evaluation import contact
+from beyond_mocap.motion import striking
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
@@ -11,12 +11,12 @@ from beyond_mocap.motion.quaternion import identity
 
 SKELETON = adult_skeleton()
 BODY = identify(SKELETON)
-JOINTS = pose_kinematics(SKELETON, np.array([0.0, 0.0, 0.95]), identity(len(SKELETON)))[0]
+JOINTS, TURNS = pose_kinematics(SKELETON, np.array([0.0, 0.0, 0.95]), identity(len(SKELETON)))
 TIPS = JOINTS[list(SKELETON.end_parents)] + SKELETON.end_offsets
 
 
 def gap(words, ball):
-    return contact.contact_gap(SKELETON, BODY, JOINTS, TIPS, words.split(), np.asarray(ball))
+    return striking.contact_gap(SKELETON, JOINTS, TURNS, words.split(), np.asarray(ball))
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def gap(words, ball):
     ],
 )
 def test_words_name_the_part(words, part):
-    assert contact.striking_part(words.split()) == part
+    assert striking.striking_part(words.split()) == part
 
 
 @pytest.mark.parametrize("distance", [-0.02, 0.0, 0.005, 0.3])
