@@ -25,8 +25,12 @@ from beyond_mocap.motion.humanoid import heading  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, place, pose_kinematics  # noqa: E402
 
 COLOURS = {
-    "skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84), "socks": (0.72, 0.06, 0.05),
-    "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02),
+    "skin": (0.60, 0.36, 0.24),
+    "shirt": (0.72, 0.06, 0.05),
+    "shorts": (0.86, 0.86, 0.84),
+    "socks": (0.72, 0.06, 0.05),
+    "boots": (0.03, 0.03, 0.035),
+    "hair": (0.045, 0.028, 0.02),
 }
 BLUE_TEAM = {"shirt": (0.05, 0.16, 0.55), "shorts": (0.04, 0.07, 0.22), "socks": (0.05, 0.16, 0.55)}
 BALL_RADIUS = 0.11
@@ -34,7 +38,9 @@ BALL_RADIUS = 0.11
 
 @dataclass(frozen=True)
 class Actor:
-    """Who is drawn: a motion on the pitch, the colours of the shirt, and how to skin it (made from the skeleton if None)."""
+    """Who is drawn: a motion on the pitch, the colours of the shirt, and how to skin it (made from the skeleton if
+    None).
+    """
 
     motion: Motion
     colours: dict | None = None
@@ -62,7 +68,12 @@ def new_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
     sun = bpy.data.objects.new("sun", light)
     sun.rotation_euler = (0.75, 0.15, -0.5)
     scene.collection.objects.link(sun)
-    add_mesh("grass", [(-300, -300, 0), (300, -300, 0), (300, 300, 0), (-300, 300, 0)], [(0, 1, 2, 3)], [paint("grass", (0.10, 0.25, 0.07))])
+    add_mesh(
+        "grass",
+        [(-300, -300, 0), (300, -300, 0), (300, 300, 0), (-300, 300, 0)],
+        [(0, 1, 2, 3)],
+        [paint("grass", (0.10, 0.25, 0.07))],
+    )
     return scene
 
 
@@ -93,7 +104,7 @@ def add_mesh(name: str, vertices, faces, materials, material=None, smooth: bool 
 
 def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None) -> None:
     """The actor's body at fractional `frames` (N,), each moved by `moved` (N, 3) metres."""
-    body = actor.body or low_poly_body(actor.motion.skeleton)
+    body = actor.body or low_poly_body(actor.motion.skeleton, example=actor.motion)
     root, local = at_frames(actor.motion, np.asarray(frames, dtype=float))
     places, world = pose_kinematics(actor.motion.skeleton, root, local)
     skins = deformed(body, actor.motion.skeleton, places, world)
@@ -160,11 +171,13 @@ def save(picture: np.ndarray, path: Path) -> None:
     image.save()
 
 
-def contact_sheet(actors, path_xy, ball, times, out_png, *, fps=None, columns: int = 3, tile=(480, 320), samples: int = 24) -> None:
+def contact_sheet(
+    actors, path_xy, ball, times, out_png, *, fps=None, columns: int = 3, tile=(480, 320), samples: int = 24
+) -> None:
     """Tiles of a passage: the actors (list of Actor) on the pitch at `times` (N,) seconds, their tracks as ribbons.
 
-    path_xy: a list of (M, 2) arrays in metres, one per actor, or None. ball: function of seconds -> (3,) metres, or None. The
-    camera follows the actors from the side and above; each tile is one render, put together into `out_png`.
+    path_xy: a list of (M, 2) arrays in metres, one per actor, or None. ball: function of seconds -> (3,) metres, or
+    None. The camera follows the actors from the side and above; each tile is one render, put together into `out_png`.
     """
     out = Path(out_png)
     tiles = []
@@ -201,11 +214,21 @@ def _grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
     return sheet
 
 
-def strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12, width: int = 1300) -> None:
-    """One motion at `frames` (N,) side by side, seen from the side and (below) half from the front: for looking at a cycle.
+def strip(
+    motion: Motion,
+    frames: np.ndarray,
+    out_png,
+    *,
+    ball=None,
+    spacing: float = 1.15,
+    samples: int = 12,
+    width: int = 1300,
+) -> None:
+    """One motion at `frames` (N,) side by side, seen from the side and (below) half from the front: for looking at a
+    cycle.
 
-    ball (N, 3): where the ball is at these frames, or None. Figures face right; each stands `spacing` metres from the last.
-    """
+    ball (N, 3): where the ball is at these frames, or None. Figures face right; each stands `spacing` metres from the
+    last."""
     frames = np.asarray(frames, dtype=float)
     facing = float(heading(motion)[int(frames[0])])
     out = Path(out_png)

@@ -1,10 +1,10 @@
-"""The project's own body: an adult of 1.80 m in 22 joints, named as Mixamo and LAFAN1 do, arms hanging in the rest pose.
+"""The project's own body: an adult of 1.80 m in 22 joints, named as Mixamo and LAFAN1 do, arms hanging in the rest
+pose.
 
-Segment lengths are shares of the stature H after Drillis and Contini 1966 as printed in Winter 2009 ("Biomechanics and motor
-control of human movement", fig. 4.1): thigh .245 H, shank .246 H, ankle .039 H, upper arm .186 H, forearm .146 H, shoulder
-(acromion) height .818 H; hip joint centres half as far apart as .191 H. Joint centres of shoulder and hip are set inwards
-from these surface landmarks by 2 to 4 cm.
-"""
+Segment lengths are shares of the stature H after Drillis and Contini 1966 as printed in Winter 2009 ("Biomechanics and
+motor control of human movement", fig. 4.1): thigh .245 H, shank .246 H, ankle .039 H, upper arm .186 H, forearm .146 H,
+shoulder (acromion) height .818 H; hip joint centres half as far apart as .191 H. Joint centres of shoulder and hip are
+set inwards from these surface landmarks by 2 to 4 cm."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _CENTRE = (
     ("Head", "Neck", (11, 0, 52)),
 )
 _ARM = (
-    ("Shoulder", "Spine2", (2, 14, 92)),
-    ("Arm", "Shoulder", (-12, 91, -6)),
+    ("Shoulder", "Spine2", (2, 14, 84)),
+    ("Arm", "Shoulder", (-12, 91, -10)),
     ("ForeArm", "Arm", (0, 0, -170)),
     ("Hand", "ForeArm", (0, 0, -146)),
 )

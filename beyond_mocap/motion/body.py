@@ -1,10 +1,10 @@
-"""A low-poly soccer player that fits any humanoid skeleton: shirt, shorts, socks, boots, head, hands, with skin weights.
+"""A low-poly soccer player that fits any humanoid skeleton: shirt, shorts, socks, boots, head, hands, with skin
+weights.
 
-Each part is a closed tube of rings around a bone, built in the neutral stance (`neutral`), where limbs hang and the body faces
-+X, and then carried back into the skeleton's rest pose. Knees, elbows, spine and neck bend smoothly (two joints share a
-ring); hips, shoulders and ankles are rounded ends that overlap, which stays whole at any angle and in any rest pose. Girths
-are those of a slim adult of 1.80 m, scaled with the skeleton.
-"""
+Each part is a closed tube of rings around a bone, built in the neutral stance (`neutral`), where limbs hang and the
+body faces +X, and then carried back into the skeleton's rest pose. Knees, elbows, spine and neck bend smoothly (two
+joints share a ring); hips, shoulders and ankles are rounded ends that overlap, which stays whole at any angle and in
+any rest pose. Girths are those of a slim adult of 1.80 m, scaled with the skeleton."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import numpy as np
 from . import quaternion
 from .gait_tables import LEG
 from .humanoid import Humanoid, Limb, identify
+from .motion import Motion
 from .neutral import Neutral, neutral_stance
 from .skeleton import Skeleton, frozen_array
 
@@ -26,10 +27,9 @@ SKIN, SHIRT, SHORTS, SOCKS, BOOTS, HAIR = range(6)
 class BodyMesh:
     """A closed mesh with weights, in the skeleton's rest pose (no joint rotated, root at the origin).
 
-    vertices (V, 3): metres, Z up. faces: tuples of 3 or 4 vertex indices, counter-clockwise from outside. joints (V, 2),
-    weights (V, 2): the two joints a vertex follows and how much, summing to 1 (the second weight may be 0).
-    material (F,): index into MATERIALS per face.
-    """
+    vertices (V, 3): metres, Z up. faces: tuples of 3 or 4 vertex indices, counter-clockwise from outside. joints (V,
+    2), weights (V, 2): the two joints a vertex follows and how much, summing to 1 (the second weight may be 0).
+    material (F,): index into MATERIALS per face."""
 
     vertices: np.ndarray
     faces: tuple[tuple[int, ...], ...]
@@ -38,12 +38,13 @@ class BodyMesh:
     material: np.ndarray
 
 
-def low_poly_body(skeleton: Skeleton, height: float | None = None) -> BodyMesh:
+def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Motion | None = None) -> BodyMesh:
     """A player's body for `skeleton`; `height`: stature in metres that girths belong to, default by the legs' length.
 
-    Raises InputError where hips or legs cannot be found.
-    """
-    neutral = neutral_stance(skeleton)
+    example: any recording on the skeleton; it tells how bones are twisted where the rest pose is no standing one,
+    without it feet and hands of such skeletons may sit turned (see `neutral.neutral_stance`). Raises InputError where
+    hips or legs cannot be found."""
+    neutral = neutral_stance(skeleton, example)
     build = _Build(neutral, identify(skeleton), neutral.leg / LEG if height is None else height / 1.80)
     build.torso()
     build.head()
@@ -60,7 +61,8 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None) -> BodyMesh:
 
 
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
-    """Vertices (..., V, 3), metres, of the body in poses with joints at `places` (..., J, 3), turned by `world` (..., J, 4).
+    """Vertices (..., V, 3), metres, of the body in poses with joints at `places` (..., J, 3), turned by `world` (...,
+    J, 4).
 
     Linear blend skinning, as Blender's armature modifier does without volume preservation.
     """
@@ -109,7 +111,8 @@ class _Build:
 
     def tube(self, rings, follows, materials, sides: int = 12, across=((1.0, 0, 0), (0, 1.0, 0))) -> None:
         """A closed tube. rings: rows (centre (3,), radius along the first axis, along the second). follows: per ring
-        (joint, joint, share of the second). materials: one per gap between rings, the first and last also for the caps."""
+        (joint, joint, share of the second). materials: one per gap between rings, the first and last also for the
+        caps."""
         first, second = (np.array(axis, dtype=float) for axis in across)
         angle = 2.0 * np.pi * np.arange(sides) / sides
         circle = np.cos(angle)[:, None, None] * first, np.sin(angle)[:, None, None] * second
@@ -130,8 +133,13 @@ class _Build:
         low, high = start + count * sides, start + count * sides + 1
         for i in range(sides):
             j = (i + 1) % sides
-            quads = [((index[r, i], index[r, j], index[r + 1, j], index[r + 1, i]), materials[r]) for r in range(count - 1)]
-            caps = [((index[0, j], index[0, i], low), materials[0]), ((index[-1, i], index[-1, j], high), materials[-1])]
+            quads = [
+                ((index[r, i], index[r, j], index[r + 1, j], index[r + 1, i]), materials[r]) for r in range(count - 1)
+            ]
+            caps = [
+                ((index[0, j], index[0, i], low), materials[0]),
+                ((index[-1, i], index[-1, j], high), materials[-1]),
+            ]
             for face, material in quads + caps:
                 self.faces.append(tuple(int(v) for v in (face if outward else face[::-1])))
                 self.material.append(material)
@@ -145,7 +153,8 @@ class _Build:
         follow = (joint, joint, 0.0) if other is None else (joint, other, 0.5)
         self.tube(rings, [follow] * 5, [material] * 4, sides)
 
-    # -- trunk and head -------------------------------------------------------------------------------------------------
+    # -- trunk and head
+    # -------------------------------------------------------------------------------------------------
 
     def spine_follow(self, height: float) -> tuple[int, int, float]:
         """Which two joints of the spine a ring at `height` metres follows: half and half at a joint, one between."""
@@ -165,13 +174,27 @@ class _Build:
         top, half = self._shoulders(hip)
         # share of the way hip joints -> shoulder joints, forward shift, half depth, half width
         shirt = (
-            (0.13, 0.000, 0.112, 0.158), (0.22, 0.002, 0.112, 0.156), (0.36, 0.006, 0.107, 0.146), (0.52, 0.006, 0.112, 0.152),
-            (0.68, 0.004, 0.122, 0.166), (0.82, -0.002, 0.124, 0.172), (0.92, -0.008, 0.112, 0.166), (1.02, -0.014, 0.090, 0.140),
-            (1.08, -0.018, 0.070, 0.095), (1.115, -0.018, 0.056, 0.064),
-        )  # fmt: skip
+            (0.13, 0.000, 0.112, 0.158),
+            (0.22, 0.002, 0.112, 0.156),
+            (0.36, 0.006, 0.107, 0.146),
+            (0.52, 0.006, 0.112, 0.152),
+            (0.68, 0.004, 0.122, 0.168),
+            (0.82, -0.002, 0.124, 0.178),
+            (0.92, -0.006, 0.114, 0.182),
+            (1.00, -0.010, 0.094, 0.180),
+            (1.055, -0.014, 0.080, 0.150),
+            (1.10, -0.016, 0.070, 0.104),
+            (1.145, -0.016, 0.060, 0.068),
+        )
         self._trunk_rings(hip, top, shirt, SHIRT, half / (0.164 * k))
-        shorts = ((-0.17, 0.0, 0.05, 0.06), (-0.14, 0.0, 0.092, 0.118), (-0.06, -0.004, 0.116, 0.158), (0.03, -0.006, 0.122, 0.168),
-                  (0.12, -0.002, 0.116, 0.162), (0.205, 0.0, 0.108, 0.152))  # fmt: skip
+        shorts = (
+            (-0.17, 0.0, 0.05, 0.06),
+            (-0.14, 0.0, 0.092, 0.118),
+            (-0.06, -0.004, 0.116, 0.158),
+            (0.03, -0.006, 0.122, 0.168),
+            (0.12, -0.002, 0.116, 0.162),
+            (0.205, 0.0, 0.108, 0.152),
+        )
         self._trunk_rings(hip, top, shorts, SHORTS, 1.0)
 
     def _shoulders(self, hip: np.ndarray) -> tuple[np.ndarray, float]:
@@ -199,22 +222,42 @@ class _Build:
         carrier = next(j for j in (body.head, body.neck, body.chest) if j is not None)
         neck = body.neck if body.neck is not None else body.chest
         base = self.at(carrier) if body.head is not None else shoulder + k * np.array([0.03, 0.0, 0.15])
-        low = shoulder + k * np.array([-0.012, 0.0, 0.02])
+        low = shoulder + k * np.array([-0.012, 0.0, 0.03])
         rings = [(low, 0.066, 0.072)]
         rings += [(low + share * (base - low), *girth) for share, *girth in ((0.45, 0.056, 0.058), (0.8, 0.054, 0.054))]
         rings += [(base + k * np.array([0.0, 0.0, 0.03]), 0.052, 0.052)]
-        self.tube(rings, [(body.chest, neck, 0.2), (neck, neck, 0), (neck, carrier, 0.5), (carrier, carrier, 0)], [SKIN] * 3, 12)
+        self.tube(
+            rings,
+            [(body.chest, neck, 0.2), (neck, neck, 0), (neck, carrier, 0.5), (carrier, carrier, 0)],
+            [SKIN] * 3,
+            12,
+        )
         self._face(base, carrier)
 
     def _face(self, base: np.ndarray, joint: int) -> None:
         k = self.scale
         # above the base of the skull, forward, half depth, half width
-        skull = ((-0.072, 0.060, 0.022, 0.022), (-0.062, 0.052, 0.042, 0.038), (-0.038, 0.036, 0.064, 0.054),
-                 (-0.005, 0.022, 0.082, 0.066), (0.035, 0.014, 0.094, 0.073), (0.075, 0.010, 0.097, 0.075),
-                 (0.110, 0.006, 0.088, 0.068), (0.137, 0.002, 0.062, 0.049), (0.151, 0.000, 0.030, 0.024))  # fmt: skip
-        hair = ((-0.020, -0.046, 0.040, 0.058), (0.010, -0.030, 0.066, 0.072), (0.050, -0.020, 0.080, 0.079),
-                (0.085, -0.010, 0.090, 0.080), (0.106, 0.002, 0.098, 0.076), (0.128, 0.003, 0.082, 0.064),
-                (0.150, 0.001, 0.054, 0.043), (0.161, -0.002, 0.022, 0.018))  # fmt: skip
+        skull = (
+            (-0.072, 0.060, 0.022, 0.022),
+            (-0.062, 0.052, 0.042, 0.038),
+            (-0.038, 0.036, 0.064, 0.054),
+            (-0.005, 0.022, 0.082, 0.066),
+            (0.035, 0.014, 0.094, 0.073),
+            (0.075, 0.010, 0.097, 0.075),
+            (0.110, 0.006, 0.088, 0.068),
+            (0.137, 0.002, 0.062, 0.049),
+            (0.151, 0.000, 0.030, 0.024),
+        )
+        hair = (
+            (-0.020, -0.046, 0.040, 0.058),
+            (0.010, -0.030, 0.066, 0.072),
+            (0.050, -0.020, 0.080, 0.079),
+            (0.085, -0.010, 0.090, 0.080),
+            (0.106, 0.002, 0.098, 0.076),
+            (0.128, 0.003, 0.082, 0.064),
+            (0.150, 0.001, 0.054, 0.043),
+            (0.161, -0.002, 0.022, 0.018),
+        )
         for table, material in ((skull, SKIN), (hair, HAIR)):
             rings = [(base + k * np.array([ahead, 0.0, up]), depth, width) for up, ahead, depth, width in table]
             self.tube(rings, [(joint, joint, 0.0)] * len(rings), [material] * (len(rings) - 1), 14)
@@ -224,11 +267,13 @@ class _Build:
             self.ball(base + k * np.array([0.0975, side * 0.028, 0.042]), (0.008, 0.011, 0.006), joint, HAIR, sides=6)
             self.ball(base + k * np.array([0.0985, side * 0.029, 0.061]), (0.007, 0.017, 0.0045), joint, HAIR, sides=6)
 
-    # -- limbs ----------------------------------------------------------------------------------------------------------
+    # -- limbs
+    # ----------------------------------------------------------------------------------------------------------
 
     def limb_tube(self, upper: int, lower: int, end: int, table, sides: int) -> None:
-        """A tube along two bones. table: rows (place, metres forward, metres left, radii, material): places 0..1 run down the
-        upper bone, 1..2 down the lower one; rings near the middle joint are shared, the last ones follow the lower bone."""
+        """A tube along two bones. table: rows (place, metres forward, metres left, radii, material): places 0..1 run
+        down the upper bone, 1..2 down the lower one; rings near the middle joint are shared, the last ones follow the
+        lower bone."""
         a, b, c = self.at(upper), self.at(lower), self.at(end)
         rings, follows = [], []
         for place, ahead, left, first, second, _ in table:
@@ -241,20 +286,42 @@ class _Build:
         inner = -np.sign(self.at(limb.upper_leg)[1])
         bones = limb.upper_leg, limb.lower_leg, limb.foot
         table = (
-            (0.16, 0.004, 0.0, 0.082, 0.076, SKIN), (0.40, 0.006, 0.0, 0.079, 0.073, SKIN), (0.62, 0.005, 0.0, 0.070, 0.065, SKIN),
-            (0.80, 0.002, 0.0, 0.060, 0.058, SKIN), (0.90, 0.004, 0.0, 0.057, 0.055, SKIN), (0.97, 0.006, 0.0, 0.057, 0.053, SKIN),
-            (1.04, 0.004, 0.0, 0.055, 0.051, SKIN), (1.12, -0.002, 0.0, 0.053, 0.050, SKIN), (1.155, -0.004, 0.0, 0.053, 0.051, SKIN),
-            (1.16, -0.006, 0.0, 0.058, 0.056, SOCKS), (1.30, -0.012, 0.004 * inner, 0.061, 0.058, SOCKS),
-            (1.45, -0.010, 0.003 * inner, 0.055, 0.052, SOCKS), (1.65, -0.004, 0.0, 0.044, 0.041, SOCKS),
-            (1.84, 0.0, 0.0, 0.037, 0.034, SOCKS), (1.96, 0.002, 0.0, 0.038, 0.034, SOCKS), (2.03, 0.002, 0.0, 0.030, 0.026, SOCKS),
-        )  # fmt: skip
+            (0.16, 0.004, 0.0, 0.082, 0.076, SKIN),
+            (0.40, 0.006, 0.0, 0.079, 0.073, SKIN),
+            (0.62, 0.005, 0.0, 0.070, 0.065, SKIN),
+            (0.80, 0.002, 0.0, 0.060, 0.058, SKIN),
+            (0.90, 0.004, 0.0, 0.057, 0.055, SKIN),
+            (0.97, 0.006, 0.0, 0.057, 0.053, SKIN),
+            (1.04, 0.004, 0.0, 0.055, 0.051, SKIN),
+            (1.12, -0.002, 0.0, 0.053, 0.050, SKIN),
+            (1.155, -0.004, 0.0, 0.053, 0.051, SKIN),
+            (1.16, -0.006, 0.0, 0.058, 0.056, SOCKS),
+            (1.30, -0.012, 0.004 * inner, 0.061, 0.058, SOCKS),
+            (1.45, -0.010, 0.003 * inner, 0.055, 0.052, SOCKS),
+            (1.65, -0.004, 0.0, 0.044, 0.041, SOCKS),
+            (1.84, 0.0, 0.0, 0.037, 0.034, SOCKS),
+            (1.96, 0.002, 0.0, 0.038, 0.034, SOCKS),
+            (2.03, 0.002, 0.0, 0.030, 0.026, SOCKS),
+        )
         self.limb_tube(*bones, table, 12)
-        self.ball(self.at(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]), (0.054, 0.050, 0.056), bones[0], SKIN, bones[1])
+        self.ball(
+            self.at(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]),
+            (0.054, 0.050, 0.056),
+            bones[0],
+            SKIN,
+            bones[1],
+        )
         self.ball(self.at(limb.foot), (0.039, 0.036, 0.042), limb.foot, SOCKS)
-        shorts = ((-0.17, 0.0, 0.0, 0.030, 0.030, SHORTS), (-0.13, 0.0, 0.0, 0.075, 0.068, SHORTS),
-                  (-0.04, 0.0, 0.0, 0.100, 0.086, SHORTS), (0.10, 0.004, 0.0, 0.104, 0.088, SHORTS),
-                  (0.36, 0.006, 0.0, 0.103, 0.093, SHORTS), (0.52, 0.006, 0.0, 0.105, 0.098, SHORTS),
-                  (0.525, 0.006, 0.0, 0.088, 0.083, SHORTS), (0.44, 0.006, 0.0, 0.050, 0.050, SHORTS))  # fmt: skip
+        shorts = (
+            (-0.17, 0.0, 0.0, 0.030, 0.030, SHORTS),
+            (-0.13, 0.0, 0.0, 0.075, 0.068, SHORTS),
+            (-0.04, 0.0, 0.0, 0.100, 0.086, SHORTS),
+            (0.10, 0.004, 0.0, 0.104, 0.088, SHORTS),
+            (0.36, 0.006, 0.0, 0.103, 0.093, SHORTS),
+            (0.52, 0.006, 0.0, 0.105, 0.098, SHORTS),
+            (0.525, 0.006, 0.0, 0.088, 0.083, SHORTS),
+            (0.44, 0.006, 0.0, 0.050, 0.050, SHORTS),
+        )
         self.limb_tube(*bones, shorts, 12)
 
     def boot(self, limb: Limb, side: float) -> None:
@@ -262,11 +329,20 @@ class _Build:
         ball = self.neutral.ball[0 if side > 0 else 1]
         floor = ankle[2] - self.neutral.ankle_height
         toe = limb.toe if limb.toe is not None else limb.foot
-        # metres from the ankle (or, from the ball on, from the toe joint), height of the middle, half height, half width
-        table = ((-0.068, 0.040, 0.024, 0.018, 0), (-0.060, 0.042, 0.040, 0.030, 0), (-0.030, 0.046, 0.046, 0.036, 0),
-                 (0.010, 0.049, 0.049, 0.037, 0), (0.050, 0.040, 0.040, 0.039, 0), (0.090, 0.032, 0.032, 0.043, 0),
-                 (0.000, 0.027, 0.027, 0.047, 0.5), (0.028, 0.024, 0.023, 0.045, 1), (0.055, 0.021, 0.018, 0.036, 1),
-                 (0.072, 0.018, 0.011, 0.022, 1))  # fmt: skip
+        # metres from the ankle (or, from the ball on, from the toe joint), height of the middle, half height, half
+        # width
+        table = (
+            (-0.068, 0.040, 0.024, 0.018, 0),
+            (-0.060, 0.042, 0.040, 0.030, 0),
+            (-0.030, 0.046, 0.046, 0.036, 0),
+            (0.010, 0.049, 0.049, 0.037, 0),
+            (0.050, 0.040, 0.040, 0.039, 0),
+            (0.090, 0.032, 0.032, 0.043, 0),
+            (0.000, 0.027, 0.027, 0.047, 0.5),
+            (0.028, 0.024, 0.023, 0.045, 1),
+            (0.055, 0.021, 0.018, 0.036, 1),
+            (0.072, 0.018, 0.011, 0.022, 1),
+        )
         rings, follows = [], []
         for row, (ahead, up, high, wide, share) in enumerate(table):
             x = ankle[0] + (k * ahead if row < 6 else ball[0] + k * ahead)
@@ -280,30 +356,65 @@ class _Build:
         inner = -np.sign(self.at(limb.upper_arm)[1])
         bones = limb.upper_arm, limb.lower_arm, limb.hand
         table = (
-            (0.30, 0.0, 0.0, 0.046, 0.044, SKIN), (0.55, 0.003, 0.0, 0.046, 0.043, SKIN), (0.78, 0.002, 0.0, 0.041, 0.039, SKIN),
-            (0.90, 0.0, 0.0, 0.039, 0.038, SKIN), (0.97, -0.002, 0.0, 0.039, 0.038, SKIN), (1.04, -0.001, 0.0, 0.039, 0.038, SKIN),
-            (1.14, 0.003, 0.0, 0.041, 0.039, SKIN), (1.35, 0.003, 0.0, 0.039, 0.036, SKIN), (1.65, 0.001, 0.0, 0.032, 0.028, SKIN),
-            (1.90, 0.0, 0.0, 0.028, 0.022, SKIN), (2.04, 0.0, 0.0, 0.026, 0.020, SKIN),
-        )  # fmt: skip
+            (0.30, 0.0, 0.0, 0.046, 0.044, SKIN),
+            (0.55, 0.003, 0.0, 0.046, 0.043, SKIN),
+            (0.78, 0.002, 0.0, 0.041, 0.039, SKIN),
+            (0.90, 0.0, 0.0, 0.039, 0.038, SKIN),
+            (0.97, -0.002, 0.0, 0.039, 0.038, SKIN),
+            (1.04, -0.001, 0.0, 0.039, 0.038, SKIN),
+            (1.14, 0.003, 0.0, 0.041, 0.039, SKIN),
+            (1.35, 0.003, 0.0, 0.039, 0.036, SKIN),
+            (1.65, 0.001, 0.0, 0.032, 0.028, SKIN),
+            (1.90, 0.0, 0.0, 0.028, 0.022, SKIN),
+            (2.04, 0.0, 0.0, 0.026, 0.020, SKIN),
+        )
         self.limb_tube(*bones, table, 10)
-        self.ball(self.at(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]), (0.038, 0.036, 0.04), bones[0], SKIN, bones[1])
-        sleeve = ((-0.19, 0.0, 0.012 * inner, 0.024, 0.024, SHIRT), (-0.155, 0.0, 0.010 * inner, 0.046, 0.042, SHIRT),
-                  (-0.07, 0.0, 0.004 * inner, 0.062, 0.057, SHIRT), (0.06, 0.0, 0.0, 0.067, 0.060, SHIRT),
-                  (0.30, 0.0, 0.0, 0.065, 0.059, SHIRT), (0.56, 0.0, 0.0, 0.066, 0.062, SHIRT),
-                  (0.565, 0.0, 0.0, 0.054, 0.052, SHIRT), (0.48, 0.0, 0.0, 0.030, 0.030, SHIRT))  # fmt: skip
+        self.ball(
+            self.at(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]),
+            (0.038, 0.036, 0.04),
+            bones[0],
+            SKIN,
+            bones[1],
+        )
+        sleeve = (
+            (-0.165, 0.0, 0.020 * inner, 0.024, 0.024, SHIRT),
+            (-0.14, 0.0, 0.016 * inner, 0.044, 0.042, SHIRT),
+            (-0.07, 0.0, 0.008 * inner, 0.060, 0.056, SHIRT),
+            (0.06, 0.0, 0.0, 0.067, 0.060, SHIRT),
+            (0.30, 0.0, 0.0, 0.065, 0.059, SHIRT),
+            (0.56, 0.0, 0.0, 0.066, 0.062, SHIRT),
+            (0.565, 0.0, 0.0, 0.054, 0.052, SHIRT),
+            (0.48, 0.0, 0.0, 0.030, 0.030, SHIRT),
+        )
         self.limb_tube(*bones, sleeve, 12)
 
     def hand(self, limb: Limb, side: float) -> None:
         wrist, k, joint = self.at(limb.hand), self.scale, limb.hand
         # below the wrist, towards the palm, forward, half length along the palm's width, half thickness
-        table = ((-0.022, 0.0, 0.0, 0.024, 0.019), (0.010, 0.0, 0.0, 0.031, 0.018), (0.050, 0.002, 0.002, 0.042, 0.019),
-                 (0.092, 0.008, 0.002, 0.043, 0.018), (0.124, 0.020, 0.000, 0.038, 0.017), (0.148, 0.038, -0.002, 0.033, 0.015),
-                 (0.156, 0.058, -0.002, 0.027, 0.012))  # fmt: skip
-        rings = [(wrist + k * np.array([ahead, -side * palm, -down]), wide, thick) for down, palm, ahead, wide, thick in table]
+        table = (
+            (-0.022, 0.0, 0.0, 0.024, 0.019),
+            (0.010, 0.0, 0.0, 0.031, 0.018),
+            (0.050, 0.002, 0.002, 0.042, 0.019),
+            (0.092, 0.008, 0.002, 0.043, 0.018),
+            (0.124, 0.020, 0.000, 0.038, 0.017),
+            (0.148, 0.038, -0.002, 0.033, 0.015),
+            (0.156, 0.058, -0.002, 0.027, 0.012),
+        )
+        rings = [
+            (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)
+            for down, palm, ahead, wide, thick in table
+        ]
         self.tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 10)
-        thumb = ((0.030, 0.004, 0.026, 0.016, 0.014), (0.058, 0.012, 0.046, 0.014, 0.013), (0.084, 0.022, 0.054, 0.011, 0.011),
-                 (0.096, 0.026, 0.055, 0.006, 0.006))  # fmt: skip
-        rings = [(wrist + k * np.array([ahead, -side * palm, -down]), wide, thick) for down, palm, ahead, wide, thick in thumb]
+        thumb = (
+            (0.030, 0.004, 0.026, 0.016, 0.014),
+            (0.058, 0.012, 0.046, 0.014, 0.013),
+            (0.084, 0.022, 0.054, 0.011, 0.011),
+            (0.096, 0.026, 0.055, 0.006, 0.006),
+        )
+        rings = [
+            (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)
+            for down, palm, ahead, wide, thick in thumb
+        ]
         self.tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 8)
 
 

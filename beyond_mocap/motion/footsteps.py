@@ -1,9 +1,8 @@
 """Where and when feet stand, and how they travel between: planted while they stand, the heel first, the toes last.
 
 A foot's life is a row of stances. During one its sole rolls over heel, ball and toe tip without sliding (the rockers of
-Perry 1992, "Gait analysis"); between two it follows the published angles of a swinging leg, bent so that it leaves and lands
-where the stances say, with their speed.
-"""
+Perry 1992, "Gait analysis"); between two it follows the published angles of a swinging leg, bent so that it leaves and
+lands where the stances say, with their speed."""
 
 from __future__ import annotations
 
@@ -25,9 +24,9 @@ _FULL_STEP = 0.55
 class Footsteps:
     """The K stances of one foot in order of time.
 
-    side: 0 left, 1 right. on, off (K,): seconds. place (K, 2): metres, below the ankle of the flat foot. yaw (K,): radians. speed (K,): m/s of
-    travel for an adult's leg, which picks the way of rolling. direction (K,): travel relative to the foot, radians.
-    """
+    side: 0 left, 1 right. on, off (K,): seconds. place (K, 2): metres, below the ankle of the flat foot. yaw (K,):
+    radians. speed (K,): m/s of travel for an adult's leg, which picks the way of rolling. direction (K,): travel
+    relative to the foot, radians."""
 
     side: int
     on: np.ndarray
@@ -53,7 +52,9 @@ class Footsteps:
 
 @dataclass(frozen=True, eq=False)
 class FootPath:
-    """ankle (T, 3) metres, world; pitch, yaw, bend (T,) radians: sole (toes down positive), direction, toes (up positive)."""
+    """ankle (T, 3) metres, world; pitch, yaw, bend (T,) radians: sole (toes down positive), direction, toes (up
+    positive).
+    """
 
     ankle: np.ndarray
     pitch: np.ndarray
@@ -82,11 +83,17 @@ def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray)
     ahead, back = np.maximum(np.cos(direction), 0.0) ** 2, np.maximum(-np.cos(direction), 0.0) ** 2
     forward_roll = tables.stance_pitch(share, speed)
     backward_roll = tables.stance_pitch(1.0 - share, speed)
-    return ahead * forward_roll + 0.5 * back * backward_roll + 0.25 * np.sin(direction) ** 2 * np.maximum(forward_roll, 0.0)
+    return (
+        ahead * forward_roll
+        + 0.5 * back * backward_roll
+        + 0.25 * np.sin(direction) ** 2 * np.maximum(forward_roll, 0.0)
+    )
 
 
 def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """How far ahead of its flat place and how high above the ground (T,), (T,) metres the ankle is when the sole pitches."""
+    """How far ahead of its flat place and how high above the ground (T,), (T,) metres the ankle is when the sole
+    pitches.
+    """
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
     # on the ball (and, beyond, on the toe tip)
@@ -102,7 +109,12 @@ def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int)
 
 
 def travel(
-    steps: Footsteps, times: np.ndarray, hip: np.ndarray, heading: np.ndarray, neutral: Neutral, thigh_shank: tuple[float, float]
+    steps: Footsteps,
+    times: np.ndarray,
+    hip: np.ndarray,
+    heading: np.ndarray,
+    neutral: Neutral,
+    thigh_shank: tuple[float, float],
 ) -> FootPath:
     """The whole way of one foot at `times` (T,), given its hip joint (T, 3) and the body's heading (T,) there.
 
@@ -217,7 +229,9 @@ def _clearance(ankle_up, pitch, share, size, neutral: Neutral) -> np.ndarray:
     return lift_off_ground(ankle_up, pitch, neutral, wanted) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
 
 
-def lift_off_ground(ankle_up: np.ndarray, pitch: np.ndarray, neutral: Neutral, clearance: float | np.ndarray = 0.0) -> np.ndarray:
+def lift_off_ground(
+    ankle_up: np.ndarray, pitch: np.ndarray, neutral: Neutral, clearance: float | np.ndarray = 0.0
+) -> np.ndarray:
     """How much (T,) metres a foot has to be raised for its lowest point to be `clearance` above the ground, softly.
 
     ankle_up (T,): height of the ankle, metres; pitch (T,): of the sole, toes down positive.

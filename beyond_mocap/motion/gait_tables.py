@@ -1,17 +1,18 @@
-"""Published figures of walking and running, from standing to 9.5 m/s, for an adult with a leg (thigh plus shank) of 0.87 m.
+"""Published figures of walking and running, from standing to 9.5 m/s, for an adult with a leg of 0.87 m.
 
-Sources, by the letters used below. Where authors differ or a speed lies between theirs, the value is a smooth line through them.
+Leg: thigh plus shank. Sources, by the letters used below; where authors differ or a speed lies between theirs, the value
+is a smooth line through them. Checked against recordings: cadence, bounce, thigh and knee angles over the cycle.
   G  Grieve and Gear 1966, Ergonomics 9: relation of cadence and stride length to walking speed
   W  Winter 1991, "The biomechanics and motor control of human gait": joint angles over the cycle, natural cadence
   M  Murray, Drought and Kory 1964, J Bone Joint Surg 46-A; Murray 1967: sway, pelvis, arms, foot angles of walking men
-  N  Nilsson and Thorstensson 1987, Acta Physiol Scand 129; Nilsson, Thorstensson and Halbertsma 1985, ibid 123: support and
-     swing phases, leg movements from 1 to 9 m/s
+  N  Nilsson and Thorstensson 1987, Acta Physiol Scand 129; Nilsson, Thorstensson and Halbertsma 1985, ibid 123:
+     support and swing phases, leg movements from 1 to 9 m/s
   V  Novacheck 1998, Gait and Posture 7: "The biomechanics of running" (joint angles of walking, running, sprinting)
   D  Dorn, Schache and Pandy 2012, J Exp Biol 215: stride length and frequency, contact times from 3.5 to 9 m/s
   Y  Weyand, Sternlight, Bellizzi and Wright 2000, J Appl Physiol 89: contact, aerial and swing times up to top speed
   H  Hinrichs 1987, Int J Sport Biomech 3: the arms in running
   T  Thorstensson 1986, Exp Brain Res 61: backward walking is forward walking run backwards
-  L  Morin, Dalleau, Kyrolainen, Jeannin and Belli 2005, J Appl Biomech 21: the sine-wave model of the ground reaction
+  L  Morin, Dalleau, Kyrolainen, Jeannin and Belli 2005, J Appl Biomech 21: sine-wave model of the ground reaction
 
 Angles in degrees here, radians outside. Speeds in m/s.
 """
@@ -31,13 +32,55 @@ _CHANGE = (1.95, 2.35)
 
 _SPEEDS = {
     # strides per second: G below 2 (cadence grows as the root of speed), N and D above
-    "frequency": [(0, 0.55), (0.3, 0.58), (0.7, 0.72), (1.0, 0.83), (1.4, 0.96), (1.8, 1.08), (2.1, 1.22), (2.5, 1.30),
-                  (3.5, 1.38), (5.2, 1.53), (7.0, 1.76), (8.0, 1.96), (9.0, 2.17), (9.5, 2.28)],
-    # share of the stride that a foot is on the ground: N, W below the change; contact times of D, Y times frequency above
-    "duty": [(0, 0.78), (0.4, 0.72), (0.8, 0.665), (1.4, 0.62), (1.9, 0.585), (2.15, 0.47), (2.5, 0.385), (3.0, 0.34),
-             (3.5, 0.31), (4.2, 0.28), (5.2, 0.25), (7.0, 0.228), (8.0, 0.22), (9.0, 0.215), (9.5, 0.215)],
+    "frequency": [
+        (0, 0.55),
+        (0.3, 0.58),
+        (0.7, 0.72),
+        (1.0, 0.83),
+        (1.4, 0.96),
+        (1.8, 1.08),
+        (2.1, 1.22),
+        (2.5, 1.30),
+        (3.5, 1.38),
+        (5.2, 1.53),
+        (7.0, 1.76),
+        (8.0, 1.96),
+        (9.0, 2.17),
+        (9.5, 2.28),
+    ],
+    # share of the stride that a foot is on the ground: N, W below the change; contact times of D, Y times frequency
+    # above
+    "duty": [
+        (0, 0.78),
+        (0.4, 0.72),
+        (0.8, 0.665),
+        (1.4, 0.62),
+        (1.9, 0.585),
+        (2.15, 0.47),
+        (2.5, 0.385),
+        (3.0, 0.34),
+        (3.5, 0.31),
+        (4.2, 0.28),
+        (5.2, 0.25),
+        (7.0, 0.228),
+        (8.0, 0.22),
+        (9.0, 0.215),
+        (9.5, 0.215),
+    ],
     # knee flexion in the middle of stance: W, V, N
-    "knee_mid": [(0, 5), (0.5, 7), (1.4, 12), (1.9, 18), (2.3, 34), (2.8, 41), (3.5, 43), (5.2, 45), (7, 45), (9, 44), (9.5, 44)],
+    "knee_mid": [
+        (0, 5),
+        (0.5, 7),
+        (1.4, 12),
+        (1.9, 18),
+        (2.3, 34),
+        (2.8, 41),
+        (3.5, 43),
+        (5.2, 45),
+        (7, 45),
+        (9, 44),
+        (9.5, 44),
+    ],
     # forward lean of the trunk (pelvis and spine together): V, and sprinters on video
     "lean": [(0, 0), (1.4, 5.5), (2.3, 8), (3.5, 11), (5.2, 12), (7, 12), (9.5, 12)],
     # anterior tilt of the pelvis, part of that lean: V
@@ -53,12 +96,31 @@ _SPEEDS = {
     # vertical travel of the pelvis up and down from its middle, metres, walking only (running: L)
     "bob": [(0, 0), (0.5, 0.005), (1.0, 0.012), (1.4, 0.019), (1.9, 0.025), (2.3, 0.028), (9.5, 0.028)],
     # distance between the feet's lines, metres: M (8 cm between heels), less in running
-    "width": [(0, 0.20), (0.3, 0.16), (0.8, 0.12), (1.4, 0.095), (2.0, 0.085), (2.5, 0.075), (3.5, 0.06), (5.2, 0.045), (9.5, 0.03)],
+    "width": [
+        (0, 0.20),
+        (0.3, 0.16),
+        (0.8, 0.12),
+        (1.4, 0.095),
+        (2.0, 0.085),
+        (2.5, 0.075),
+        (3.5, 0.06),
+        (5.2, 0.045),
+        (9.5, 0.03),
+    ],
     # outward turn of the feet: M (7), nearly straight in running
     "toe_out": [(0, 14), (0.4, 10), (1.4, 7), (2.5, 6), (3.5, 5), (9.5, 2)],
     # where the flat foot's ankle lies relative to the hips in the middle of stance, metres: from the angles of W, V, N
-    "ahead": [(0, -0.02), (0.7, -0.08), (1.4, -0.135), (2.0, -0.16), (2.5, -0.165), (3.5, -0.19), (5.2, -0.19), (7, -0.185),
-              (9.5, -0.185)],
+    "ahead": [
+        (0, -0.02),
+        (0.7, -0.08),
+        (1.4, -0.135),
+        (2.0, -0.16),
+        (2.5, -0.165),
+        (3.5, -0.19),
+        (5.2, -0.19),
+        (7, -0.185),
+        (9.5, -0.185),
+    ],
     # arms: upper arm to and fro (half range) and its middle, forward positive: M (walking), H (running)
     "arm_swing": [(0, 0), (0.5, 7), (1.4, 17), (2.0, 23), (2.5, 21), (3.5, 26), (5.2, 34), (7, 42), (9.5, 48)],
     "arm_middle": [(0, 1), (1.4, -3), (2.0, -3), (2.5, -7), (3.5, -6), (5.2, -4), (7, -1), (9.5, 3)],
@@ -66,7 +128,7 @@ _SPEEDS = {
     "elbow": [(0, 14), (1.4, 23), (1.9, 33), (2.4, 76), (3.5, 90), (5.2, 94), (9.5, 92)],
     "elbow_swing": [(0, 0), (0.7, 4), (1.4, 9), (2.0, 12), (2.5, 8), (3.5, 10), (5.2, 15), (7, 22), (9.5, 27)],
     "abduct": [(0, 9), (1.4, 8.5), (2.5, 14), (3.5, 16), (9.5, 17)],
-    "inward": [(0, 12), (1.4, 14), (2.0, 18), (2.5, 34), (3.5, 34), (7, 24), (9.5, 18)],
+    "inward": [(0, 12), (1.4, 14), (2.0, 16), (2.5, 26), (3.5, 25), (7, 18), (9.5, 14)],
 }
 
 
@@ -77,7 +139,9 @@ def _curve(name: str) -> PchipInterpolator:
 
 
 def at_speed(name: str, speed: np.ndarray) -> np.ndarray:
-    """The figure `name` of the table at `speed` (...,) m/s, clamped to 0 .. 9.5: degrees, metres or Hz as the table says."""
+    """The figure `name` of the table at `speed` (...,) m/s, clamped to 0 .. 9.5: degrees, metres or Hz as the table
+    says.
+    """
     return _curve(name)(np.clip(speed, 0.0, FASTEST))
 
 
@@ -92,16 +156,32 @@ def smooth_step(x: np.ndarray) -> np.ndarray:
     return x**3 * (x * (6.0 * x - 15.0) + 10.0)
 
 
-# The swinging leg: thigh against the vertical (forward positive), knee flexion, ankle (dorsiflexion positive), in degrees, at
-# shares of the swing. Thigh = hip flexion less pelvic tilt. Walking W at 60 .. 100 % of the cycle; running (3.2 m/s) and
-# sprinting (9 m/s) V at 39 .. 100 and 22 .. 100 %, with N for the height of the heel; jogging between.
+# The swinging leg: thigh against the vertical (forward positive), knee flexion, ankle (dorsiflexion positive), in
+# degrees, at shares of the swing. Thigh = hip flexion less pelvic tilt. Walking W at 60 .. 100 % of the cycle; running
+# (3.2 m/s) and sprinting (9 m/s) V at 39 .. 100 and 22 .. 100 %, with N for the height of the heel; jogging between.
 _SWING_AT = (0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 _SWING = {
     # speed: thigh, knee, ankle
-    1.4: ((-14, -5, 7, 17, 23.5, 26, 25.5, 23, 20), (42, 58, 66, 62, 49, 31, 15, 5, 6), (-17, -12, -5, 0, 2, 2, 1, 0, 0)),
-    2.6: ((-20, -16, -7, 6, 19, 28, 31, 28, 23), (30, 50, 71, 84, 85, 73, 48, 22, 15), (-22, -17, -9, -2, 2, 4, 5, 5, 4)),
-    3.6: ((-23, -19, -9, 6, 23, 35, 38, 33, 25), (24, 48, 75, 94, 102, 92, 65, 34, 20), (-25, -20, -11, -4, 1, 4, 5, 5, 3)),
-    9.0: ((-32, -35, -24, -2, 29, 54, 61, 48, 31), (15, 43, 88, 124, 132, 110, 70, 32, 25), (-28, -23, -13, -5, 1, 4, 3, -2, -6)),
+    1.4: (
+        (-14, -5, 7, 17, 23.5, 26, 25.5, 23, 20),
+        (42, 58, 66, 62, 49, 31, 15, 5, 6),
+        (-17, -12, -5, 0, 2, 2, 1, 0, 0),
+    ),
+    2.6: (
+        (-20, -16, -7, 6, 19, 28, 31, 28, 23),
+        (30, 50, 71, 84, 85, 73, 48, 22, 15),
+        (-22, -17, -9, -2, 2, 4, 5, 5, 4),
+    ),
+    3.6: (
+        (-23, -19, -9, 6, 23, 35, 38, 33, 25),
+        (24, 48, 75, 94, 102, 92, 65, 34, 20),
+        (-25, -20, -11, -4, 1, 4, 5, 5, 3),
+    ),
+    9.0: (
+        (-32, -35, -24, -2, 29, 54, 61, 48, 31),
+        (15, 43, 88, 124, 132, 110, 70, 32, 25),
+        (-28, -23, -13, -5, 1, 4, 3, -2, -6),
+    ),
 }
 
 
@@ -121,8 +201,8 @@ def swing_angles(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
     return np.radians(np.einsum("...s,...sa->...a", weights, values))
 
 
-# The standing foot: pitch of the sole (toes down positive) in degrees at shares of the stance. W and M (heel strike at 20,
-# toe-off beyond 60), V (rearfoot runners), N and sprinters on video (forefoot: the heel never quite comes down).
+# The standing foot: pitch of the sole (toes down positive) in degrees at shares of the stance. W and M (heel strike at
+# 20, toe-off beyond 60), V (rearfoot runners), N and sprinters on video (forefoot: the heel never quite comes down).
 _STANCE_AT = (0, 0.06, 0.14, 0.25, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _STANCE = {
     1.4: (-19, -11, -2, 0, 0, 0.5, 3, 9, 20, 38, 62),
@@ -139,7 +219,9 @@ def _stance_curves() -> tuple[np.ndarray, PchipInterpolator]:
 
 
 def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Pitch of the sole (...,) in radians, toes down positive, at a share (...,) of the stance, for a speed (...,) in m/s."""
+    """Pitch of the sole (...,) in radians, toes down positive, at a share (...,) of the stance, for a speed (...,) in
+    m/s.
+    """
     speeds, curve = _stance_curves()
     values = curve(np.clip(share, 0.0, 1.0))
     position = np.interp(speed, speeds, np.arange(len(speeds)))
@@ -164,7 +246,8 @@ def _bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def bounce(step_phase: np.ndarray, contact_share: np.ndarray, step_time: np.ndarray) -> np.ndarray:
-    """Height of the body over its mean, metres, in running (L): contact from step phase 0 to `contact_share`, then flight.
+    """Height of the body over its mean, metres, in running (L): contact from step phase 0 to `contact_share`, then
+    flight.
 
     step_phase (...,) 0 .. 1 from a foot's contact, contact_share (...,) of the step, step_time (...,) seconds.
     """

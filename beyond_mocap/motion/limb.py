@@ -1,8 +1,8 @@
 """The geometry of a limb of two bones: where the middle joint goes when the end joint is asked to be somewhere.
 
-Tolani, Goswami and Badler 2000 ("Real-time inverse kinematics techniques for anthropomorphic limbs"): the triangle of upper
-bone, lower bone and the line to the target leaves one freedom, the direction in which the middle joint points (the pole).
-"""
+Tolani, Goswami and Badler 2000 ("Real-time inverse kinematics techniques for anthropomorphic limbs"): the triangle of
+upper bone, lower bone and the line to the target leaves one freedom, the direction in which the middle joint points
+(the pole)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from . import quaternion
 
 
 def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float) -> np.ndarray:
-    """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then it only nears it.
+    """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then it only nears
+    it.
 
     distance (...,) asked, longest (...,) upper plus lower bone; C1, so that a knee does not snap straight.
     """
@@ -26,10 +27,10 @@ def bend(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middle joint (..., 3), end joint (..., 3) and hinge axis (..., 3) of a limb that reaches for `target`.
 
-    top, target (..., 3) metres, world. upper, lower (...,) bone lengths, metres. pole (..., 3): roughly where the middle
-    joint points. soft: metres of soft reach. The hinge is the unit axis about which the middle joint bends: direction of the
-    limb x pole. A target out of reach is neared along its line; one too near is kept away by the difference of the bones.
-    """
+    top, target (..., 3) metres, world. upper, lower (...,) bone lengths, metres. pole (..., 3): roughly where the
+    middle joint points. soft: metres of soft reach. The hinge is the unit axis about which the middle joint bends:
+    direction of the limb x pole. A target out of reach is neared along its line; one too near is kept away by the
+    difference of the bones."""
     line = target - top
     asked = np.linalg.norm(line, axis=-1)
     direction = unit(line, np.array([0.0, 0.0, -1.0]))

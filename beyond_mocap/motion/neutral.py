@@ -1,8 +1,8 @@
 """The neutral stance of any humanoid skeleton: upright, facing +X, legs straight down, arms hanging, soles flat.
 
-Skeletons rest in all kinds of poses (CMU's legs splay, LAFAN1's limbs all lie along X, Mixamo stands in a T). Whatever is
-said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all of them.
-"""
+Skeletons rest in all kinds of poses (CMU's legs splay, LAFAN1's limbs all lie along X, Mixamo stands in a T). Whatever
+is said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all of
+them."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _BALL_HEIGHT = 0.022
 class Neutral:
     """A skeleton in its neutral stance.
 
-    rotations (J, 4): world rotation of each joint. positions (J, 3): metres, the ground at z = 0, mid-hip above the origin.
-    leg: length of thigh plus shank, metres. ankle_height: metres. ball (2, 3): from ankle to toe joint (left, right) with
-    the sole flat. heel: metres from the ankle's foot point back to the heel. tip: metres from toe joint to toe tip.
-    """
+    rotations (J, 4): world rotation of each joint. positions (J, 3): metres, the ground at z = 0, mid-hip above the
+    origin. leg: length of thigh plus shank, metres. ankle_height: metres. ball (2, 3): from ankle to toe joint (left,
+    right) with the sole flat. heel: metres from the ankle's foot point back to the heel. tip: metres from toe joint to
+    toe tip."""
 
     skeleton: Skeleton
     rotations: np.ndarray
@@ -50,10 +50,10 @@ class Neutral:
 def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral:
     """The neutral stance of `skeleton`.
 
-    example: a recording on the same skeleton; its most upright frame then says how bones are twisted about their own
-    length, which bone directions alone leave open (needed where made and recorded motion are to be blended).
-    Raises InputError where hips or legs cannot be found.
-    """
+    example: a recording on the same skeleton; its most upright frames then say how bones are twisted about their own
+    length and how a flat foot lies, which bone directions alone leave open. Wanted where made and recorded motion are
+    to be blended, and where a skeleton's rest pose is no standing one (LAFAN1, Bandai). Raises InputError where hips or
+    legs cannot be found."""
     body = identify(skeleton)
     world = np.array(_start(skeleton, body, example))
     _straighten(skeleton, body, world)
@@ -63,12 +63,9 @@ def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral
 
 
 def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.ndarray:
-    """World rotations (J, 4) to begin with, facing +X: the example's most upright frame, or the rest pose set upright."""
+    """World rotations (J, 4) to begin with, facing +X: the example's upright frames, or the rest pose set upright."""
     if example is not None:
-        places, world = forward_kinematics(example)
-        frame = int(np.argmax(_uprightness(body, places)))
-        turn = quaternion.about_up(-heading_from_positions(skeleton, places[frame]))
-        return quaternion.multiply(turn, world[frame])
+        return _mean_upright(skeleton, body, example)
     places, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
     places = places[0]
     across = places[body.left.upper_leg] - places[body.right.upper_leg]
@@ -84,11 +81,26 @@ def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.nda
     return np.broadcast_to(quaternion.inverse(frame), (len(skeleton), 4))
 
 
+def _mean_upright(skeleton: Skeleton, body: Humanoid, example: Motion) -> np.ndarray:
+    """Mean world rotations (J, 4) over the tenth of the frames that look most like standing, each turned to face +X."""
+    places, world = forward_kinematics(example)
+    score = _uprightness(body, places)
+    chosen = np.argsort(-score, kind="stable")[: max(len(score) // 10, 1)]
+    turn = quaternion.about_up(-heading_from_positions(skeleton, places[chosen]))
+    turned = quaternion.multiply(turn[:, None], world[chosen])
+    alike = np.sign(np.sum(turned * turned[:1], axis=-1, keepdims=True))
+    return quaternion.normalized(np.sum(turned * np.where(alike == 0.0, 1.0, alike), axis=0))
+
+
 def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
     """How much each frame (T,) looks like standing: limbs that hang, a head that is high."""
     score = np.zeros(len(places))
     for limb in (body.left, body.right):
-        for high, low in ((limb.upper_leg, limb.lower_leg), (limb.lower_leg, limb.foot), (limb.upper_arm, limb.lower_arm)):
+        for high, low in (
+            (limb.upper_leg, limb.lower_leg),
+            (limb.lower_leg, limb.foot),
+            (limb.upper_arm, limb.lower_arm),
+        ):
             if high is not None and low is not None:
                 score += unit(places[:, low] - places[:, high], _DOWN) @ _DOWN
     return score
@@ -152,11 +164,11 @@ def _angle(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None,
 
 
 def _point(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None, wanted: np.ndarray) -> None:
-    """Turn `joint` and all below it so that its bone points along `wanted`; half a turn is made about the body's Y."""
+    """Turn `joint` and all below it so that its bone points along `wanted`; half a turn is made about the body's X."""
     direction = _direction(skeleton, world, joint, child)
     turn = quaternion.between(direction, wanted)
     if np.dot(direction, wanted) < -0.999:
-        turn = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), np.pi)
+        turn = quaternion.about_axis(np.array([1.0, 0.0, 0.0]), np.pi)
     for other in _below(skeleton, joint):
         world[other] = quaternion.multiply(turn, world[other])
 
@@ -186,7 +198,11 @@ def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.n
     ]
     leg = float(np.mean(legs))
     ball = np.array([_ball(places, limb, leg) for limb in limbs])
-    tips = [np.linalg.norm(_tip(skeleton, limb.toe)) for limb in limbs if limb.toe is not None and _has_tip(skeleton, limb.toe)]
+    tips = [
+        np.linalg.norm(_tip(skeleton, limb.toe))
+        for limb in limbs
+        if limb.toe is not None and _has_tip(skeleton, limb.toe)
+    ]
     middle = 0.5 * (places[body.left.upper_leg] + places[body.right.upper_leg])
     ankle_height = float(np.mean(-ball[:, 2])) + _BALL_HEIGHT * leg
     ground = np.mean([places[limb.foot, 2] for limb in limbs]) - ankle_height

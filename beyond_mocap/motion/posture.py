@@ -1,8 +1,8 @@
 """A body's movement in anatomical terms, and how any humanoid skeleton takes it on.
 
-A `Posture` says where the pelvis is and how it is turned, how the trunk bends, what the arms do, and where the feet are.
-Nothing in it speaks of a particular skeleton's joints, rest pose or axes: `to_motion` does, through the neutral stance.
-"""
+A `Posture` says where the pelvis is and how it is turned, how the trunk bends, what the arms do, and where the feet
+are. Nothing in it speaks of a particular skeleton's joints, rest pose or axes: `to_motion` does, through the neutral
+stance."""
 
 from __future__ import annotations
 
@@ -25,14 +25,13 @@ class Posture:
     """T frames of a body, metres and radians, world Z up.
 
     hips (T, 3): the middle between the hip joints. heading (T,): the body's facing about Z. pelvis (T, 3): turn of the
-    pelvis relative to the heading as a rotation vector about (X forward, Y left, Z up): list, forward tilt, turn.
-    spine (T, 3): rotation vector of the chest relative to the pelvis, shared by the joints of the spine. head (T, 3): of
-    the head relative to the chest, shared with the neck. arms (T, 2, 5), left and right: flexion (arm forward positive),
-    abduction (sideways), inward turn about the upper arm, elbow flexion, turn of the forearm. wrists (T, 2): hand flexion
-    towards the palm. ankles (T, 2, 3): where the ankles are. feet (T, 2, 3): rotation of each foot in the world: roll
-    (sole outwards-in, about the foot's length), pitch (toes down positive), yaw. toes (T, 2): the toes' bend against the
-    foot, up positive. knees (T, 2): extra turn of the knees outwards.
-    """
+    pelvis relative to the heading as a rotation vector about (X forward, Y left, Z up): list, forward tilt, turn. spine
+    (T, 3): rotation vector of the chest relative to the pelvis, shared by the joints of the spine. head (T, 3): of the
+    head relative to the chest, shared with the neck. arms (T, 2, 5), left and right: flexion (arm forward positive),
+    abduction (sideways), inward turn about the upper arm, elbow flexion, turn of the forearm. wrists (T, 2): hand
+    flexion towards the palm. ankles (T, 2, 3): where the ankles are. feet (T, 2, 3): rotation of each foot in the
+    world: roll (sole outwards-in, about the foot's length), pitch (toes down positive), yaw. toes (T, 2): the toes'
+    bend against the foot, up positive. knees (T, 2): extra turn of the knees outwards."""
 
     fps: float
     hips: np.ndarray
@@ -75,9 +74,7 @@ def to_motion(posture: Posture, neutral: Neutral) -> Motion:
 
 def pelvis_rotation(posture: Posture) -> np.ndarray:
     """World turn (T, 4) of the pelvis relative to the neutral stance."""
-    return quaternion.multiply(
-        quaternion.about_up(posture.heading), quaternion.from_rotation_vector(posture.pelvis)
-    )
+    return quaternion.multiply(quaternion.about_up(posture.heading), quaternion.from_rotation_vector(posture.pelvis))
 
 
 def hip_joints(posture: Posture, neutral: Neutral) -> np.ndarray:

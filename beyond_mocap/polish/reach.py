@@ -1,8 +1,8 @@
 """Limbs that reach: two-bone inverse kinematics on a skeleton, over all frames at once, without stretching a bone.
 
-Feet are kept on the ground and striking feet brought to the ball with it. The knee keeps the plane in which it bends in the
-pose that is given; where the limb is so straight that it shows none, the plane comes from the frames where it is bent.
-"""
+Feet are kept on the ground and striking feet brought to the ball with it. The knee keeps the plane in which it bends in
+the pose that is given; where the limb is so straight that it shows none, the plane comes from the frames where it is
+bent."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def two_bone(
 ) -> Reached:
     """Local rotations with which a limb's end joint is at `target`.
 
-    root (T, 3) metres, world; rotations (T, J, 4) local; joints: upper, middle and end joint (hip, knee, ankle or shoulder,
-    elbow, wrist), each below the one before, further joints between allowed; target (T, 3) metres, world.
+    root (T, 3) metres, world; rotations (T, J, 4) local; joints: upper, middle and end joint (hip, knee, ankle or
+    shoulder, elbow, wrist), each below the one before, further joints between allowed; target (T, 3) metres, world.
     end_rotation (T, 4): world rotation that the end joint gets; without it the end joint keeps its own, or (with
     keep_end_rotation false) turns rigidly with the lower bone. pole (T, 3): world direction in which the middle joint
     points; without it the pose's own. soft: metres below full extension from where the limb eases, see
@@ -118,9 +118,8 @@ def _frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
 def _own_pole(top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray) -> np.ndarray:
     """Direction (T, 3) in which the middle joint points in the given pose, unit, square to the line top-ankle.
 
-    A nearly straight limb says little: there the direction is mixed with the mean one of all frames, carried by the upper
-    bone (a knee is a hinge), weighted by how clearly each frame shows it.
-    """
+    A nearly straight limb says little: there the direction is mixed with the mean one of all frames, carried by the
+    upper bone (a knee is a hinge), weighted by how clearly each frame shows it."""
     line = limb.unit(ankle - top, np.array([0.0, 0.0, -1.0]))
     off = knee - top - np.sum((knee - top) * line, axis=-1, keepdims=True) * line
     length = np.linalg.norm(knee - top, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)

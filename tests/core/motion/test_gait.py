@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
-from beyond_mocap.motion import gestures
+from beyond_mocap.motion import gestures, moves
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.gait import GaitStyle, footsteps, gait, plan
 from beyond_mocap.motion.humanoid import heading, identify, leg_length
@@ -24,7 +24,10 @@ def flexion(motion: Motion) -> np.ndarray:
     body = identify(motion.skeleton)
     angles = []
     for limb in (body.left, body.right):
-        thigh, shank = places[:, limb.lower_leg] - places[:, limb.upper_leg], places[:, limb.foot] - places[:, limb.lower_leg]
+        thigh, shank = (
+            places[:, limb.lower_leg] - places[:, limb.upper_leg],
+            places[:, limb.foot] - places[:, limb.lower_leg],
+        )
         cosine = np.sum(thigh * shank, axis=1) / np.linalg.norm(thigh, axis=1) / np.linalg.norm(shank, axis=1)
         angles.append(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
     return np.stack(angles, axis=1)
@@ -82,7 +85,8 @@ def test_knees_bend_as_in_the_books():
 
 
 @pytest.mark.parametrize(
-    ("speed", "steps_per_minute"), [(1.0, (92, 108)), (1.4, (108, 122)), (3.0, (150, 172)), (5.0, (170, 192)), (9.0, (245, 275))]
+    ("speed", "steps_per_minute"),
+    [(1.0, (92, 108)), (1.4, (108, 122)), (3.0, (150, 172)), (5.0, (170, 192)), (9.0, (245, 275))],
 )
 def test_cadence(speed, steps_per_minute):
     neutral = neutral_stance(adult_skeleton())
@@ -126,7 +130,9 @@ def test_turns_and_other_directions():
 
 def test_same_input_same_bits_and_a_seed_that_matters():
     first, again, other = (gait(1.4, 3.0, seed=s) for s in (4, 4, 5))
-    assert np.array_equal(first.rotations, again.rotations) and np.array_equal(first.root_positions, again.root_positions)
+    assert np.array_equal(first.rotations, again.rotations) and np.array_equal(
+        first.root_positions, again.root_positions
+    )
     assert not np.array_equal(first.rotations, other.rotations)
 
 
@@ -136,7 +142,9 @@ def test_a_child_takes_shorter_quicker_steps():
     grown = neutral_stance(adult_skeleton())
     strides = [np.ptp(plan(1.2, 5.0, FPS, n, style=GaitStyle(life=0.0)).phase) for n in (child and neutral, grown)]
     assert strides[0] > 1.05 * strides[1]
-    assert gait(1.2, 3.0, FPS, child).root_positions[:, 2].mean() < 0.75 * gait(1.2, 3.0, FPS).root_positions[:, 2].mean()
+    assert (
+        gait(1.2, 3.0, FPS, child).root_positions[:, 2].mean() < 0.75 * gait(1.2, 3.0, FPS).root_positions[:, 2].mean()
+    )
 
 
 def test_bad_speeds_and_lengths_are_refused():
@@ -195,16 +203,18 @@ def test_kicking_is_fast():
 
 
 def test_other_moves_stay_above_the_ground_and_do_what_they_are_called():
-    jump = gestures.header()
+    jump = moves.header()
     frame = int(round(jump.key * jump.motion.fps))
     places, _ = forward_kinematics(jump.motion)
     assert places[frame, :, 2].min() > 0.2  # both feet in the air
-    up = gestures.getting_up()
+    up = moves.getting_up()
     head = forward_kinematics(up.motion)[0][:, up.motion.skeleton.index("Head"), 2]
     assert head[0] < 0.3 and head[-1] > 1.5
-    throw = gestures.throw_in()
+    throw = moves.throw_in()
     frame = int(round(throw.key * throw.motion.fps))
-    hands = forward_kinematics(throw.motion)[0][frame, [throw.motion.skeleton.index(f"{s}Hand") for s in ("Left", "Right")]]
+    hands = forward_kinematics(throw.motion)[0][
+        frame, [throw.motion.skeleton.index(f"{s}Hand") for s in ("Left", "Right")]
+    ]
     assert np.all(hands[:, 2] > 1.75) and 0.08 < np.linalg.norm(hands[0] - hands[1]) < 0.45
     for move in (jump, up, throw):
         assert forward_kinematics(move.motion)[0][..., 2].min() > -0.02

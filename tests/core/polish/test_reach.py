@@ -38,7 +38,9 @@ def test_meets_its_target_without_stretching(running):
     after, turned = kinematics(running, moved.rotations)
     assert np.linalg.norm(after[:, end] - target, axis=1).max() < 1e-6 and moved.miss.max() < 1e-6
     for a, b in ((upper, middle), (middle, end)):
-        assert np.allclose(np.linalg.norm(after[:, b] - after[:, a], axis=1), np.linalg.norm(places[0, b] - places[0, a]))
+        assert np.allclose(
+            np.linalg.norm(after[:, b] - after[:, a], axis=1), np.linalg.norm(places[0, b] - places[0, a])
+        )
     assert np.allclose(np.abs(np.sum(turned[:, end] * world[:, end], axis=1)), 1.0)  # the foot keeps its turn
     others = [j for j in range(len(running.skeleton)) if j not in (upper, middle, end)]
     assert np.allclose(moved.rotations[:, others], running.rotations[:, others])
@@ -130,4 +132,6 @@ def test_end_rotation_and_pole_are_obeyed(running):
 def test_wrong_joints_are_refused(running):
     upper, middle, end = leg(running)
     with pytest.raises(InputError):
-        two_bone(running.skeleton, running.root_positions, running.rotations, (upper, end, middle), running.root_positions)
+        two_bone(
+            running.skeleton, running.root_positions, running.rotations, (upper, end, middle), running.root_positions
+        )

@@ -1,0 +1,24 @@
+"""Key poses over time: rows of a table as smooth curves, and how one movement is laid over another."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from .gait_tables import smooth_step
+
+
+def keyed(rows, times: np.ndarray) -> np.ndarray:
+    """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the last."""
+    table = np.array(rows, dtype=float)
+    return PchipInterpolator(table[:, 0], table[:, 1:], axis=0)(np.clip(times, table[0, 0], table[-1, 0]))
+
+
+def envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
+    """0 before `begin`, 1 from `full` to `fade`, 0 after `end` (T,)."""
+    return smooth_step((times - begin) / (full - begin)) * (1.0 - smooth_step((times - fade) / (end - fade)))
+
+
+def mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    weight = weight.reshape(weight.shape + (1,) * (a.ndim - 1))
+    return a * (1.0 - weight) + b * weight
