@@ -210,11 +210,14 @@ def _unit_notes(read) -> list[str]:
 
 def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
     """Features, words and clusters of `clips`."""
+    from threadpoolctl import threadpool_limits
+
     _check(cancelled)
     report(0.7, "Describing frames")
     skeleton = clips[0].motion.skeleton
     vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
-    frames = describe(skeleton, clips, lambda clip, source: words_matrix(clip, source, vocabulary), vocabulary, FPS)
+    with threadpool_limits(limits=1):  # with more, sums of products come out in another order
+        frames = describe(skeleton, clips, lambda clip, source: words_matrix(clip, source, vocabulary), vocabulary, FPS)
     clusters = {}
     for number, length in enumerate(BLOCK_LENGTHS):
         _check(cancelled)
