@@ -189,8 +189,18 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         method=plan.method,
         seed=plan.seed,
         seconds=seconds,
-        warnings=(*library.notes, *order.warnings),
+        warnings=(*library.notes, *order.warnings, *_crowded_out(order, edit)),
     )
+
+
+def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
+    """One warning per key moment that clips could serve, but not so close to another one."""
+    placed = {key.wanted for key in edit.keys}
+    return [
+        f"{key.asked.time:g} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, it is not played"
+        for number, key in enumerate(order.keys)
+        if key.choices and number not in placed
+    ]
 
 
 def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, footage: Footage, number: int) -> KeyResult:
