@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import ClipAnnotation
+from ..errors import InputError
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .clusters import Clusters
@@ -31,7 +32,7 @@ def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) 
     """A hash of names and contents of all files that a build reads, the options, and this file's VERSION."""
     digest = hashlib.blake2b(json.dumps([VERSION, str(np.__version__), options], sort_keys=True).encode())
     for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
-        digest.update(os.path.relpath(path, folder).encode() + b"\0")
+        digest.update(os.fsencode(os.path.relpath(path, folder)) + b"\0")
         try:
             digest.update(hashlib.blake2b(Path(path).read_bytes()).digest())
         except OSError:
@@ -42,6 +43,8 @@ def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) 
 def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
     """Where the cache is kept, and a note for the user where that is not beside the recordings."""
     if cache_dir is not None:
+        if Path(cache_dir).exists() and not Path(cache_dir).is_dir():
+            raise InputError(cache_dir, "is not a folder", "a folder for the cache", "give another one with --cache")
         return Path(cache_dir), ""
     beside = folder / CACHE_FOLDER
     if os.access(beside if beside.is_dir() else folder, os.W_OK):
