@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation import DISCRETE
-from ..errors import Cancelled
+from ..errors import Cancelled, InputError
 from ..library.keys import Key
 from ..library.library import Library
 from .annotation_cost import AnnotationCost
@@ -99,7 +99,12 @@ class PathSearch:
         self._other: dict[frozenset[str], np.ndarray] = {}
 
     def run(self) -> EditList:
-        """The cheapest way through all slots that the beam finds."""
+        """The cheapest way through all slots that the beam finds; InputError where no clip is as long as a slot."""
+        if not np.any(self.played[0][2] & self.usable):
+            raise InputError(
+                self.library.folder or "library", f"no clip of more than {SLOT} frames at {self.library.fps:g} per second",
+                "clips of a second or more", "add longer recordings",
+            )
         slots = slots_between_keys(self.library, self.wanted)
         layers: list[States] = []
         for number, slot in enumerate(slots):
