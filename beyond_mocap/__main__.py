@@ -175,16 +175,17 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     )
     take = synthesize(library, plan, told.progress, told.cancelled)
     take.seconds.update(load=loaded - begun, library=ready - loaded, total=time.perf_counter() - begun)
+    if options.report:
+        from .evaluation.report import evaluate
+
+        report = evaluate(take, track, library)
+        report["warnings"] = [*report.get("warnings", []), *data.lines]
     write(take, options.out)
     if options.provenance:
         write_provenance(options.provenance, take)
     if options.ball and take.ball is not None:
         write_ball(options.ball, take.ball)
     if options.report:
-        from .evaluation.report import evaluate
-
-        report = evaluate(take, track, library)
-        report["warnings"] = [*report.get("warnings", []), *data.lines]
         write_report(options.report, report)
     told.end()
     for warning in take.warnings:
