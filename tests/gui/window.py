@@ -116,10 +116,10 @@ class Window:
         yield from self.move(*place)
         return self.command_under_pointer(area, region)
 
-    def buttons(self, area, region, step=9):
+    def buttons(self, area, region, step=12):
         """Move over all that the region shows; return each operator's button: its call -> where it is."""
         found = {}
-        columns = [region.x + int(region.width * share) for share in (0.15, 0.4, 0.65, 0.85)]
+        columns = [region.x + int(region.width * share) for share in (0.2, 0.5, 0.83)]
         for y in range(region.y + region.height - 8, region.y + 4, -step):
             for x in columns:
                 if call := (yield from self.points_at(area, region, (x, y))):
