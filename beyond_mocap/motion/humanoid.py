@@ -1,38 +1,43 @@
-"""Which joint is what: hips, legs, arms, head, of any humanoid skeleton, by the names of the common families.
+"""Which joint is what: hips, legs, arms, head, of any humanoid skeleton, by name, and where names say nothing by
+structure.
 
-Covers CMU, LAFAN1, Mixamo, Bandai-Namco, Rigify, Unreal, MVN (Xsens) and MakeHuman style names. Every measure that speaks
-of feet, heading or sides asks here, so a new family of names is one line in a table.
+Covers the names of CMU (.bvh and .asf), LAFAN1, Mixamo, Bandai-Namco, Rigify, Unreal, MVN (Xsens), MakeHuman, VRM, 3ds
+Max Biped, Daz, Character Creator and SMPL. Every measure that speaks of feet, heading or sides asks here, so a new
+family of names is one line in a table. What no name tells is found in the tree (`structure`).
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from ..errors import InputError
-from . import quaternion
-from .motion import Motion, forward_kinematics
+from . import quaternion, structure
+from .motion import Motion, forward_kinematics, pose_kinematics
 from .skeleton import Skeleton
 
 # canonical limb part -> names without side, blanks and prefix, in order of preference
 _LIMB_NAMES = {
-    "shoulder": ("shoulder", "clavicle", "collar"),
-    "upper_arm": ("upperarm", "arm", "uparm"),
-    "lower_arm": ("forearm", "lowerarm", "lowarm", "elbow"),
-    "hand": ("hand", "wrist"),
-    "upper_leg": ("upleg", "upperleg", "thigh", "hip"),
-    "lower_leg": ("leg", "lowerleg", "lowleg", "shin", "calf", "knee"),
-    "foot": ("foot", "ankle"),
-    "toe": ("toebase", "toe", "toes", "ball"),
+    "shoulder": ("clavicle", "collar", "shoulder"),
+    "upper_arm": ("upperarm", "arm", "uparm", "upperarm01", "shldr", "shldrbend", "humerus"),
+    "lower_arm": ("forearm", "lowerarm", "lowarm", "elbow", "lowerarm01", "forearmbend", "radius"),
+    "hand": ("wrist", "hand"),
+    "upper_leg": ("upleg", "upperleg", "thigh", "hip", "upperleg01", "thighbend", "femur"),
+    "lower_leg": ("leg", "lowerleg", "lowleg", "shin", "calf", "knee", "lowerleg01", "tibia"),
+    "foot": ("ankle", "foot"),
+    "toe": ("toebase", "toe", "toes", "ball", "toe0", "toe11"),
 }
 _CENTRE_NAMES = {
     "hips": ("hips", "pelvis", "hip"),
-    "neck": ("neck", "neck1", "neck01"),
+    "neck": ("neck", "neck1", "neck01", "necklower", "necktwist01", "lowerneck"),
     "head": ("head",),
 }
+_PREFIX = re.compile(r"^(mixamorig\d*|valvebiped|j_bip|cc_base|bip\d+|joint|def|org|b)[_\-. ]+(c_)?", re.I)
+_PARTS = {name for names in _LIMB_NAMES.values() for name in names}
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,8 @@ class Humanoid:
 def side_and_part(name: str) -> tuple[str, str]:
     """Side ("left", "right", "") and the rest of a joint's name, prefix, blanks and case removed."""
     plain = re.sub(r"^.*[:|]", "", name)
-    plain = re.sub(r"^(mixamorig\d*|bip\d+|joint|def|org|b)[_\-. ]+", "", plain, flags=re.I)
+    while _PREFIX.search(plain):
+        plain = _PREFIX.sub("", plain)
     for side in ("left", "right"):
         initial = f"[{side[0]}{side[0].upper()}]"
         whole = f"(?i:^{side}|{side}$)"
@@ -83,53 +89,114 @@ def side_and_part(name: str) -> tuple[str, str]:
         if match:
             plain = plain[: match.start()] + plain[match.end() :]
             return side, re.sub(r"[_\-. ]", "", plain).lower()
+        if plain[:1] == side[0] and plain[1:].lower() in _PARTS:
+            return side, plain[1:].lower()
     return "", re.sub(r"[_\-. ]", "", plain).lower()
 
 
-@lru_cache(maxsize=256)
-def _identify(names: tuple[str, ...], parents: tuple[int, ...]) -> Humanoid:
-    parts = [side_and_part(name) for name in names]
-    limbs = {side: _limb(parts, parents, side) for side in ("left", "right")}
-    missing = [f"{s} {p}" for s in limbs for p in ("upper_leg", "lower_leg", "foot") if limbs[s][p] is None]
-    if missing:
-        raise InputError("skeleton", f"no joint found for {', '.join(missing)}", "legs named as in common rigs")
-    hips = _centre(parts, "hips")
-    if hips is None:
-        hips = _common_ancestor(parents, limbs["left"]["upper_leg"], limbs["right"]["upper_leg"])
-    neck, head = _centre(parts, "neck"), _centre(parts, "head")
-    top = neck if neck is not None else head
-    spine = tuple(_chain(parents, hips, top)) if top is not None else ()
-    return Humanoid(hips, spine, neck, head, Limb(**limbs["left"]), Limb(**limbs["right"]), _mirror(parts))
-
-
 def identify(skeleton: Skeleton) -> Humanoid:
-    """The meaning of a skeleton's joints; InputError where hips or legs cannot be found."""
-    return _identify(skeleton.names, skeleton.parents)
+    """The meaning of a skeleton's joints, by names, else by the structure of its rest pose.
+
+    InputError where no legs can be found.
+    """
+    return _identify(skeleton.names, skeleton.parents, skeleton.offsets.tobytes())
+
+
+def identify_posed(motion: Motion) -> Humanoid:
+    """As `identify`, but where names say nothing left and right are told from the recorded poses.
+
+    A rest pose may be folded up; recorded feet point forward and knees bend backward. InputError as there.
+    """
+    skeleton = motion.skeleton
+    parts = [side_and_part(name) for name in skeleton.names]
+    roles = _named(parts, skeleton.parents)
+    if not _has_legs(roles):
+        frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
+        places, _ = pose_kinematics(skeleton, motion.root_positions[frames], motion.rotations[frames])
+        roles = structure.find(skeleton.parents, places) or roles
+    return assemble(skeleton.names, skeleton.parents, roles)
+
+
+@lru_cache(maxsize=256)
+def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes) -> Humanoid:
+    parts = [side_and_part(name) for name in names]
+    roles = _named(parts, parents)
+    if not _has_legs(roles):
+        skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3))
+        rest, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names)))
+        roles = structure.find(parents, rest) or roles
+    return assemble(names, parents, roles)
+
+
+def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:
+    """A body from what is known about it. roles: "hips", "neck", "head", "left upper_leg" and the like -> joint.
+
+    Hips, spine, neck and head that are not named are found from where legs and arms hang. InputError without legs.
+    """
+    roles = dict(roles)
+    if not _has_legs(roles):
+        missing = [part for part in _LEG_ROLES if part not in roles]
+        raise InputError(
+            "skeleton", f"no joint found for {', '.join(missing)}",
+            "legs named as in common rigs, or two legs alike below the hips", "give a bone map",
+        )
+    legs = [roles["left upper_leg"], roles["right upper_leg"]]
+    arms = [roles[part] for part in ("left upper_arm", "right upper_arm") if part in roles]
+    crossing = structure.common_ancestor(parents, legs)
+    if "hips" not in roles or not set(legs) <= set(structure.below(parents, roles["hips"])):
+        roles["hips"] = crossing
+    if arms and roles["hips"] not in structure.path(parents, arms[0]):
+        roles["hips"] = structure.common_ancestor(parents, [*legs, *arms])
+    chest = structure.common_ancestor(parents, arms) if len(arms) == 2 else None
+    if chest is not None:
+        roles.update({**structure.neck_and_head(parents, chest, set(roles.values()), roles), **roles})
+    top = roles.get("neck", roles.get("head"))
+    spine = _chain(parents, roles["hips"], top) if top is not None else []
+    if not spine and chest is not None and chest != roles["hips"]:
+        spine = [*_chain(parents, roles["hips"], chest), chest]
+    limbs = {side: Limb(**{part: roles.get(f"{side} {part}") for part in _LIMB_NAMES}) for side in ("left", "right")}
+    mirror = _mirror([side_and_part(name) for name in names], parents, roles)
+    neck, head = roles.get("neck"), roles.get("head")
+    return Humanoid(roles["hips"], tuple(spine), neck, head, limbs["left"], limbs["right"], mirror)
+
+
+def roles_of(body: Humanoid) -> dict[str, int]:
+    """The inverse of `assemble`: every part that the body has, without its spine."""
+    found = {"hips": body.hips, "neck": body.neck, "head": body.head}
+    for side, limb in (("left", body.left), ("right", body.right)):
+        found.update({f"{side} {part}": getattr(limb, part) for part in _LIMB_NAMES})
+    return {role: joint for role, joint in found.items() if joint is not None}
+
+
+_LEG_ROLES = tuple(f"{side} {part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot"))
+
+
+def _has_legs(roles: Mapping[str, int]) -> bool:
+    return all(role in roles for role in _LEG_ROLES)
+
+
+def _named(parts, parents) -> dict[str, int]:
+    """Roles that names tell."""
+    roles: dict[str, int | None] = {centre: _centre(parts, centre) for centre in _CENTRE_NAMES}
+    for side in ("left", "right"):
+        roles.update({f"{side} {part}": joint for part, joint in _limb(parts, parents, side).items()})
+    return {role: joint for role, joint in roles.items() if joint is not None}
 
 
 def _limb(parts, parents, side: str) -> dict[str, int | None]:
-    found: dict[str, int | None] = {}
-    for part, options in _LIMB_NAMES.items():
-        places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if s == side}
-        found[part] = next((places[o] for o in options if o in places), None)
-    if found["upper_leg"] is not None and found["upper_leg"] == found["lower_leg"]:
-        found["lower_leg"] = next((i for i, p in enumerate(parents) if p == found["upper_leg"]), None)
+    places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if s == side}
+    found = {part: next((places[o] for o in names if o in places), None) for part, names in _LIMB_NAMES.items()}
+    if found["upper_arm"] is None and "shoulder" in places:  # collar, shoulder, elbow, wrist: the joints' own names
+        found["upper_arm"] = places["shoulder"]
+        found["shoulder"] = next((places[o] for o in ("clavicle", "collar") if o in places), None)
+    if found["toe"] is None and "ankle" in places and "foot" in places:
+        found["toe"] = places["foot"]
     return found
 
 
 def _centre(parts, part: str) -> int | None:
     places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if not s}
     return next((places[o] for o in _CENTRE_NAMES[part] if o in places), None)
-
-
-def _common_ancestor(parents, a: int, b: int) -> int:
-    above = set()
-    while a >= 0:
-        above.add(a)
-        a = parents[a]
-    while b not in above:
-        b = parents[b]
-    return b
 
 
 def _chain(parents, low: int, high: int) -> list[int]:
@@ -141,18 +208,21 @@ def _chain(parents, low: int, high: int) -> list[int]:
     return chain[::-1] if joint == low else []
 
 
-def _mirror(parts) -> tuple[int, ...]:
+def _mirror(parts, parents, roles: Mapping[str, int]) -> tuple[int, ...]:
     """For each joint the one on the other side (itself where there is none)."""
     other = {"left": "right", "right": "left", "": ""}
     places = {part: i for i, part in reversed(list(enumerate(parts)))}
-    return tuple(places.get((other[side], rest), i) if side else i for i, (side, rest) in enumerate(parts))
+    if any(side for side, _ in parts):
+        return tuple(places.get((other[side], rest), i) if side else i for i, (side, rest) in enumerate(parts))
+    pairs = [(roles[role], roles.get("right" + role[4:])) for role in roles if role.startswith("left ")]
+    return structure.mirrored(parents, [(a, b) for a, b in pairs if b is not None])
 
 
 def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndarray:
     """Facing about Z, radians, 0 along +X: (..., J, 3) world positions -> (...,).
 
-    Across = from right to left upper legs plus from right to left upper arms, so that neither a twisted pelvis nor twisted
-    shoulders alone decide; facing is across x up.
+    Across = from right to left upper legs plus from right to left upper arms, so that neither a twisted pelvis nor
+    twisted shoulders alone decide; facing is across x up.
     """
     body = identify(skeleton)
     across = positions[..., body.left.upper_leg, :] - positions[..., body.right.upper_leg, :]
