@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import Cancelled
+from beyond_mocap.errors import Cancelled, InputError
+from beyond_mocap.library.library import build
+from beyond_mocap.plan import Plan
 from beyond_mocap.synthesis.path_search import PathSearch
+from beyond_mocap.synthesis.wanted import wanted
 
 
 def found(library, asked):
@@ -69,3 +72,10 @@ def test_it_can_be_stopped_and_tells_how_far_it_is(library, order):
     assert told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
     with pytest.raises(Cancelled):
         PathSearch(library, order(), cancelled=lambda: True).run()
+
+
+def test_clips_shorter_than_a_slot_are_told(tmp_path, clip_file, track_of):
+    clip_file(tmp_path / "walk.bvh", 1.4, 0.2)
+    library = build(tmp_path)
+    with pytest.raises(InputError, match="no clip of more than 8 frames"):
+        found(library, wanted(library, Plan(track=track_of())))
