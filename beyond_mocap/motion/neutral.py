@@ -56,7 +56,8 @@ def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral
     legs cannot be found."""
     body = identify(skeleton)
     world = np.array(_start(skeleton, body, example))
-    _straighten(skeleton, body, world)
+    slopes = [_sole_slope(skeleton, limb, world, example) for limb in (body.left, body.right)]
+    _straighten(skeleton, body, world, slopes)
     local = _to_local(skeleton, world)
     positions, _ = pose_kinematics(skeleton, np.zeros((1, 3)), local[None])
     return _measure(skeleton, body, world, positions[0])
@@ -106,9 +107,9 @@ def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
     return score
 
 
-def _straighten(skeleton: Skeleton, body: Humanoid, world: np.ndarray) -> None:
+def _straighten(skeleton: Skeleton, body: Humanoid, world: np.ndarray, slopes: list[float]) -> None:
     """Turn limbs in `world` (J, 4), parents first, each with all that hangs on it, on the short way."""
-    for limb, side in ((body.left, 1.0), (body.right, -1.0)):
+    for limb, side, slope in ((body.left, 1.0, slopes[0]), (body.right, -1.0, slopes[1])):
         if limb.shoulder is not None and limb.upper_arm is not None:
             sideways = np.array([0.0, side, 0.0])
             if _angle(skeleton, world, limb.shoulder, limb.upper_arm, sideways) > _COLLAR_TOLERANCE:
@@ -118,16 +119,29 @@ def _straighten(skeleton: Skeleton, body: Humanoid, world: np.ndarray) -> None:
                 _point(skeleton, world, high, low, _DOWN)
         _point(skeleton, world, limb.upper_leg, limb.lower_leg, _DOWN)
         _point(skeleton, world, limb.lower_leg, limb.foot, _DOWN)
-        _flatten_foot(skeleton, world, limb)
+        _flatten_foot(skeleton, world, limb, slope)
 
 
-def _flatten_foot(skeleton: Skeleton, world: np.ndarray, limb: Limb) -> None:
-    flat = np.array([np.cos(_SOLE_SLOPE), 0.0, -np.sin(_SOLE_SLOPE)])
+def _sole_slope(skeleton: Skeleton, limb: Limb, world: np.ndarray, example: Motion | None) -> float:
+    """How steeply, radians, the line from ankle to toe joint falls while the sole is flat.
+
+    In the example: where the ankle is in its lowest quarter. Else as the skeleton rests, or a usual slope where that is
+    no standing foot.
+    """
+    if example is not None and limb.toe is not None:
+        places, _ = forward_kinematics(example)
+        ankle = places[:, limb.foot]
+        bones = places[:, limb.toe] - ankle
+        low = ankle[:, 2] <= np.quantile(ankle[:, 2], 0.25)
+        slope = float(np.median(np.arctan2(-bones[low, 2], np.hypot(bones[low, 0], bones[low, 1]))))
+        return float(np.clip(slope, np.radians(5.0), np.radians(50.0)))
     direction = _direction(skeleton, world, limb.foot, limb.toe)
-    slope = np.arctan2(-direction[2], np.hypot(direction[0], direction[1]))
-    if direction[0] > 0.5 and np.radians(5.0) < slope < np.radians(50.0):
-        flat = np.array([np.cos(slope), 0.0, -np.sin(slope)])  # the skeleton's own foot, turned straight ahead
-    _point(skeleton, world, limb.foot, limb.toe, flat)
+    slope = float(np.arctan2(-direction[2], np.hypot(direction[0], direction[1])))
+    return slope if direction[0] > 0.5 and np.radians(5.0) < slope < np.radians(50.0) else _SOLE_SLOPE
+
+
+def _flatten_foot(skeleton: Skeleton, world: np.ndarray, limb: Limb, slope: float) -> None:
+    _point(skeleton, world, limb.foot, limb.toe, np.array([np.cos(slope), 0.0, -np.sin(slope)]))
     ahead = np.array([1.0, 0.0, 0.0])
     if limb.toe is not None and _has_tip(skeleton, limb.toe):
         if _angle(skeleton, world, limb.toe, None, ahead) > _NEARLY:
