@@ -1,4 +1,4 @@
-"""A small made library with planted truths (speeds, a kick whose moment is known), and made tracks, for the core's tests."""
+"""A small made library with planted truths (speeds, a kick's moment), and made tracks, for the core's tests."""
 
 from pathlib import Path
 
@@ -32,14 +32,15 @@ def clip_file():
     """clip_file(path, speed=1.4, seconds=3.0, words="walking", fps=30, **gait): a made gait and its words."""
 
     def make(path, speed=1.4, seconds=3.0, words="walking", fps=30.0, **more) -> Path:
-        return write_clip(Path(path), gait(speed, seconds, fps, **more), f"0 {seconds:g} {words}\n" if words else "# nothing\n")
+        text = f"0 {seconds:g} {words}\n" if words else "# nothing\n"
+        return write_clip(Path(path), gait(speed, seconds, fps, **more), text)
 
     return make
 
 
 @pytest.fixture(scope="session")
 def clips_folder(tmp_path_factory) -> Path:
-    """stand, walk, jog and run at SPEEDS, a walk that turns left, and a kick with the right foot (60 fps) among them."""
+    """stand, walk, jog and run at SPEEDS, a walk that turns left, and a right kick (60 fps)."""
     folder = tmp_path_factory.mktemp("clips")
     for seed, (name, (speed, words)) in enumerate(SPEEDS.items()):
         write_clip(folder / f"{name}.bvh", gait(speed, 5.0, 30.0, seed=seed), f"0 5 {words}\n")
@@ -65,7 +66,8 @@ def kick_seconds() -> float:
 def track_of():
     """track_of(speed, seconds=8, turn=0, hz=25, start=0, ball=False) -> Track without noise.
 
-    speed: m/s, one or a function of the time since the first sample; turn: radians per second. The ball rolls 1 m ahead."""
+    speed: m/s, one or a function of the time since the first sample; turn: radians per second, or a function that gives
+    the direction in radians. The ball rolls 1 m ahead."""
 
     def make(speed=1.4, seconds=8.0, turn=0.0, hz=25.0, start=0.0, ball=False) -> Track:
         fine = np.arange(0.0, seconds + 0.5 / hz, 0.001)

@@ -21,13 +21,14 @@ DATA = TOP.parent / "shared" / "data"
 # ../shared/contract.md, Report JSON
 REPORT = """
 version seed fps frames duration_s seconds{load,library,search,construct,polish,total} root_error_m{mean,p95,max}
-pelvis_error_m{mean,own} keys skate{contact_cm_s,source_contact_cm_s,stance_mm_median,stances_over_21mm,gmd_ratio,source_gmd_ratio}
-seam_jerk_ratio{median,p95,max,share_above_real} foot_correction_m{p95} ik_miss_share pelvis_drop_m pelvis_surge_ratio
-pose_realism loop_share speed_coverage{above,below} annotation_similarity{all,keys,eq18_all,eq18_keys} warp_rate{min,max}
-ground_mm{min,support_max} warnings
+pelvis_error_m{mean,own} keys
+skate{contact_cm_s,source_contact_cm_s,stance_mm_median,stances_over_21mm,gmd_ratio,source_gmd_ratio}
+seam_jerk_ratio{median,p95,max,share_above_real} foot_correction_m{p95} ik_miss_share pelvis_drop_m
+pelvis_surge_ratio pose_realism loop_share speed_coverage{above,below}
+annotation_similarity{all,keys,eq18_all,eq18_keys} warp_rate{min,max} ground_mm{min,support_max} warnings
 """
-KEY = """time_s solved_time_s labels clip clip_frame time_error_s position_error_m pelvis_error_m contact_gap_m ball_shift_m
-used_instead"""
+KEY = """time_s solved_time_s labels clip clip_frame time_error_s position_error_m pelvis_error_m contact_gap_m
+ball_shift_m used_instead"""
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,9 @@ def match(tmp_path_factory, track_of):
     rows = np.column_stack([track.times, track.positions, track.ball])
     header = "time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m\n"
     (folder / "track.csv").write_text(header + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
-    (folder / "track_only.csv").write_text("time_s,x_m,y_m\n" + "\n".join(",".join(f"{v:.4f}" for v in r[:3]) for r in rows) + "\n")
+    (folder / "track_only.csv").write_text(
+        "time_s,x_m,y_m\n" + "\n".join(",".join(f"{v:.4f}" for v in r[:3]) for r in rows) + "\n"
+    )
     (folder / "words.txt").write_text("0 6\n3 kick right\n")
     (folder / "empty.txt").write_text("")
     (folder / "header.txt").write_text("3 header\n")
@@ -196,7 +199,10 @@ def test_help_and_version(run):
     assert run("synthesize", "--help")[0] == 0
 
 
-@pytest.mark.parametrize("arguments", [(), ("fly",), ("library",), ("synthesize", "--out", "x.bvh"), ("mirror", "a.bvh"), ("library", "x", "--what")])
+@pytest.mark.parametrize(
+    "arguments",
+    [(), ("fly",), ("library",), ("synthesize", "--out", "x.bvh"), ("mirror", "a.bvh"), ("library", "x", "--what")],
+)
 def test_a_wrong_command_line_is_status_2(run, arguments):
     assert_told(run(*arguments), 2)
 
@@ -286,7 +292,9 @@ BROKEN = {
     "a word among numbers": lambda c: c[:-400] + b" what " + c[-400:],
     "not a number": lambda c: c[: c.rindex(b"\n", 0, -1)] + b"\n" + b"nan " * 69 + b"\n",
     "no time": lambda c: c.replace(b"Frame Time: 0.0333", b"Frame Time: -0.333"),
-    "zero time": lambda c: c[: c.index(b"Frame Time:")] + b"Frame Time: 0\n" + c[c.index(b"\n", c.index(b"Frame Time:")) + 1 :],
+    "zero time": lambda c: (
+        c[: c.index(b"Frame Time:")] + b"Frame Time: 0\n" + c[c.index(b"\n", c.index(b"Frame Time:")) + 1 :]
+    ),
     "channels": lambda c: c.replace(b"CHANNELS 3", b"CHANNELS 4", 1),
 }
 
@@ -386,11 +394,15 @@ def test_python_m_runs_it(clips_folder, library, match, tmp_path):
 def test_ctrl_c_stops_and_leaves_nothing(clips_folder, library, match, tmp_path, moment):
     times = np.arange(0.0, 240.0, 0.1)
     rows = np.column_stack([times, 30 * np.sin(times / 9), 20 * np.cos(times / 7)])
-    (tmp_path / "long.csv").write_text("time_s,x_m,y_m\n" + "\n".join(",".join(f"{v:.3f}" for v in row) for row in rows))
+    (tmp_path / "long.csv").write_text(
+        "time_s,x_m,y_m\n" + "\n".join(",".join(f"{v:.3f}" for v in row) for row in rows)
+    )
     before = files_in(tmp_path)
     more = ("--cache", tmp_path / "cache") if moment == "Reading" else ()
-    process = started("synthesize", "--json", "--library", clips_folder, "--track", tmp_path / "long.csv", "--annotations",
-                      match / "empty.txt", "--out", tmp_path / "out.bvh", "--report", tmp_path / "r.json", *more)  # fmt: skip
+    arguments = {"library": clips_folder, "track": tmp_path / "long.csv", "annotations": match / "empty.txt"}
+    outputs = {"out": tmp_path / "out.bvh", "report": tmp_path / "r.json"}
+    options = [part for name, value in {**arguments, **outputs}.items() for part in (f"--{name}", value)]
+    process = started("synthesize", "--json", *options, *more)
     for line in process.stderr:
         if json.loads(line)["text"].startswith(moment):
             process.send_signal(signal.SIGINT)
@@ -401,7 +413,9 @@ def test_ctrl_c_stops_and_leaves_nothing(clips_folder, library, match, tmp_path,
     assert files_in(tmp_path) == before
 
 
-needs_data = pytest.mark.skipif(not (DATA / "mocap" / "cmu10").is_dir(), reason="needs the recordings in ../shared/data")
+needs_data = pytest.mark.skipif(
+    not (DATA / "mocap" / "cmu10").is_dir(), reason="needs the recordings in ../shared/data"
+)
 
 
 @needs_data
@@ -410,9 +424,12 @@ def test_real_recordings(run, tmp_path_factory, scenario):
     """CMU's subject 10 as the library: all methods with the nearest words, key times exact; without, status 3."""
     folder = tmp_path_factory.mktemp("real")
     cache = tmp_path_factory.getbasetemp() / "cmu10"
-    track, words = (DATA / "tracking" / "scenarios" / f"scenario{scenario}_{kind}" for kind in ("track.csv", "annotations.txt"))
-    common = ("synthesize", "--library", DATA / "mocap" / "cmu10", "--unit", 0.05644, "--cache", cache, "--track", track,
-              "--annotations", words, "--out", folder / "out.bvh", "--report", folder / "r.json")  # fmt: skip
+    track, words = (
+        DATA / "tracking" / "scenarios" / f"scenario{scenario}_{kind}" for kind in ("track.csv", "annotations.txt")
+    )
+    library = ("--library", DATA / "mocap" / "cmu10", "--unit", 0.05644, "--cache", cache)
+    written = ("--out", folder / "out.bvh", "--report", folder / "r.json")
+    common = ("synthesize", *library, "--track", track, "--annotations", words, *written)
     asked = read_timeline(words, 30.0).keys
     assert_told(run(*common), 3, "--nearest")
     assert files_in(folder) == {}

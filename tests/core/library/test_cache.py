@@ -54,8 +54,9 @@ def arrays_of(library: Library) -> dict[str, np.ndarray]:
 def the_rest(library: Library):
     clips = [(c.path, c.mirrored, c.motion.fps, c.annotations) for c in library.clips]
     skeleton = (library.skeleton.names, library.skeleton.parents, library.skeleton.end_parents)
-    return (clips, skeleton, library.frames.vocabulary, library.fps, library.notes, list(library.clusters), library.folder,
-            library.keys, library.gaits, library.words, library.minutes)  # fmt: skip
+    words = (library.frames.vocabulary, library.words, library.keys)
+    return (clips, skeleton, words, library.fps, library.notes, list(library.clusters), library.folder,
+            library.gaits, library.minutes)  # fmt: skip
 
 
 def assert_same(a: Library, b: Library):
@@ -145,7 +146,9 @@ def test_no_single_wrong_byte_does_harm(small, tmp_path):
     random = np.random.default_rng(3)
     places = [*random.integers(0, len(content), 40), *range(len(content) - 2500, len(content), 7)]
     for place in places:
-        (tmp_path / "library.npz").write_bytes(content[:place] + bytes([content[place] ^ (1 << place % 8)]) + content[place + 1 :])
+        (tmp_path / "library.npz").write_bytes(
+            content[:place] + bytes([content[place] ^ (1 << place % 8)]) + content[place + 1 :]
+        )
         found = cache.load(tmp_path, key)
         if found is not None:
             left, right = arrays_of(library), arrays_of(found)
@@ -199,7 +202,9 @@ def read_only(folder, monkeypatch):
     """The library's folder as one that cannot be written (root may write anywhere, so the answer is planted)."""
     shutil.rmtree(folder / ".beyond_mocap")
     real = os.access
-    monkeypatch.setattr(os, "access", lambda path, mode, **more: not str(path).startswith(str(folder)) and real(path, mode, **more))
+    monkeypatch.setattr(
+        os, "access", lambda path, mode, **more: not str(path).startswith(str(folder)) and real(path, mode, **more)
+    )
     return folder
 
 
@@ -237,7 +242,9 @@ def test_a_folder_in_the_cache_file_s_place_does_no_harm(folder):
 
 def test_two_processes_that_build_at_once_both_succeed(folder):
     shutil.rmtree(folder / ".beyond_mocap")
-    code = "import sys; from beyond_mocap.library.library import build; print(len(build(sys.argv[1], rebuild=True).clips))"
+    code = (
+        "import sys; from beyond_mocap.library.library import build; print(len(build(sys.argv[1], rebuild=True).clips))"
+    )
     environment = {**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"}
     running = [
         subprocess.Popen([sys.executable, "-c", code, str(folder)], env=environment, stdout=-1, stderr=-1, text=True)

@@ -10,7 +10,10 @@ def key(words, clip=0):
 
 
 LOW, TOP, VOLLEY, LEFT = (
-    key("kick low inside right running"), key("kick high top right"), key("kick low volley right"), key("kick low inside left"),
+    key("kick low inside right running"),
+    key("kick high top right"),
+    key("kick low volley right"),
+    key("kick low inside left"),
 )  # fmt: skip
 KICKS = (LOW, TOP, VOLLEY, LEFT)
 
@@ -47,7 +50,17 @@ def test_the_nearest_shares_most_and_has_least_beyond(words, keys):
 
 
 @pytest.mark.parametrize(
-    "words", ["slide", "header", "right header", "running header", "receive body high", "jump slide right", "getting_up left", "throwb high"]
+    "words",
+    [
+        "slide",
+        "header",
+        "right header",
+        "running header",
+        "receive body high",
+        "jump slide right",
+        "getting_up left",
+        "throwb high",
+    ],
 )
 def test_a_kick_is_no_answer_to_another_action(words):
     """Sharing a side, a pace or a height is not sharing the movement."""

@@ -1,4 +1,4 @@
-"""A folder of clips becomes a library: what is planted in the clips comes out, and what is wrong is told in one line."""
+"""A folder of clips becomes a library: what is planted in it comes out, and what is wrong is told in one line."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,10 @@ def test_a_clip_that_floats_is_brought_down(tmp_path, clip_file):
     motion = gait(1.4, 2.0)
     for name, height in (("low", 0.0), ("high", 0.7)):
         clip_file(tmp_path / f"{name}.bvh")
-        bvh.write(tmp_path / f"{name}.bvh", Motion(motion.skeleton, motion.root_positions + [0, 0, height], motion.rotations, 30.0))
+        bvh.write(
+            tmp_path / f"{name}.bvh",
+            Motion(motion.skeleton, motion.root_positions + [0, 0, height], motion.rotations, 30.0),
+        )
     library = build(tmp_path, unit=0.01)
     high, low = clip_of(library, "high.bvh"), clip_of(library, "low.bvh")
     assert np.allclose(high.motion.root_positions, low.motion.root_positions, atol=1e-6)
@@ -66,7 +69,9 @@ def test_frames_say_where_they_come_from(library):
         source = frames.source[frames.first[number] :][: frames.count[number]]
         assert np.allclose(source, np.arange(len(source)) * clip.motion.fps / 30.0)
         assert source[-1] <= len(clip.motion) - 1 < source[-1] + clip.motion.fps / 30.0
-        assert np.allclose(frames.root[frames.clip == number], clip.motion.root_positions[source.astype(int)], atol=1e-9)
+        assert np.allclose(
+            frames.root[frames.clip == number], clip.motion.root_positions[source.astype(int)], atol=1e-9
+        )
     assert frames.left_in_clip[frames.first].tolist() == (frames.count - 1).tolist()
 
 
@@ -120,7 +125,9 @@ def test_a_clip_of_one_frame_is_kept(tmp_path, clip_file):
 
 
 def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
-    return Skeleton(skeleton.names, skeleton.parents, skeleton.offsets * factor, skeleton.end_parents, skeleton.end_offsets)
+    return Skeleton(
+        skeleton.names, skeleton.parents, skeleton.offsets * factor, skeleton.end_parents, skeleton.end_offsets
+    )
 
 
 def test_two_skeletons_are_told_with_both_files(tmp_path, clip_file):
@@ -140,7 +147,9 @@ def test_bones_that_differ_by_rounding_are_one_skeleton(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
     motion = gait(1.4, 1.0)
     clip_file(tmp_path / "same.bvh", 1.4, 1.0)
-    bvh.write(tmp_path / "same.bvh", Motion(scaled(motion.skeleton, 1.001), motion.root_positions, motion.rotations, 30.0))
+    bvh.write(
+        tmp_path / "same.bvh", Motion(scaled(motion.skeleton, 1.001), motion.root_positions, motion.rotations, 30.0)
+    )
     library = build(tmp_path, unit=0.01)
     assert {id(clip.motion.skeleton) for clip in library.clips} == {id(library.skeleton)}
     walk = bvh.read(tmp_path / "walk.bvh", 0.01).motion.skeleton

@@ -84,7 +84,9 @@ def test_the_text_beside_a_clip_wins_over_tables(folder):
 
 
 def test_the_nearest_table_that_speaks_of_a_clip_wins(folder):
-    (folder.parent / "annotations.csv").write_text(HEADER + row("library/deep/a.BVH", "far") + row("library/b.bvh", "far"))
+    (folder.parent / "annotations.csv").write_text(
+        HEADER + row("library/deep/a.BVH", "far") + row("library/b.bvh", "far")
+    )
     assert words(folder, "deep/a.BVH") == words(folder, "b.bvh") == ["far"]
     (folder / "annotations.csv").write_text(HEADER + row("deep/a.BVH", "top"))
     assert (words(folder, "deep/a.BVH"), words(folder, "b.bvh")) == (["top"], ["far"])
@@ -101,7 +103,12 @@ def test_a_table_two_folders_above_says_nothing(folder):
 
 def test_tables_are_found_from_wherever_one_stands(folder, monkeypatch):
     (folder.parent / "annotations.csv").write_text(HEADER + row("library/b.bvh", "above"))
-    for here, given in ((folder, "."), (folder.parent, "library"), (folder / "deep", ".."), (folder / "deep", "../../library")):
+    for here, given in (
+        (folder, "."),
+        (folder.parent, "library"),
+        (folder / "deep", ".."),
+        (folder / "deep", "../../library"),
+    ):
         monkeypatch.chdir(here)
         paths = find_clips(given)
         clip = next(path for path in paths if path.name == "b.bvh")

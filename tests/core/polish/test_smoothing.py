@@ -88,7 +88,11 @@ def test_one_value_per_frame():
 @given(st.integers(0, 10**6), st.integers(1, 40), st.integers(0, 5))
 def test_any_seams_at_all(seed, count, number):
     random = np.random.default_rng(seed)
-    seams = np.sort(random.choice(np.arange(1, count), min(number, count - 1), replace=False)) if count > 1 else np.zeros(0, int)
+    seams = (
+        np.sort(random.choice(np.arange(1, count), min(number, count - 1), replace=False))
+        if count > 1
+        else np.zeros(0, int)
+    )
     values = np.cumsum(random.normal(size=(count, 3)), axis=0)
     kept = values.copy()
     out = spread_values(values, seams, random.normal(size=(len(seams), 3)))

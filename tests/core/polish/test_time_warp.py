@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from beyond_mocap.polish.time_warp import catch_up, warp
 
-WAYS = st.lists(st.floats(0.0, 0.4), min_size=2, max_size=60).map(lambda steps: np.concatenate([[0.0], np.cumsum(steps)]))
+WAYS = st.lists(st.floats(0.0, 0.4), min_size=2, max_size=60).map(
+    lambda steps: np.concatenate([[0.0], np.cumsum(steps)])
+)
 
 
 @settings(max_examples=100, deadline=None)

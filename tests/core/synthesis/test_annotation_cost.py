@@ -19,12 +19,15 @@ def frames_with(rows) -> SimpleNamespace:
         def __len__(self):
             return len(self.words)
 
-    return Rows(words=np.array([[word in row for word in WORDS] for row in rows], bool).reshape(-1, len(WORDS)), vocabulary=WORDS)
+    return Rows(
+        words=np.array([[word in row for word in WORDS] for row in rows], bool).reshape(-1, len(WORDS)),
+        vocabulary=WORDS,
+    )
 
 
 def eq18(asked, carried) -> float:
-    """As printed: over frames and words that either has, minus the mean of products of +1 and -1; nothing asked, nothing
-    counted."""
+    """As printed: over frames and words that either has, minus the mean of products of +1 and -1; where nothing is
+    asked, nothing is counted."""
     products = []
     for a, m in zip(asked, carried):
         if a is not None:
@@ -58,7 +61,10 @@ def test_it_is_eq_18_of_each_block(rows, asked, data):
     ],
 )
 def test_faustino_s_own_frames(asked, carried, cost):
-    frames = SimpleNamespace(words=np.array([[w in carried for w in ("kick", "running", "walking")]]), vocabulary=("kick", "running", "walking"))
+    frames = SimpleNamespace(
+        words=np.array([[w in carried for w in ("kick", "running", "walking")]]),
+        vocabulary=("kick", "running", "walking"),
+    )
     frames = type("Frames", (SimpleNamespace,), {"__len__": lambda self: len(self.words)})(**vars(frames))
     assert AnnotationCost(frames).of_blocks(np.array([0]), [frozenset(asked)]).tolist() == [cost]
 

@@ -22,13 +22,16 @@ def tables(draw):
         if not all(forbidden):
             costs[np.array(forbidden)] = np.inf
     between = [
-        np.array(draw(st.lists(COSTS, min_size=a * b, max_size=a * b)), float).reshape(a, b) for a, b in zip(sizes, sizes[1:])
+        np.array(draw(st.lists(COSTS, min_size=a * b, max_size=a * b)), float).reshape(a, b)
+        for a, b in zip(sizes, sizes[1:])
     ]
     return unary, between
 
 
 def cost_of(choice, unary, between):
-    return sum(costs[c] for costs, c in zip(unary, choice)) + sum(t[a, b] for t, a, b in zip(between, choice, choice[1:]))
+    return sum(costs[c] for costs, c in zip(unary, choice)) + sum(
+        t[a, b] for t, a, b in zip(between, choice, choice[1:])
+    )
 
 
 @settings(max_examples=150, deadline=None)

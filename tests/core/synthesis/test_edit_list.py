@@ -45,7 +45,9 @@ def test_between_a_piece_s_last_frame_and_the_seam_it_goes_on():
 
 
 def test_a_piece_of_one_frame():
-    clip, frame, _ = at_times(edit_of(np.array([1, 2, 1]), np.array([5.0, 90.0, 30.0])), np.array([0.0, 0.5, 1.0, 1.5, 2.0]))
+    clip, frame, _ = at_times(
+        edit_of(np.array([1, 2, 1]), np.array([5.0, 90.0, 30.0])), np.array([0.0, 0.5, 1.0, 1.5, 2.0])
+    )
     assert clip.tolist() == [1, 1, 2, 2, 1] and np.allclose(frame, [5, 5.5, 90, 90.5, 30])
 
 
@@ -66,7 +68,13 @@ def test_footage_laid_back_is_the_recording(library, straight, fps):
     own = (10.0 + index) * 2.0
     root, rotations = at_frames(source, own)
     heading = np.interp(10.0 + index, np.arange(200), library.frames.heading[library.frames.first[number] :][:200])
-    path = np.stack([np.interp(10.0 + index, np.arange(121), library.frames.path[library.frames.clip == number][:, a]) for a in (0, 1)], 1)
+    path = np.stack(
+        [
+            np.interp(10.0 + index, np.arange(121), library.frames.path[library.frames.clip == number][:, a])
+            for a in (0, 1)
+        ],
+        1,
+    )
     pose = footage.pose.copy()
     pose[:, 0] = quaternion.multiply(quaternion.about_up(heading), pose[:, 0])
     assert np.allclose(np.abs(np.sum(pose * rotations, axis=-1)), 1.0, atol=1e-9)
@@ -93,13 +101,18 @@ def test_played_faster_it_goes_faster(library, straight):
 
 def test_at_a_seam_it_is_known_what_would_have_come_next(library):
     first = library.frames.first
-    clip, frame = np.repeat([4, 6], 20), np.concatenate([first[4] + 30.0 + np.arange(20), first[6] + 60.0 + np.arange(20)])
+    clip, frame = (
+        np.repeat([4, 6], 20),
+        np.concatenate([first[4] + 30.0 + np.arange(20), first[6] + 60.0 + np.arange(20)]),
+    )
     footage = fetch(library, EditList(clip, frame, find_seams(clip, frame), ()), np.arange(40.0), 30.0)
     going_on = EditList(clip[:21] * 0 + 4, first[4] + 30.0 + np.arange(21), np.zeros(0, int), ())
     uncut = fetch(library, going_on, np.arange(21.0), 30.0)
     assert footage.seams.tolist() == [20] and footage.turn[20] == 0.0
     assert np.allclose(np.abs(np.sum(footage.ahead_pose[0] * uncut.pose[20], axis=-1)), 1.0, atol=1e-9)
-    assert footage.ahead_height[0] == pytest.approx(uncut.height[20]) and np.allclose(footage.ahead_sway[0], uncut.sway[20])
+    assert footage.ahead_height[0] == pytest.approx(uncut.height[20]) and np.allclose(
+        footage.ahead_sway[0], uncut.sway[20]
+    )
     assert np.allclose(footage.velocity[19], uncut.velocity[19])
 
 
@@ -112,5 +125,10 @@ def test_beyond_a_clip_its_end_is_held(library):
 
 
 def test_one_frame(library):
-    footage = fetch(library, EditList(np.array([4]), np.array([float(library.frames.first[4])]), np.zeros(0, int), ()), np.zeros(1), 30.0)
+    footage = fetch(
+        library,
+        EditList(np.array([4]), np.array([float(library.frames.first[4])]), np.zeros(0, int), ()),
+        np.zeros(1),
+        30.0,
+    )
     assert len(footage.clip) == 1 and np.all(np.isfinite(footage.velocity)) and footage.turn.tolist() == [0.0]

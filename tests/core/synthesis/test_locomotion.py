@@ -51,7 +51,9 @@ def test_sections_of_locomotion_and_of_everything_else(library, order):
 
 
 @pytest.mark.parametrize("delta", [0.1, 0.5, 1.0])
-@pytest.mark.parametrize("found, asked_for", [("run.bvh", 1.4), ("walk.bvh", 2.8), ("stand.bvh", 5.0), ("run.bvh", 0.8), ("walk.bvh", 1.4)])
+@pytest.mark.parametrize(
+    "found, asked_for", [("run.bvh", 1.4), ("walk.bvh", 2.8), ("stand.bvh", 5.0), ("run.bvh", 0.8), ("walk.bvh", 1.4)]
+)
 def test_the_section_travels_what_the_track_does(library, order, track_of, found, asked_for, delta):
     asked = order(track=track_of(asked_for, 8.0))
     search = BlockSearch(library, asked, 0.2)
@@ -118,4 +120,6 @@ def test_the_key_moment_stays_at_its_frame_when_the_rest_is_warped(library, orde
     search = BlockSearch(library, asked, 0.2)
     edit, _ = warped_edit(search, match_distance(search, search.run(), 0.5), True)
     assert edit.clip[120] == edit.keys[0].clip
-    assert np.interp(edit.frame[120], np.arange(len(library.frames)), library.frames.source) == pytest.approx(edit.keys[0].clip_frame, abs=1e-6)
+    assert np.interp(edit.frame[120], np.arange(len(library.frames)), library.frames.source) == pytest.approx(
+        edit.keys[0].clip_frame, abs=1e-6
+    )

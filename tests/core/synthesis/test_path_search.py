@@ -18,7 +18,9 @@ def source_frame(library, edit, at):
     return np.interp(edit.frame[at], np.arange(len(library.frames)), library.frames.source)
 
 
-@pytest.mark.parametrize("lines", [(), ((4.0, "kick"),), ((0.0, "kick"), (8.0, "kick left")), ((3.9, "kick"), (4.2, "kick left"))])
+@pytest.mark.parametrize(
+    "lines", [(), ((4.0, "kick"),), ((0.0, "kick"), (8.0, "kick left")), ((3.9, "kick"), (4.2, "kick left"))]
+)
 def test_every_frame_shows_a_clip_played_forward(library, order, lines):
     edit = found(library, order(*lines))
     assert len(edit) == 241
@@ -37,7 +39,9 @@ def test_a_key_moment_is_on_time(library, order, time):
     near = int(round(at))
     assert edit.clip[near] == edit.keys[0].clip
     step = edit.frame[near] + (at - near)
-    assert np.interp(step, np.arange(len(library.frames)), library.frames.source) == pytest.approx(edit.keys[0].clip_frame, abs=2.0)
+    assert np.interp(step, np.arange(len(library.frames)), library.frames.source) == pytest.approx(
+        edit.keys[0].clip_frame, abs=2.0
+    )
 
 
 @pytest.mark.parametrize("speed", [0.0, 1.4, 2.8, 5.0])

@@ -88,4 +88,6 @@ def test_a_key_s_place_among_the_frames(library):
     for key in library.keys:
         at = pool_frame(library, key)
         assert library.frames.clip[int(at)] == key.clip
-        assert np.interp(at, np.arange(len(library.frames)), library.frames.source) == pytest.approx(key.frame, abs=1e-6)
+        assert np.interp(at, np.arange(len(library.frames)), library.frames.source) == pytest.approx(
+            key.frame, abs=1e-6
+        )
