@@ -72,6 +72,7 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--seed", type=int, default=0)
     verb.add_argument("--alpha", type=_share, default=0.2, help="weight of words against continuity, 0 to 1")
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
+    verb.add_argument("--no-made", action="store_true", help="no made running where the track outruns the recordings")
     verb.add_argument("--nearest", action="store_true", help="go on with the nearest words where the library lacks some")
     _add_library_options(verb)
     verb.set_defaults(run=run_synthesize)
@@ -171,7 +172,7 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     plan = Plan(
         track=track, timeline=timeline, library=str(options.library), method=options.method,
         catch_up=not options.no_catch_up, fps=options.fps, alpha=options.alpha, mirror=not options.no_mirror,
-        nearest=options.nearest, seed=options.seed,
+        nearest=options.nearest, seed=options.seed, made=not options.no_made,
     )
     take = synthesize(library, plan, told.progress, told.cancelled)
     take.seconds.update(load=loaded - begun, library=ready - loaded, total=time.perf_counter() - begun)

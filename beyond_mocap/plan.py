@@ -20,6 +20,7 @@ class Plan:
     alpha: weight of annotation against continuity (Faustino eq. 13). mirror: whether mirrored clips may be used.
     nearest: go on with the nearest words where the library lacks a key moment. seed: of every random choice.
     delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1).
+    made: whether made running may stand in where the track is faster than any recording (method "path" only).
     """
 
     track: Track
@@ -34,3 +35,4 @@ class Plan:
     seed: int = 0
     delta: float = 0.5
     omega: float = 4.0
+    made: bool = True

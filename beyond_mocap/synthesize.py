@@ -19,6 +19,7 @@ import numpy as np
 
 from .errors import InputError
 from .library.library import Library
+from .library.made import MADE_FOLDER
 from .motion import quaternion
 from .motion.humanoid import identify
 from .motion.motion import Motion, pose_kinematics
@@ -69,6 +70,9 @@ def synthesize(
 
 
 def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Take:
+    if plan.method == "path" and plan.made and sample(plan.track, library.fps).speed.max() > library.fastest:
+        report(0.0, "Making faster gaits")
+        library = library.extended
     clock = [time.perf_counter()]
     order = wanted(library, plan)
     found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled)
@@ -165,7 +169,7 @@ def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
 
 def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage, motion, seconds) -> Take:
     clips = library.clips
-    names = tuple(dict.fromkeys(clip.path for clip in clips))
+    names = tuple(dict.fromkeys(clips[clip].path for clip in footage.clip))
     number = {name: i for i, name in enumerate(names)}
     words = tuple(
         tuple(sorted(clips[clip].words_at(frame))) for clip, frame in zip(footage.clip, np.round(footage.clip_frame, 6))
@@ -189,7 +193,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         method=plan.method,
         seed=plan.seed,
         seconds=seconds,
-        warnings=(*library.notes, *order.warnings, *_crowded_out(order, edit)),
+        warnings=(*library.notes, *order.warnings, *_crowded_out(order, edit), *_made_seconds(library, plan, footage)),
     )
 
 
@@ -218,3 +222,14 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
         shown = placed.clip_frame
     source = library.clips[clip]
     return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, key.used_instead)
+
+
+def _made_seconds(library: Library, plan: Plan, footage: Footage) -> list[str]:
+    """How much of the take the made gait plays, told where it does."""
+    made = np.array([clip.path.startswith(MADE_FOLDER) for clip in library.clips])[footage.clip]
+    if not np.any(made):
+        return []
+    return [
+        f"{made.sum() / plan.fps:.1f} s ({made.mean():.0%}) are faster than the recordings and played by made running, "
+        "styled after the fastest of them"
+    ]

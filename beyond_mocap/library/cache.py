@@ -24,8 +24,8 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 2
-_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "features", "words")
+VERSION = 3
+_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "features", "mean", "basis", "words")
 
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
@@ -55,12 +55,12 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
     return elsewhere, f"{folder} cannot be written: its cache is kept in {elsewhere}"
 
 
-def save(place: Path, key: str, library) -> None:
-    """Writes `library` as `place`/library.npz; a place that cannot be written is left alone."""
-    arrays = {f"frames.{name}": getattr(library.frames, name) for name in _FRAME_ARRAYS}
+def save(place: Path, key: str, library, name: str = "library") -> None:
+    """Writes `library` as `place`/`name`.npz; a place that cannot be written is left alone."""
+    arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     for length, clusters in library.clusters.items():
-        for name in ("start", "label", "medoid"):
-            arrays[f"clusters.{length}.{name}"] = getattr(clusters, name)
+        for part in ("start", "label", "medoid"):
+            arrays[f"clusters.{length}.{part}"] = getattr(clusters, part)
     arrays["root"] = np.concatenate([clip.motion.root_positions for clip in library.clips])
     arrays["rotations"] = np.concatenate([clip.motion.rotations for clip in library.clips])
     arrays["standing"] = np.concatenate([clip.standing for clip in library.clips])
@@ -74,7 +74,7 @@ def save(place: Path, key: str, library) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             np.savez(file, **arrays)
-        os.replace(beside, place / "library.npz")
+        os.replace(beside, place / f"{name}.npz")
     except OSError:
         Path(beside).unlink(missing_ok=True)
 
@@ -97,14 +97,14 @@ def _header(key: str, library) -> dict:
     }
 
 
-def load(place: Path, key: str):
+def load(place: Path, key: str, name: str = "library"):
     """The cached library, or None where there is none, it belongs to other content, or it is damaged."""
     try:
-        with np.load(place / "library.npz", allow_pickle=False) as arrays:
+        with np.load(place / f"{name}.npz", allow_pickle=False) as arrays:
             header = json.loads(arrays["header"].tobytes())
             if header["key"] != key:
                 return None
-            return _restore(header, {name: arrays[name] for name in arrays.files})
+            return _restore(header, {part: arrays[part] for part in arrays.files})
     except Exception:  # a damaged file can fail in any of zipfile's, numpy's, json's and our own ways
         return None
 

@@ -31,7 +31,8 @@ class Frames:
     clip (N,) clip index; source (N,) fractional frame in the clip's own rate; first, count (C,) each clip's place.
     root (N, 3) metres; heading (N,) facing, radians, unwrapped within a clip; path (N, 2) the root on the ground without
     its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame (x forward, y left).
-    features (N, D) float32, metres. words (N, V) bool, one column per word of `vocabulary`.
+    features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words (N, V) bool, one
+    column per word of `vocabulary`.
     """
 
     clip: np.ndarray
@@ -43,6 +44,8 @@ class Frames:
     path: np.ndarray
     velocity: np.ndarray
     features: np.ndarray
+    mean: np.ndarray
+    basis: np.ndarray
     words: np.ndarray
     vocabulary: tuple[str, ...]
 
@@ -110,8 +113,9 @@ def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np
     return mean, vectors[:, :kept].astype(values.dtype)
 
 
-def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], fps: float) -> Frames:
-    """Frames of all `clips` at `fps`. `words_of(clip, frames)` gives the (T, V) bool words at fractional clip frames."""
+def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], fps: float, like: Frames | None = None) -> Frames:
+    """Frames of all `clips` at `fps`. `words_of(clip, frames)` gives the (T, V) bool words at fractional clip frames.
+    like: frames whose components are used, so that features of both can be compared; else those of the clips themselves."""
     joints = feature_joints(skeleton)
     parts: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}
     counts = []
@@ -133,10 +137,24 @@ def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], f
         for name, column in zip(_COLUMNS, columns):
             parts[name].append(column)
     merged = {name: np.concatenate(columns) for name, columns in parts.items()}
-    mean, basis = principal_components(merged["features"])
+    mean, basis = (like.mean, like.basis) if like is not None else principal_components(merged["features"])
     merged["features"] = (merged["features"] - mean) @ basis
     count = np.array(counts)
-    return Frames(first=np.cumsum(count) - count, count=count, vocabulary=vocabulary, **merged)
+    return Frames(first=np.cumsum(count) - count, count=count, mean=mean, basis=basis, vocabulary=vocabulary, **merged)
+
+
+def joined(a: Frames, b: Frames) -> Frames:
+    """The frames of `a`, then those of `b`, which was described like `a`; clip numbers of `b` go on from `a`'s."""
+    vocabulary = tuple(sorted({*a.vocabulary, *b.vocabulary}))
+    words = np.zeros((len(a) + len(b), len(vocabulary)), bool)
+    for frames, rows in ((a, slice(0, len(a))), (b, slice(len(a), None))):
+        words[rows, [vocabulary.index(word) for word in frames.vocabulary]] = frames.words
+    parts = {
+        name: np.concatenate([getattr(a, name), getattr(b, name)])
+        for name in ("source", "count", "root", "heading", "path", "velocity", "features")
+    }
+    clip, first = np.append(a.clip, b.clip + len(a.first)), np.append(a.first, b.first + len(a))
+    return Frames(clip=clip, first=first, mean=a.mean, basis=a.basis, words=words, vocabulary=vocabulary, **parts)
 
 
 _COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "features", "words")

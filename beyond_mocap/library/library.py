@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Callable
@@ -23,8 +23,9 @@ from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from . import cache
 from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
-from .features import Frames, describe
+from .features import Frames, describe, joined
 from .keys import Key, keys_of
+from .made import MADE_FOLDER, made_clips
 from .scan import Annotations, find_clips
 
 FPS = 30.0
@@ -73,7 +74,8 @@ class Gait:
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was decided."""
+    """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was decided;
+    kept: where its cache is and under which key, for what is worked out later."""
 
     folder: str
     skeleton: Skeleton
@@ -82,7 +84,7 @@ class Library:
     clusters: dict[int, Clusters]
     fps: float = FPS
     notes: tuple[str, ...] = ()
-    seconds: dict[str, float] = field(default_factory=dict)
+    kept: tuple[Path, str] | None = None
 
     @cached_property
     def keys(self) -> tuple[Key, ...]:
@@ -98,6 +100,26 @@ class Library:
     def gaits(self) -> tuple[Gait, ...]:
         """The library's own locomotion from slow to fast; InputError where it has none."""
         return measure_gaits(self)
+
+    @cached_property
+    def extended(self) -> "Library":
+        """The recordings and, behind them, the made gait above the fastest of them (`library.made`); made on first use
+        and kept beside the cache. It has no clusters."""
+        made = cache.load(*self.kept, "made") if self.kept else None
+        if made is None:
+            made = _made(self)
+            if self.kept:
+                _keep_made(self.kept[0], made)
+                cache.save(*self.kept, made, "made")
+        if not made.clips:
+            return self
+        frames = joined(self.frames, made.frames)
+        return replace(self, clips=(*self.clips, *made.clips), frames=frames, clusters={})
+
+    @cached_property
+    def fastest(self) -> float:
+        """m/s: the highest speed that a clip reaches."""
+        return float(self.frames.speed.max())
 
     @property
     def minutes(self) -> float:
@@ -134,13 +156,52 @@ def build(
         report(0.0, "Reading the cache")
         found = cache.load(place, key)
         if found is not None:
-            return replace(found, folder=str(folder))
+            return replace(found, folder=str(folder), kept=(place, key))
     notes: list[str] = [where] if where else []
     clips = _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled)
     built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
     cache.save(place, key, built)
     report(1.0, "Library ready")
-    return built
+    return replace(built, kept=(place, key))
+
+
+def _made(library: Library) -> Library:
+    """The made gait for this library's skeleton and style, described like its recordings."""
+    from threadpoolctl import threadpool_limits
+
+    clips = []
+    for name, motion, words in made_clips(library.skeleton, _example(library), library.fastest):
+        row = ClipAnnotation(0, len(motion) - 1, None, words)
+        clip = Clip(name, False, motion, (row,), foot_contacts.points(motion))
+        clips += [clip, clip.twin()]
+    if not clips:
+        return replace(library, clips=())
+    vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
+    words_of = lambda clip, source: words_matrix(clip, source, vocabulary)  # noqa: E731
+    with threadpool_limits(limits=1):
+        frames = describe(library.skeleton, clips, words_of, vocabulary, library.fps, library.frames)
+    return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
+
+
+def _keep_made(place: Path, made: Library) -> None:
+    """Writes the made clips as BVH beside the cache, so that whoever follows a take's provenance finds them; a place that
+    cannot be written is left alone."""
+    try:
+        (place / Path(MADE_FOLDER).name).mkdir(parents=True, exist_ok=True)
+        for clip in made.clips:
+            if not clip.mirrored:
+                bvh.write(place / Path(MADE_FOLDER).name / Path(clip.path).name, clip.motion)
+    except OSError:
+        return
+
+
+def _example(library: Library) -> Motion:
+    """A second or two of the fastest recorded locomotion: its posture, arms and width are the made gait's style."""
+    frames = library.frames
+    best = int(np.argmax(np.where(frames.words.any(axis=1), frames.speed, 0.0)))
+    clip = library.clips[int(frames.clip[best])]
+    middle, reach = int(round(frames.source[best])), int(round(clip.motion.fps))
+    return clip.motion.frames(max(0, middle - reach), min(len(clip.motion), middle + reach + 1))
 
 
 def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled) -> tuple[Clip, ...]:
@@ -241,16 +302,21 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     """Speeds of the library's locomotion (Faustino §3.1.1): per gait word, distance over time of its most common rows.
 
     A gait without a direction in its words counts as well as one with; rows of key moments and dribbles do not count,
-    nor do rows that a slower one would overtake in the mean (then the word is dropped, since thresholds need an order).
+    nor do made clips of a gait that is recorded, nor rows that a slower one would overtake in the mean (then the word is dropped, since thresholds need an order).
     """
     seconds: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
     metres: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames
     step = np.linalg.norm(np.diff(frames.path, axis=0), axis=1)
+    clips = [clip for clip in library.clips if not clip.path.startswith(MADE_FOLDER)]
+    recorded = {word for clip in clips for row in clip.annotations for word in row.words}
     for index, clip in enumerate(library.clips):
         first, rate = frames.first[index], library.fps / clip.motion.fps
+        made = clip.path.startswith(MADE_FOLDER)
         for row in () if clip.mirrored else clip.annotations:
             words = [word for word in row.words if word in seconds]
+            if made and recorded.intersection(words):
+                continue
             if row.key is not None or len(words) != 1 or set(row.words) - {words[0]} - _DIRECTIONS:
                 continue
             low, high = first + int(np.ceil(row.start * rate)), first + int(row.end * rate)

@@ -23,6 +23,7 @@ from .reach import two_bone
 SMOOTH = 0.02
 PULL = 2e-4
 MOST_DROP = 0.10
+MOST_SHIFT = 0.18
 EASE = 0.012
 
 
@@ -70,7 +71,7 @@ def _goal(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray,
     turn = shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0]
     spin = quaternion.about_up(turn)
     toe = heel + quaternion.rotate(spin, toe - heel)
-    ground = shift(np.stack([np.diff(heel[:, :2], axis=0), np.diff(toe[:, :2], axis=0)], axis=1), weight, scale)
+    ground, weight = _held(np.stack([np.diff(heel[:, :2], axis=0), np.diff(toe[:, :2], axis=0)], axis=1), weight, scale)
     lift = _lift(heel[:, 2], toe[:, 2], weight, scale)
     return heel + np.column_stack([ground, lift]), quaternion.multiply(spin, world[:, limb.foot])
 
@@ -79,6 +80,23 @@ def _firmness(stands: np.ndarray) -> np.ndarray:
     """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, when it is still arriving, else 0."""
     inner = stands & np.roll(stands, 1, axis=0) & np.roll(stands, -1, axis=0)
     return np.where(inner, 1.0, np.where(stands, 0.5, 0.0))
+
+
+def _held(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than MOST_SHIFT are
+    held less firmly, since a foot that slides looks better than a leg torn after it (give-way order, ../shared/metrics.md)."""
+    stance = weight.max(axis=1) > 0
+    label = np.cumsum(np.diff(stance, prepend=False)) * stance
+    ground = shift(velocity, weight, scale)
+    for _ in range(4):
+        far = np.zeros(label.max() + 1)
+        np.maximum.at(far, label, np.where(stance, np.linalg.norm(ground, axis=1), 0.0))
+        if far.max() <= MOST_SHIFT:
+            break
+        ease = np.minimum(1.0, (MOST_SHIFT / np.maximum(far, 1e-9)) ** 3)
+        weight = weight * ease[label][:, None]
+        ground = shift(velocity, weight, scale)
+    return ground, weight
 
 
 def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0) -> np.ndarray:

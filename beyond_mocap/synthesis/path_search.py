@@ -18,12 +18,14 @@ from ..annotation import DISCRETE
 from ..errors import Cancelled, InputError
 from ..library.keys import Key
 from ..library.library import Library
+from ..library.made import MADE_FOLDER
 from .annotation_cost import AnnotationCost
 from .edit_list import EditList, PlacedKey, find_seams
 from .wanted import Wanted, needed, pool_frame
 
 SLOT = 8
 RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
+KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])
 BEAM = 64
 CANDIDATES = 1500
 MEMORY_SLOTS = 15
@@ -34,7 +36,7 @@ BUCKET = 40
 class Weights:
     """What a unit of each misfit costs. speed per m/s; turn per radian and slot; facing per radian off the direction of
     travel; words for lacking all of the asked ones; unasked for frames of an action that nobody asked for, or that carry no
-    word; rate per unit of warp; switch for any cut; pose per metre of joint distance; rate_change per unit; replay for a
+    word; made for a made gait where recordings could serve; rate per unit of warp; switch for any cut; pose per metre of joint distance; rate_change per unit; replay for a
     stretch shown less than 4 s ago."""
 
     speed: float = 1.0
@@ -42,6 +44,7 @@ class Weights:
     facing: float = 0.1
     words: float = 0.3
     unasked: float = 0.5
+    made: float = 0.4
     rate: float = 0.24
     switch: float = 0.1
     pose: float = 1.0
@@ -90,6 +93,8 @@ class PathSearch:
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
         self.usable = wanted.allowed[library.frames.clip]
+        made = np.array([clip.path.startswith(MADE_FOLDER) for clip in library.clips])
+        self.made = made[library.frames.clip]
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
         self.played = [played_speed_and_turn(library, rate) for rate in RATES]
         self.off_travel = np.abs(np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]))
@@ -166,7 +171,7 @@ class PathSearch:
         words = self.wanted.asked[(slot.first + slot.end) // 2]
         if words:
             cost += w.words * self._missing_share(words)
-        cost += w.unasked * self._unasked(words or frozenset())
+        cost += w.unasked * self._unasked(words or frozenset()) + w.made * self.made
         return np.where(valid & self.usable, cost, np.inf)
 
     def _missing_share(self, words: frozenset[str]) -> np.ndarray:
@@ -190,18 +195,22 @@ class PathSearch:
         return speed, float(track.direction[last] - track.direction[slot.first]) * min(1.0, speed)
 
     def _key_states(self, slot: Slot):
-        """One state per clip that can serve the slot's key moment at the asked time."""
+        """A state per clip that can serve the slot's key moment at the asked time, and per rate. A kick that was recorded
+        slower than the player runs is played faster, within the limits of what may give way (../shared/metrics.md)."""
         number, choices = slot.key
         wanted_speed, _ = self._asked(slot)
-        offset = self.wanted.keys[number].frame - slot.first
-        start = np.array([pool_frame(self.library, key) - offset for key in choices])
-        clip = np.array([key.clip for key in choices])
+        choice = np.repeat(np.arange(len(choices)), len(KEY_RATES))
+        rate = np.tile(KEY_RATES, len(choices))
+        clip = np.array([key.clip for key in choices])[choice]
+        middle = np.array([pool_frame(self.library, key) for key in choices])[choice]
+        start = middle - rate * (self.wanted.keys[number].frame - slot.first)
         first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
-        held = np.maximum(first - start, 0) + np.maximum(start + len(slot) - last, 0)
-        span = np.clip(np.round(start[:, None] + np.arange(len(slot))).astype(int), first[:, None], last[:, None])
-        misfit = np.abs(self.frames.speed[span].mean(axis=1) - wanted_speed)
-        unary = (self.weights.speed * misfit + 0.1 * held) * (len(slot) / SLOT)
-        return clip, start, np.ones(len(start)), unary, np.arange(len(start))
+        held = np.maximum(first - start, 0) + np.maximum(start + rate * len(slot) - last, 0)
+        span = np.round(start[:, None] + rate[:, None] * np.arange(len(slot))).astype(int)
+        speed = rate * self.frames.speed[np.clip(span, first[:, None], last[:, None])].mean(axis=1)
+        stretch = np.maximum(np.abs(rate - 1.0) - 0.15, 0.0)
+        misfit = self.weights.speed * np.abs(speed - wanted_speed) + self.weights.rate * np.abs(rate - 1.0) + 4.0 * stretch
+        return clip, start, rate, (misfit + 0.1 * held) * (len(slot) / SLOT), choice
 
     def _switch_costs(self, before: States, ends: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """(B, K) cost of cutting from each kept state to each candidate."""
