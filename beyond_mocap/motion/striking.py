@@ -44,8 +44,8 @@ def striking_part(words: Iterable[str]) -> str | None:
 class Surface:
     """A striking surface: all that is within `radius` metres of the line between two points that joints carry.
 
-    part: "foot", "head", "chest" or "hand". side: "left", "right" or "" (head, chest). start and end: a joint's index and
-    the point (3,) in metres in that joint's own frame.
+    part: "foot", "head", "chest" or "hand". side: "left", "right" or "" (head, chest). start and end: a joint's index
+    and the point (3,) in metres in that joint's own frame.
     """
 
     part: str

@@ -1,0 +1,122 @@
+"""A part of the body carried elsewhere: a foot or hand by its limb, head or chest by the spine, the rest as it was.
+
+What is applied is the difference between reaching for the new place and reaching for the old one, so that a shift of
+zero changes nothing at all, however straight the limb is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion import quaternion
+from ..motion.humanoid import Limb, identify
+from ..motion.motion import pose_kinematics
+from ..motion.skeleton import Skeleton
+from ..motion.striking import Surface
+from .reach import two_bone
+
+MOST_BEND = {"head": 0.6, "chest": 0.35}
+"""Radians that the whole spine bends at most."""
+
+_DAMPING = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body over W frames: root (W, 3) m, rotations (W, J, 4) local; places (W, J, 3) m and world (W, J, 4) of its
+    joints."""
+
+    skeleton: Skeleton
+    root: np.ndarray
+    rotations: np.ndarray
+    places: np.ndarray
+    world: np.ndarray
+
+    @classmethod
+    def posed(cls, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> "Body":
+        """With its joints' places worked out."""
+        return cls(skeleton, root, rotations, *pose_kinematics(skeleton, root, rotations))
+
+    def line(self, surface: Surface, at) -> tuple[np.ndarray, np.ndarray]:
+        """Both ends (..., 3) m of a striking surface's line at frame or frames `at`."""
+        return surface.line(self.places[at], self.world[at])
+
+
+def leg(limb: Limb) -> tuple[int, int, int]:
+    """Hip, knee and ankle."""
+    return limb.upper_leg, limb.lower_leg, limb.foot
+
+
+def arm(limb: Limb) -> tuple[int, int, int]:
+    """Shoulder, elbow and wrist."""
+    return limb.upper_arm, limb.lower_arm, limb.hand
+
+
+def limb_carried(
+    body: Body, root: np.ndarray, rotations: np.ndarray, chain, shift: np.ndarray, soft: float = 0.01
+) -> np.ndarray:
+    """`rotations` (W, J, 4) with the limb's joints turned so that its end lies `shift` (W, 3) m from where `body` has
+    it.
+
+    root (W, 3) m: where the body's root is now. chain, soft: as for `reach.two_bone`. The end joint keeps its world
+    rotation.
+    """
+    skeleton = body.skeleton
+    end = body.places[:, chain[2]]
+    still = two_bone(skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
+    moved = two_bone(skeleton, root, body.rotations, chain, end + shift, soft=soft).rotations
+    before, after = (pose_kinematics(skeleton, root, turned)[1] for turned in (still, moved))
+    world, out = body.world.copy(), rotations.copy()
+    for joint in _path(skeleton, chain[0], chain[2]):
+        turn = quaternion.multiply(after[:, joint], quaternion.inverse(before[:, joint]))
+        world[:, joint] = quaternion.multiply(turn, body.world[:, joint])
+        local = quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), world[:, joint])
+        out[:, joint] = _same_sign(local, body.rotations[:, joint])
+    return out
+
+
+def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Local rotations (W, J, 4) with the spine bent so that the surface's middle lies `shift` (3,) m away at frame
+    `at`.
+
+    weight (W,): share of the bend at each frame. Every joint of the spine (and neck, for the head) turns alike, by one
+    damped step of the inverse of how the middle moves; the bend goes along with the hips, and is at most MOST_BEND.
+    """
+    skeleton, joint = body.skeleton, surface.start[0]
+    hips = identify(skeleton).hips
+    bending = [j for j in _path(skeleton, hips, joint)[1:] if j != joint or surface.part == "head"]
+    if not bending:
+        return body.rotations.copy()
+    middle = np.mean(body.line(surface, at), axis=0)
+    arms = middle - body.places[at, bending]
+    moves = np.mean([_cross_matrix(a).T for a in arms], axis=0)
+    bend = np.linalg.solve(moves.T @ moves + _DAMPING * np.eye(3), moves.T @ shift)
+    bend *= min(1.0, MOST_BEND[surface.part] / max(np.linalg.norm(bend), 1e-9))
+    carried = quaternion.rotate(quaternion.inverse(body.world[at, hips]), bend / len(bending))
+    turn = quaternion.from_rotation_vector(weight[:, None] * quaternion.rotate(body.world[:, hips], carried))
+    out = body.rotations.copy()
+    for j in bending:
+        parent = body.world[:, skeleton.parents[j]]
+        own = quaternion.multiply(quaternion.inverse(parent), quaternion.multiply(turn, parent))
+        out[:, j] = quaternion.multiply(own, body.rotations[:, j])
+    return out
+
+
+def _cross_matrix(v: np.ndarray) -> np.ndarray:
+    """(3, 3) of v x."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def _path(skeleton: Skeleton, high: int, low: int) -> list[int]:
+    """Joints from `high` down to `low`, both included."""
+    chain = [low]
+    while chain[-1] != high:
+        chain.append(skeleton.parents[chain[-1]])
+    return chain[::-1]
+
+
+def _same_sign(q: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """The same rotations (W, 4) with the signs of those they come from."""
+    return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)
