@@ -15,7 +15,7 @@ TABLE_NAME = "annotations.csv"
 def find_clips(folder: str | Path) -> list[Path]:
     """All BVH files below `folder`, sorted by their path below it; symbolic links are followed, loops are not.
 
-    Raises InputError where the folder is missing or holds no BVH file.
+    Raises InputError where the folder is missing, holds no BVH file, or one whose name cannot be written into a table.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -32,6 +32,9 @@ def find_clips(folder: str | Path) -> list[Path]:
         found += [Path(here) / name for name in files if name.lower().endswith(".bvh")]
     if not found:
         raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
+    for path in found:
+        if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
+            raise InputError(ascii(str(path)), "a name that is not UTF-8", "names that tables can hold", "rename the file")
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 

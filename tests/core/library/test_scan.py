@@ -1,5 +1,7 @@
 """Which files below a folder are clips, and which words belong to each."""
 
+import os
+
 import pytest
 
 from beyond_mocap.errors import InputError
@@ -74,6 +76,19 @@ def test_a_missing_or_empty_folder_is_told(tmp_path, make):
     with pytest.raises(InputError, match="nothing: no .*; expected .*; .") as told:
         find_clips(tmp_path / "nothing")
     assert "\n" not in str(told.value)
+
+
+def test_names_of_any_script_will_do_but_bytes_that_are_none_are_told(folder):
+    (folder / "frei stoß 蹴る.bvh").write_text("")
+    assert "frei stoß 蹴る.bvh" in names(folder)
+    try:
+        with open(os.fsencode(folder) + b"/w\xffalk.bvh", "w"):
+            pass
+    except OSError:
+        pytest.skip("this file system takes no such names")
+    with pytest.raises(InputError, match="not UTF-8") as told:
+        find_clips(folder)
+    assert str(told.value).isascii()
 
 
 def test_the_text_beside_a_clip_wins_over_tables(folder):
