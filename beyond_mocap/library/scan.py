@@ -34,13 +34,13 @@ def find_clips(folder: str | Path) -> list[Path]:
         raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
     for path in found:
         if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
-            raise InputError(ascii(str(path)), "a name that is not UTF-8", "names that tables can hold", "rename the file")
+            raise InputError(ascii(str(path)), "a name that is not UTF-8", "a name for tables to hold", "rename the file")
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 
 def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
-    """The `annotations.csv` files that may speak about `clips`: from each clip's folder up to the library's top, and the
-    one in the folder above that, since a library is often one folder of a larger collection."""
+    """The `annotations.csv` files that may speak about `clips`: from each clip's folder up to the library's top, and
+    the one in the folder above that, since a library is often one folder of a larger collection."""
     folder = Path(folder)
     places = {parent for clip in clips for parent in clip.parents if parent == folder or folder in parent.parents}
     places |= {folder, _absolute(folder).parent}
