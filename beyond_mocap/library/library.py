@@ -104,7 +104,8 @@ class Library:
     @cached_property
     def extended(self) -> "Library":
         """The recordings and, behind them, the made gait above the fastest of them (`library.made`); made on first use
-        and kept beside the cache. It has no clusters."""
+        and kept beside the cache. It has no clusters. InputError where no recording shows locomotion."""
+        measure_gaits(self)  # a library without locomotion stays an error
         made = cache.load(*self.kept, "made") if self.kept else None
         if made is None:
             made = _made(self)
