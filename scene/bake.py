@@ -32,7 +32,7 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
         target = armature.create(context, take.motion.skeleton, order.name, room)
         order.body = target
     if settings.make_bodies and not any(child.type == "MESH" for child in target.children):
-        body.create(target, order.name, tuple(order.shirt), room, scene)
+        body.create(target, order.name, tuple(order.shirt), room, scene, take.motion)
     channels.discard(target, MARK)
     start = frame_at(scene, take.start_time)
     action.write(target, take.motion, scene, start, f"{order.name} take")[MARK] = True

@@ -17,18 +17,21 @@ LOOKS = {  # linear RGB of what is the same on all players
 }
 
 
-def create(player: bpy.types.Object, name: str, shirt, collection, scene: bpy.types.Scene) -> bpy.types.Object:
-    """Dress the armature `player`: a mesh named `name` with an armature modifier, as its child, in `collection`."""
+def create(player, name: str, shirt, collection, scene: bpy.types.Scene, example) -> bpy.types.Object:
+    """Dress the armature `player`: a mesh named `name` with an armature modifier, as its child, in `collection`.
+
+    example: a `Motion` on the armature's skeleton; it shows how the body hangs on bones whose rest pose says little.
+    """
     from ..beyond_mocap.motion.body import MATERIALS, low_poly_body  # brings scipy, which is slow to import
 
     skeleton = armature.skeleton_of(player, scene)
-    body = low_poly_body(skeleton)
+    body = low_poly_body(skeleton, example=example)
     scale = armature.placement(player, scene).scale
     root = np.array(player.data.bones[skeleton.names[0]].head_local)
     mesh = bpy.data.meshes.new(f"{name} body")
     mesh.from_pydata((body.vertices / scale + root).tolist(), [], body.faces)
     mesh.polygons.foreach_set("material_index", np.asarray(body.material, np.int32))
-    mesh.polygons.foreach_set("use_smooth", np.zeros(len(body.faces), bool))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
     for part in MATERIALS:
         mesh.materials.append(colour(f"{name} {part}" if part == "shirt" else part.capitalize(), LOOKS.get(part, shirt)))
     person = bpy.data.objects.new(f"{name} body", mesh)
