@@ -34,7 +34,7 @@ def find_clips(folder: str | Path) -> list[Path]:
         raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
     for path in found:
         if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
-            raise InputError(ascii(str(path)), "a name that is not UTF-8", "one that tables can hold", "rename the file")
+            raise InputError(ascii(str(path)), "a name that is not UTF-8", "one that tables can hold", "rename it")
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 
