@@ -39,6 +39,8 @@ def test_where_nobody_moves_time_passes():
     assert np.allclose(warp(np.zeros(31), np.zeros(61)), np.arange(61) / 2.0)
     pause = np.concatenate([np.linspace(0, 2, 21), np.full(20, 2.0), np.linspace(2, 4, 21)])
     assert np.diff(warp(pause, pause)).min() > 0.9
+    slow = np.linspace(0, len(pause) - 1, 2 * len(pause) - 1)
+    assert np.allclose(warp(pause, np.interp(slow, np.arange(len(pause)), pause)), slow, atol=0.05)
 
 
 @pytest.mark.parametrize("source, target", [(1, 5), (5, 1), (1, 1)])
