@@ -36,8 +36,9 @@ BUCKET = 40
 class Weights:
     """What a unit of each misfit costs. speed per m/s; turn per radian and slot; facing per radian off the direction of
     travel; words for lacking all of the asked ones; unasked for frames of an action that nobody asked for, or that carry no
-    word; made for a made gait where recordings could serve; rate per unit of warp; switch for any cut; pose per metre of joint distance; rate_change per unit; replay for a
-    stretch shown less than 4 s ago."""
+    word; made for a made gait, which steps in only where recordings miss the speed by more; rate per unit of warp; switch
+    for any cut; pose per metre of joint distance; rate_change per unit; replay for a stretch shown less than 4 s ago.
+    """
 
     speed: float = 1.0
     turn: float = 0.5
