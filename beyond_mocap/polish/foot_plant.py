@@ -23,7 +23,7 @@ from .reach import two_bone
 SMOOTH = 0.02
 PULL = 2e-4
 MOST_DROP = 0.10
-MOST_SHIFT = 0.18
+MOST_SHIFT = 0.25
 EASE = 0.012
 
 
