@@ -5,27 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, FloatProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
+from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files import bvh
 from ..beyond_mocap.library.scan import find_clips
 from ..scene import action, armature
-from .verb import Verb
+from .verb import ImportVerb
 
 
-class BEYOND_MOCAP_OT_import_clips(Verb, bpy.types.Operator, ImportHelper):
+class BEYOND_MOCAP_OT_import_clips(ImportVerb, bpy.types.Operator):
     """Import BVH motion clips as armatures; choose files, or a folder without a file for all below it"""
 
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}
     filename_ext = ".bvh"
 
     filter_glob: StringProperty(default="*.bvh", options={"HIDDEN"})
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
-    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
     unit: FloatProperty(
         name="Metres per unit", default=0.0, min=0.0, precision=5,
         description="Size of one unit of the file in metres; 0 guesses it from the height of the hips",
@@ -35,21 +31,12 @@ class BEYOND_MOCAP_OT_import_clips(Verb, bpy.types.Operator, ImportHelper):
         description="Add the clips' actions to the active armature where its bones are the same, instead of making new ones",
     )
 
-    def invoke(self, context, event):
-        """Dropped files are imported at once; else the file browser opens."""
-        if self.directory and self.files:
-            return self.execute(context)
-        return ImportHelper.invoke(self, context, event)
-
     def paths(self) -> list[Path]:
-        """The chosen files; all below the chosen folder where no file is chosen."""
-        names = [file.name for file in self.files if file.name]
-        if names:
-            return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
-        chosen = Path(bpy.path.abspath(self.filepath or self.directory))
-        if str(chosen) == ".":
+        """The chosen files, and all below a chosen folder."""
+        chosen = self.chosen() or ([Path(self.directory)] if self.directory else [])
+        if not chosen:
             raise InputError("import", "no file given", "a .bvh file or a folder", "choose one")
-        return find_clips(chosen) if chosen.is_dir() else [chosen]
+        return [file for path in chosen for file in (find_clips(path) if path.is_dir() else [path])]
 
     def do(self, context):
         """Read all files, then make armatures."""

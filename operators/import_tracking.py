@@ -5,31 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-from bpy.props import CollectionProperty, EnumProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
+from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.tracking import PROVIDERS
 from ..scene import tracks
 from ..scene.settings import as_setting
-from .verb import Verb
+from .verb import ImportVerb
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
 SECTION = 60.0  # seconds of a whole match that are taken at first
 
 
-class BEYOND_MOCAP_OT_import_tracking(Verb, bpy.types.Operator, ImportHelper):
+class BEYOND_MOCAP_OT_import_tracking(ImportVerb, bpy.types.Operator):
     """Import players' positions: CSV files with time_s, x_m, y_m, or a provider's tracking file (TRACAB, Metrica,
 SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name beside a CSV is taken as the player's words"""
 
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}
     filename_ext = ".csv"
 
     filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml", options={"HIDDEN"})
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
-    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
     metadata: StringProperty(
         name="Metadata", subtype="FILE_PATH",
         description="The provider's second file; where empty, one beside the tracking file whose name fits is taken",
@@ -40,20 +36,13 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
         description="Whose form the file has",
     )
 
-    def invoke(self, context, event):
-        """Dropped files are imported at once; else the file browser opens."""
-        if self.directory and self.files:
-            return self.execute(context)
-        return ImportHelper.invoke(self, context, event)
-
     def paths(self) -> list[str]:
-        """The chosen files."""
-        names = [file.name for file in self.files if file.name]
-        if names:
-            return [str(Path(self.directory or Path(self.filepath).parent, name)) for name in names]
-        if not self.filepath:
+        """The chosen files, without the words that lie beside a chosen CSV and come along with it."""
+        chosen = self.chosen()
+        if not chosen:
             raise InputError("import", "no file given", "a tracking file", "choose one")
-        return [bpy.path.abspath(self.filepath)]
+        words = {path.with_suffix(".txt") for path in chosen if path.suffix.lower() == ".csv"}
+        return [str(path) for path in chosen if path not in words]
 
     def do(self, context):
         """Read all files, then fill the list."""

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
+from bpy.props import CollectionProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
 
 from ..beyond_mocap.errors import BeyondMocapError
 from ..scene import background
@@ -34,6 +38,28 @@ class Verb:
         """Report an error."""
         self.report({"ERROR"}, message)
         return {"CANCELLED"}
+
+
+class ImportVerb(Verb, ImportHelper):
+    """A verb that reads files: chosen in the file browser, dropped into a view, or named by a script."""
+
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+
+    def invoke(self, context, event):
+        """Dropped files are imported at once; else the file browser opens."""
+        if self.directory and self.files:
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def chosen(self) -> list[Path]:
+        """The chosen files; where none is, the path of the file browser's name field, if there is one."""
+        names = [file.name for file in self.files if file.name]
+        if names:
+            return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
+        return [Path(bpy.path.abspath(self.filepath))] if self.filepath else []
 
 
 class BackgroundVerb(Verb):
