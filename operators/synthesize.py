@@ -24,11 +24,11 @@ FIGURES = (  # of the report: what the panel's table shows, path in the report, 
     ("Off the track, mean", "root_error_m.mean", 100, "{:.1f} cm"),
     ("Off the track, 95 %", "root_error_m.p95", 100, "{:.1f} cm"),
     ("Feet slide", "skate.contact_cm_s", 1, "{:.1f} cm/s"),
-    ("in the recordings", "skate.source_contact_cm_s", 1, "{:.1f} cm/s"),
-    ("Jerk at seams / recordings", "seam_jerk_ratio.median", 1, "{:.2f}"),
+    ("... in the recordings", "skate.source_contact_cm_s", 1, "{:.1f} cm/s"),
+    ("Jerk at seams", "seam_jerk_ratio.median", 1, "{:.2f} of real"),
     ("Words met", "annotation_similarity.all", -50, "{:.0f} %"),  # -1 is all, +1 none
-    ("Time stretched", "warp_rate.max", 1, "{:.2f} x"),
-    ("Seconds to make", "seconds.total", 1, "{:.1f}"),
+    ("Clips played at most", "warp_rate.max", 1, "{:.2f} x"),
+    ("Time to make", "seconds.total", 1, "{:.1f} s"),
 )
 
 
@@ -116,7 +116,7 @@ The scene changes with Bake only"""
                 continue
             player = settings.players[name]
             player.take = session.keep_take(plan, take)
-            player.quality = quality(report)
+            player.quality, player.moments = quality(report), moments(report)
             told = dict.fromkeys((*warnings, *report.get("warnings", ())))
             player.warnings = "\n".join(line for line in told if line not in result.library.notes)
         if lost:
@@ -133,7 +133,13 @@ def quality(report: dict) -> str:
             value = value.get(key) if isinstance(value, dict) else None
         if value is not None:
             lines.append(f"{name}: {form.format(factor * (value if factor > 0 else value - 1.0))}")
+    return "\n".join(lines)
+
+
+def moments(report: dict) -> str:
+    """A line for each key moment: its time, what was asked for, and what is shown where that is something else."""
+    lines = []
     for key in report.get("keys", ()):
-        used = key.get("used_instead")
-        lines.append(f"{' '.join(key['labels'])} at {key['time_s']:.1f} s: {' '.join(used) if used else 'found'}")
+        instead = f", shown as {' '.join(key['used_instead'])}" if key.get("used_instead") else ""
+        lines.append(f"{key['time_s']:.1f} s  {' '.join(key['labels'])}{instead}")
     return "\n".join(lines)

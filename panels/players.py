@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.settings import active_player
-from .tab import Step
+from .tab import Step, paragraph
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
@@ -37,6 +37,7 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
         player = active_player(settings)
         if player is None:
+            paragraph(layout, "Import a file with positions, or drop it into the view", "INFO")
             return
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
@@ -45,6 +46,8 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
             column.prop(player, "feed_id")
             column.prop(settings, "section_start")
             column.prop(settings, "section_end")
-        column.prop(player, "annotation_file")
+        file = column.column()
+        file.active = player.annotation_text is None  # the text counts more
+        file.prop(player, "annotation_file")
         column.prop(player, "annotation_text")
         column.prop(player, "body")

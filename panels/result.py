@@ -5,17 +5,17 @@ from __future__ import annotations
 import bpy
 
 from ..scene.settings import active_player
-from .tab import Step, table
+from .tab import Step, paragraph, table
 
 
 class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
-    """Bake, and the quality of the active player's take."""
+    """Bake, and how well the active player's take came out."""
 
     bl_label = "4  Bake & Result"
     bl_order = 4
 
     def draw(self, context):
-        """Button, what is made, table, warnings."""
+        """Button, what is made, figures, key moments, warnings."""
         layout, settings = self.layout, context.scene.beyond_mocap
         row = layout.row()
         row.scale_y = 1.3
@@ -35,5 +35,8 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
             box = layout.box()
             box.label(text=player.name, icon="INFO")
             table(box, player.quality.splitlines())
+            column = box.column(align=True)
+            for line in player.moments.splitlines():
+                paragraph(column, line, "KEYTYPE_KEYFRAME_VEC")
             for line in player.warnings.splitlines():
-                box.label(text=line, icon="ERROR")
+                paragraph(column, line, "ERROR")

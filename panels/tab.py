@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import textwrap
+
+import bpy
+
+LETTER = 5.7  # pixels that a letter of the interface takes on the average, at a scale of 1
+EDGES = 70  # pixels of a sidebar that are no text: tabs, the box and its icon
+
 
 def table(layout, lines) -> None:
     """Lines "name: value" in two columns; a line without a colon goes right across."""
@@ -15,6 +22,15 @@ def table(layout, lines) -> None:
         row = column.split(factor=0.62)
         row.label(text=name)
         row.label(text=value)
+
+
+def paragraph(layout, text: str, icon: str) -> None:
+    """Text over as many lines as the sidebar's width asks for, since labels are cut; the icon stands before the first."""
+    width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for number, line in enumerate(textwrap.wrap(text, max(16, int((width - EDGES) / LETTER)))):
+        column.label(text=line, icon="BLANK1" if number else icon)
 
 
 class Step:

@@ -22,7 +22,7 @@ def write(context: bpy.types.Context, name: str, points: np.ndarray, rgb, collec
     placed = np.ones((len(points), 4), np.float32)
     placed[:, :2], placed[:, 2] = np.asarray(points) * units, HEIGHT * units
     line.points.foreach_set("co", placed.ravel())
-    line.points.foreach_set("tilt", np.full(len(points), np.pi / 2, np.float32))
+    line.points.foreach_set("tilt", np.full(len(points), -np.pi / 2, np.float32))  # its upper side looks up
     data.materials.append(colour(f"{name} colour", tuple(rgb), 0.9))
     ribbon = collection.objects.get(name)
     if ribbon is None or ribbon.type != "CURVE":

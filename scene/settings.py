@@ -58,6 +58,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
+    moments: StringProperty(name="Key moments", options={"HIDDEN"}, description="A line for each key moment of the newest take")
     warnings: StringProperty(name="Warnings", options={"HIDDEN"}, description="Lines about what to look at in the newest take")
 
 
@@ -88,7 +89,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Catch Up", default=True, description="Let the body catch up with the track smoothly after each warp"
     )
     alpha: FloatProperty(
-        name="Words against Smoothness", default=0.2, min=0.0, max=1.0,
+        name="Weight of Words", default=0.2, min=0.0, max=1.0,
         description="0 looks only for smooth transitions, 1 only for the words asked for",
     )
     mirror: BoolProperty(name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged")
@@ -98,7 +99,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     seed: IntProperty(name="Seed", default=0, min=0, description="Another number may choose other clips; the same repeats")
     rate: FloatProperty(
-        name="Rate", default=30.0, min=10.0, max=240.0,
+        name="Frame Rate", default=30.0, min=10.0, max=240.0,
         description="Frames per second that are synthesized; the scene keeps its own rate",
     )
     start_frame: IntProperty(

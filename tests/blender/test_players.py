@@ -68,6 +68,13 @@ def test_tracking_becomes_players(match, core):
     assert bpy.context.scene.render.fps == 25
 
 
+def test_words_chosen_together_with_their_track_are_no_track(match):
+    names = [{"name": "player1.txt"}, {"name": "player1.csv"}]
+    assert bpy.ops.beyond_mocap.import_tracking(directory=str(match), files=names) == {"FINISHED"}
+    only, = bpy.context.scene.beyond_mocap.players
+    assert only.tracking_file.endswith("player1.csv") and only.annotation_file.endswith("player1.txt")
+
+
 def test_paths_are_kept_relative_where_the_user_wants_that(match):
     bpy.ops.wm.save_as_mainfile(filepath=str(match / "scene.blend"))
     bpy.context.preferences.filepaths.use_relative_paths = True
@@ -217,7 +224,7 @@ def test_words_that_the_library_lacks(ready, match):
     refused(bpy.ops.beyond_mocap.synthesize, "header")
     ready.nearest = True
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
-    assert "header at 6.0 s: " in ready.players[0].quality
+    assert ready.players[0].moments.startswith("6.0 s  header, shown as ")
 
 
 def test_a_take_of_another_session(ready, session):
