@@ -55,11 +55,21 @@ def open_the_tab(bpy) -> None:
     for space in spaces:
         if space.type == "VIEW_3D":
             space.show_region_ui = True
-            space.shading.type, space.shading.color_type = "SOLID", "MATERIAL"
-            space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+            like_a_pitch(space.shading, space.overlay)
             space.region_3d.view_perspective = "CAMERA"
+            space.region_3d.view_camera_zoom, space.region_3d.view_camera_offset = 12.0, (0.08, 0.0)
         elif space.type == "FILE_BROWSER" and space.params is not None:
             space.params.directory = b"//"
+
+
+def like_a_pitch(shading, overlay) -> None:
+    """Colours, shadows and a sky in the solid view, which every computer draws quickly; nothing in front of the players."""
+    shading.type, shading.light = "SOLID", "STUDIO"  # the light first: it says which studio lights there are
+    shading.color_type, shading.studio_light = "MATERIAL", "paint.sl"
+    shading.show_shadows, shading.shadow_intensity, shading.show_object_outline = True, 0.4, False
+    shading.background_type, shading.background_color = "VIEWPORT", (0.35, 0.50, 0.72)
+    for name in ("floor", "axis_x", "axis_y", "cursor", "extras", "relationship_lines", "bones"):
+        setattr(overlay, f"show_{name}", False)
 
 
 def main() -> int:
@@ -73,6 +83,7 @@ def main() -> int:
     demo.prepare(bpy)
     scene = bpy.context.scene
     scene.frame_end, scene.beyond_mocap.active_player = 1201, 0
+    scene.camera.data.show_passepartout = False
     words_as_texts(bpy, scene.beyond_mocap)
     relative_paths(scene.beyond_mocap)
     bpy.data.texts.new("Read me").write(HOW_TO)
