@@ -98,6 +98,7 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--library", type=Path)
     _add_library_options(verb)
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
+    verb.add_argument("--html", type=Path, metavar="R.html", help="the report as a page with pictures (needs matplotlib)")
     verb.set_defaults(run=run_evaluate)
     return verb
 
@@ -190,9 +191,9 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
         write_report(options.report, report)
     told.end()
     for warning in take.warnings:
-        print(f"note: {warning}", file=sys.stderr)
+        told.note(warning)
     if options.ball and take.ball is None:
-        print(f"note: {options.track} has no ball, so {options.ball} was not written", file=sys.stderr)
+        told.note(f"{options.track} has no ball, so {options.ball} was not written")
     print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
 
 
@@ -211,14 +212,18 @@ def run_mirror(options, told: "Told", writers: Mapping[str, Writer]) -> None:
 def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     """`evaluate`: the report of a motion that was written before. `--unit` is the library's where there is one."""
     from .annotation import read_timeline
+    from .evaluation.html import html_report
     from .evaluation.played import played_from_tables
+    from .evaluation.plots import require_matplotlib
     from .evaluation.report import evaluate_played
     from .files import bvh
-    from .files.tables import read_ball, read_provenance, write_report
+    from .files.tables import atomic_write, read_ball, read_provenance, write_report
     from .files.tracking import read_track_csv
     from .motion.track import clean
 
-    _check_outputs(options.report)
+    _check_outputs(options.report, options.html)
+    if options.html:
+        require_matplotlib()
     motion = bvh.read(options.motion, None if options.library else options.unit).motion
     track = clean(read_track_csv(options.track))[0] if options.track else None
     start = float(track.times[0]) if track else 0.0
@@ -227,7 +232,14 @@ def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     ball = read_ball(options.ball) if options.ball else None
     played = played_from_tables(motion, provenance, ball, start, str(options.provenance))
     library = _library(options, told) if options.library else None
-    write_report(options.report, evaluate_played(played, track=track, timeline=timeline, library=library))
+    report = evaluate_played(played, track=track, timeline=timeline, library=library)
+    write_report(options.report, report)
+    if options.html:
+        title = options.motion.name
+        atomic_write(
+            options.html,
+            html_report(played, report, track=track, timeline=timeline, library=library, title=title),
+        )
     told.end()
     print(options.report)
 
@@ -288,6 +300,10 @@ class Told:
             if line != self._last:
                 print(line, end="", file=self._stream, flush=True)
                 self._last = line
+
+    def note(self, text: str) -> None:
+        """Tells something that the user should know, on the stream of the progress."""
+        print(json.dumps({"note": text}) if self._json else f"note: {text}", file=self._stream, flush=True)
 
     def end(self) -> None:
         """Clears the bar."""

@@ -87,26 +87,28 @@ def table(reports: Mapping[str, dict]) -> str:
 
     Nested figures are named with dots, key moments are numbered from 1; texts (warnings) are counted.
     """
-    flat = {name: _flat(report) for name, report in reports.items()}
-    rows = dict.fromkeys(figure for row in flat.values() for figure in row)
-    lines = ["| figure | " + " | ".join(flat) + " |", "|---|" + "---|" * len(flat)]
+    columns = {name: flat(report) for name, report in reports.items()}
+    rows = dict.fromkeys(figure for column in columns.values() for figure in column)
+    lines = ["| figure | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]
     for row in rows:
-        lines.append(f"| {row} | " + " | ".join(_cell(column.get(row)) for column in flat.values()) + " |")
+        lines.append(f"| {row} | " + " | ".join(cell(column.get(row)) for column in columns.values()) + " |")
     return "\n".join(lines) + "\n"
 
 
-def _flat(value, name: str = "") -> dict[str, object]:
+def flat(value, name: str = "") -> dict[str, object]:
+    """A report as one row per figure: nested names joined with dots, key moments numbered from 1, warnings counted."""
     if name == "warnings":
         return {name: len(value)}
     if isinstance(value, Mapping):
-        return {k: v for key, entry in value.items() for k, v in _flat(entry, f"{name}.{key}" if name else key).items()}
+        return {k: v for key, entry in value.items() for k, v in flat(entry, f"{name}.{key}" if name else key).items()}
     if isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
         pairs = [(f"{name} {i}", entry) for i, entry in enumerate(value, 1)]
-        return {k: v for label, entry in pairs for k, v in _flat(entry, label).items()}
+        return {k: v for label, entry in pairs for k, v in flat(entry, label).items()}
     return {name: value}
 
 
-def _cell(value) -> str:
+def cell(value) -> str:
+    """One figure as text for a Markdown table."""
     if value is None:
         return "-"
     if isinstance(value, list):

@@ -1,0 +1,270 @@
+"""Pictures of one take: curves and bars over its time, and stick figures. Each is a PNG as bytes, drawn by matplotlib.
+
+matplotlib is imported inside the functions, since only this page needs it; without a window, without global state.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion.contacts import floor_height
+from ..motion.humanoid import heading_from_positions, side_and_part
+from ..motion.quaternion import about_up, rotate
+from ..motion.track import BALL_RADIUS
+from . import figures, pieces, realism, root
+from .view import View
+
+WIDTH = 11.0
+DPI = 100
+LEFT, RIGHT, MIDDLE, BALL = "#2563a8", "#c0392b", "#333333", "#e08a00"
+_SIDES = {"left": LEFT, "right": RIGHT}
+_MOST_ROWS = 30
+_SPACING = 1.3  # metres between two figures of a strip
+
+
+def require_matplotlib() -> None:
+    """InputError, with what to do, where matplotlib is not installed."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise InputError(
+            "--html", "matplotlib is not installed", "it for the pictures",
+            "python -m pip install 'matplotlib>=3.8', or leave --html out",
+        ) from None  # fmt: skip
+
+
+def curves(view: View) -> bytes:
+    """Root error, feet, speed and steadiness over time, one above the other."""
+    panels = [_draw_root, _draw_feet, _draw_speed, _draw_smoothness]
+    canvas, axes = _canvas(len(panels), [2.0, 2.0, 2.0, 1.6])
+    for draw, ax in zip(panels, axes):
+        draw(ax, view)
+        _mark_moments(ax, view)
+    _time_axis(axes[-1], view)
+    return _png(canvas)
+
+
+def legend(view: View) -> dict[int, tuple[int, str]]:
+    """Number on the bars of `clips` and colour "#rrggbb" of each clip that is played, by its index, most played
+    first."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    table = [to_hex(c) for c in (*colormaps["Set2"].colors, *colormaps["Pastel1"].colors, *colormaps["Set3"].colors)]
+    used, counts = np.unique(view.played.clip[view.played.clip >= 0], return_counts=True)
+    order = used[np.argsort(-counts, kind="stable")]
+    return {int(clip): (place + 1, table[place % len(table)]) for place, clip in enumerate(order)}
+
+
+def clips(view: View) -> bytes:
+    """Which clip is played when, by the numbers of `legend`, with its seams, and how fast it is played."""
+    canvas, (bar, warp) = _canvas(2, [0.8, 1.4])
+    names = legend(view)
+    edges = [0, *view.seams, view.count]
+    for low, high in zip(edges[:-1], edges[1:]):
+        _clip_bar(bar, view, low, high, names)
+    bar.set_yticks([])
+    bar.set_ylabel("clip")
+    bar.set_title("clips and seams; ' marks a mirrored clip", loc="left", fontsize=9.5)
+    rate = np.append(pieces.played_rate(*view.source), np.nan)
+    rate[view.seams - 1] = np.nan
+    warp.plot(view.played.times, rate, color=MIDDLE, lw=1)
+    for limit in (0.85, 1.15):
+        warp.axhline(limit, color="#999999", lw=0.8, ls="--")
+    warp.set_ylabel("played / recorded")
+    warp.set_title("time warp", loc="left", fontsize=9.5)
+    _mark_moments(warp, view)
+    _time_axis(warp, view)
+    return _png(canvas)
+
+
+def words(view: View) -> bytes | None:
+    """Words asked (upper half of each row) and got (lower half); None where no words are known."""
+    if view.played.words is None:
+        return None
+    got = [frozenset(w) for w in view.played.words]
+    asked = [None] * view.count
+    if view.timeline is not None:
+        asked = figures.asked_words(figures.filled_timeline(view), view.played.times, view.moments)
+    rows = list(dict.fromkeys(word for pair in zip(asked, got) for words in pair for word in sorted(words or ())))
+    for moment in view.moments:
+        rows += [word for word in moment.asked.words if word not in rows]
+    rows = rows[:_MOST_ROWS]
+    if not rows:
+        return None
+    canvas, (ax,) = _canvas(1, [0.5 + 0.24 * len(rows)])
+    for row, word in enumerate(rows):
+        _bars(ax, view, np.array([word in (w or ()) for w in asked]), row - 0.38, "#8fb8de")
+        _bars(ax, view, np.array([word in w for w in got]), row + 0.02, "#3c7d4e")
+        times = [m.asked.time for m in view.moments if word in m.asked.words]
+        ax.plot(times, [row - 0.2] * len(times), "v", color=RIGHT, ms=6)
+    ax.set_yticks(range(len(rows)), rows)
+    ax.set_ylim(len(rows) - 0.5, -0.5)
+    ax.set_title("words: asked (blue; red: key moments) above got (green)", loc="left", fontsize=9.5)
+    ax.grid(axis="y", visible=False)
+    _time_axis(ax, view)
+    return _png(canvas)
+
+
+def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes:
+    """Stick figures side by side, seen from the body's left side and a little from ahead; left blue, right red.
+
+    frames: output frames, drawn in their order; marked: the one whose number is bold. The ball is drawn where it is
+    near.
+    """
+    middle = frames[len(frames) // 2]
+    facing = float(heading_from_positions(view.played.motion.skeleton, view.played.positions[middle]))
+    turn = about_up(np.array(-facing + np.radians(20.0)))
+    top = max(1.6, float(view.played.positions[list(frames), :, 2].max()) + 0.15)
+    span = len(frames) * _SPACING
+    canvas, (ax,) = _canvas(1, [(top + 0.35) * WIDTH / span])
+    for number, frame in enumerate(frames):
+        _figure(ax, view, frame, turn, number * _SPACING)
+        weight = "bold" if frame == marked else "normal"
+        label = f"{view.played.times[frame]:.2f} s"
+        ax.text(number * _SPACING, -0.1, label, ha="center", va="top", fontsize=8, weight=weight)
+    ax.axhline(0.0, color="#4a7a4a", lw=0.8)
+    ax.set_xlim(-0.5 * _SPACING, span - 0.5 * _SPACING)
+    ax.set_ylim(-0.35, top)
+    ax.set_aspect("equal")
+    ax.axis("off")
+    return _png(canvas)
+
+
+def _draw_root(ax, view: View) -> None:
+    ax.set_title("distance from the track", loc="left", fontsize=9.5)
+    ax.set_ylabel("cm")
+    if view.wanted is None:
+        return _empty(ax, "no track was given")
+    times, pelvis = view.played.times, view.played.pelvis
+    error, smooth = root.pelvis_error(pelvis, view.wanted), root.root_error(pelvis, view.wanted, view.fps)
+    ax.plot(times, 100 * error, color="#bbbbbb", lw=1, label="pelvis, as it sways")
+    ax.plot(times, 100 * smooth, color=LEFT, lw=1.4, label="root (1.5 s window)")
+    ax.axhline(1.5, color="#999999", lw=0.8, ls="--", label="target for 95 % of root")
+    ax.set_ylim(bottom=0.0)
+    return _legend(ax, 3)
+
+
+def _draw_feet(ax, view: View) -> None:
+    times, toes = view.played.times, view.played.feet[:, :, 1, 2] - floor_height(view.played.motion)
+    for side, (name, colour) in enumerate(_SIDES.items()):
+        ax.plot(times, 100 * toes[:, side], color=colour, lw=1, label=f"{name} toe")
+        stands = view.played.contacts[:, side]
+        _bars(ax, view, stands, -5.0 - 4.0 * side, colour, 3.0)
+    ax.set_ylim(bottom=-11.0)
+    ax.set_title("toe heights; bars: foot in contact", loc="left", fontsize=9.5)
+    ax.set_ylabel("cm")
+    _legend(ax, 2)
+
+
+def _draw_speed(ax, view: View) -> None:
+    times = view.played.times
+    if view.wanted is not None:
+        ax.plot(times, root.travel_speed(view.wanted, view.fps), color="#8fb8de", lw=3, label="asked by the track")
+    ax.plot(times, view.speed, color=MIDDLE, lw=1, label="played")
+    if view.reference is not None and np.isfinite(view.reference.fastest):
+        ax.axhline(1.15 * view.reference.fastest, color=RIGHT, lw=0.8, ls="--", label="fastest recording x 1.15")
+    ax.set_ylim(bottom=0.0)
+    ax.set_title("speed", loc="left", fontsize=9.5)
+    ax.set_ylabel("m/s")
+    _legend(ax, 3)
+
+
+def _draw_smoothness(ax, view: View) -> None:
+    played = view.played
+    features = realism.pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
+    ax.plot(played.times[1:], realism.smoothness(features), color=MIDDLE, lw=1, label="pose distance")
+    for number, seam in enumerate(view.seams):
+        label = "seam" if number == 0 else None
+        ax.axvline(played.times[seam], color=BALL, lw=0.8, alpha=0.7, zorder=0, label=label)
+    ax.set_ylim(bottom=0.0)
+    ax.set_title("smoothness: distance of each pose from the one before (Faustino, App. D)", loc="left", fontsize=9.5)
+    ax.set_ylabel("m")
+    _legend(ax, 2)
+
+
+def _mark_moments(ax, view: View) -> None:
+    for moment in view.moments:
+        ax.axvline(moment.asked.time, color=RIGHT, lw=0.9, ls=":", zorder=0)
+
+
+def _clip_bar(ax, view: View, low: int, high: int, names: dict[int, tuple[int, str]]) -> None:
+    number, colour = names.get(int(view.played.clip[low]), ("", "#dddddd"))
+    start, width = view.played.times[low], (high - low) / view.fps
+    ax.broken_barh([(start, width)], (0.0, 1.0), facecolors=colour, edgecolors="white", linewidth=0.8)
+    label = f"{number}'" if view.played.mirrored[low] else f"{number}"
+    if width / (view.count / view.fps) > 0.008 * len(label):
+        ax.text(start + width / 2, 0.5, label, ha="center", va="center", fontsize=8)
+
+
+def _bars(ax, view: View, flags: np.ndarray, bottom: float, colour: str, height: float = 0.36) -> None:
+    """A bar wherever flags (T,) hold."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    spans = [(view.played.start_time + a / view.fps, (b - a) / view.fps) for a, b in zip(edges[::2], edges[1::2])]
+    ax.broken_barh(spans, (bottom, height), facecolors=colour, linewidth=0)
+
+
+def _figure(ax, view: View, frame: int, turn: np.ndarray, offset: float) -> None:
+    """One pose and the ball, the pelvis at `offset`."""
+    skeleton, places = view.played.motion.skeleton, view.played.positions[frame]
+    origin = places[view.played.body.hips] * [1.0, 1.0, 0.0]
+    seen = rotate(turn, places - origin)
+    for joint, parent in enumerate(skeleton.parents):
+        if parent > 0 or (parent == 0 and view.played.body.hips == 0):
+            colour = _SIDES.get(side_and_part(skeleton.names[joint])[0], MIDDLE)
+            ax.plot(offset + seen[[parent, joint], 0], seen[[parent, joint], 2], color=colour, lw=1.6, zorder=2)
+    ball = _ball(view, frame)
+    if ball is not None:
+        centre = rotate(turn, ball - origin)
+        if abs(centre[0]) < 0.55 * _SPACING and abs(centre[1]) < 1.5 and centre[2] < 2.5:
+            from matplotlib.patches import Circle
+
+            place = (offset + centre[0], centre[2])
+            ax.add_patch(Circle(place, BALL_RADIUS, facecolor=BALL, edgecolor="black", lw=0.6, zorder=3))
+
+
+def _ball(view: View, frame: int) -> np.ndarray | None:
+    ball = view.played.ball
+    if ball is None:
+        return None
+    place = ball.positions[int(np.argmin(np.abs(ball.times - view.played.times[frame])))]
+    return place if np.isfinite(place).all() else None
+
+
+def _canvas(rows: int, heights: Sequence[float]):
+    """A figure without a window, and its axes from above."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, sum(heights) + 0.1 * rows), dpi=DPI, layout="constrained")
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})[:, 0]
+    for ax in axes:
+        ax.grid(color="#e6e6e6", lw=0.6)
+        ax.set_axisbelow(True)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(labelsize=8)
+        ax.yaxis.label.set_fontsize(8)
+    return figure, axes
+
+
+def _time_axis(ax, view: View) -> None:
+    ax.set_xlim(view.played.times[0], max(view.played.times[-1], view.played.times[0] + 1.0 / view.fps))
+    ax.set_xlabel("seconds on the track's clock", fontsize=8)
+
+
+def _legend(ax, columns: int) -> None:
+    """Above the axes, at the right, beside the title: never on the curves."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize=8, frameon=False, borderpad=0.1)
+
+
+def _empty(ax, text: str) -> None:
+    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, fontsize=9, color="#777777")
+
+
+def _png(figure) -> bytes:
+    out = io.BytesIO()
+    figure.savefig(out, format="png", metadata={"Software": None})
+    return out.getvalue()

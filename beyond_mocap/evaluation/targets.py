@@ -1,0 +1,89 @@
+"""What each figure of the report aims for (`../shared/metrics.md`, far column): a fixed limit, or what the recordings
+score."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Target:
+    """A figure lies between `least` and `most`; or is at most the figure `own` (dotted name) plus `beyond`."""
+
+    least: float | None = None
+    most: float | None = None
+    own: str | None = None
+    beyond: float = 0.0
+
+    def bounds(self, flat: Mapping[str, object]) -> tuple[float | None, float | None]:
+        """Least and most for one report, flat as by `report.flat`; None where there is no such bound or it is
+        unknown."""
+        if self.own is None:
+            return self.least, self.most
+        score = flat.get(self.own)
+        return self.least, None if score is None else float(score) + self.beyond
+
+    def text(self, flat: Mapping[str, object]) -> str:
+        """The target in words, such as "≤ 0.005"."""
+        least, most = self.bounds(flat)
+        if least is not None and most is not None:
+            return f"± {most:.3g}" if least == -most else f"{least:g} .. {most:g}"
+        if most is not None:
+            beyond = f" + {self.beyond:g}" if self.beyond else ""
+            return f"≤ {most:.4g}" + (f" (recordings{beyond})" if self.own else "")
+        return "" if least is None else f"≥ {least:g}"
+
+    def met(self, value: float, flat: Mapping[str, object]) -> bool | None:
+        """Whether a value meets it; None where the bound is not known."""
+        least, most = self.bounds(flat)
+        if least is None and most is None:
+            return None
+        return (least is None or value >= least - _SLACK) and (most is None or value <= most + _SLACK)
+
+
+TARGETS = {
+    "root_error_m.mean": Target(most=0.005),
+    "root_error_m.p95": Target(most=0.015),
+    "pelvis_error_m.mean": Target(own="pelvis_error_m.own", beyond=0.015),
+    "pelvis_surge_ratio": Target(most=1.3),
+    "skate.contact_cm_s": Target(own="skate.source_contact_cm_s"),
+    "skate.stance_mm_median": Target(most=5.0),
+    "skate.stances_over_21mm": Target(own="skate.source_stances_over_21mm"),
+    "skate.gmd_ratio": Target(own="skate.source_gmd_ratio"),
+    "ground_mm.min": Target(least=-5.0),
+    "ground_mm.support_max": Target(most=5.0),
+    "foot_correction_m.p95": Target(most=0.10),
+    "ik_miss_share": Target(most=0.0),
+    "pelvis_drop_m": Target(most=0.04),
+    "bone_change_m": Target(most=1e-6),
+    "seam_jerk_ratio.share_above_real": Target(most=0.10),
+    "seam_jerk_ratio.max": Target(most=1.3),
+    "seam_jerk_ratio.rest_max": Target(most=1.3),
+    "warp_rate.min": Target(least=0.85),
+    "warp_rate.max": Target(most=1.15),
+    "loop_share": Target(most=0.05),
+    "pose_realism": Target(most=0.10),
+    "annotation_similarity.all": Target(most=-0.9),
+    "annotation_similarity.keys": Target(most=-1.0),
+}
+"""Dotted name of a figure -> its target. Key moments' are in `KEY_TARGETS`."""
+
+KEY_TARGETS = {
+    "position_error_m": Target(most=0.05),
+    "contact_gap_m": Target(most=0.005),
+    "ball_shift_m": Target(most=0.3),
+}
+
+
+def target_of(name: str, fps: float) -> Target | None:
+    """The target of a figure by its dotted name ("keys 2.contact_gap_m"), None where it has none; fps: the output's
+    rate."""
+    key = re.fullmatch(r"keys \d+\.(\w+)", name)
+    if key and key[1] == "time_error_s":
+        half = round(0.5 / fps, 6)
+        return Target(least=-half, most=half)
+    return KEY_TARGETS.get(key[1]) if key else TARGETS.get(name)
