@@ -29,13 +29,14 @@ from .polish.foot_plant import Planted, plant
 from .polish.joining import chained_facing, chained_root, torso_corrections
 from .polish.on_track import facing, pulled_to_track, root_with_sway
 from .polish.smoothing import spread_rotations, spread_values
+from .polish.strike import Struck, Touch, strike
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, fetch
 from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
-from .synthesis.wanted import Wanted, wanted
+from .synthesis.wanted import Wanted, needed, wanted
 from .take import BallPath, KeyResult, Take
 
 Progress = Callable[[float, str], None]
@@ -85,6 +86,9 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Ta
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
     planted = _polished(library, plan, track, footage, found, index)
+    if plan.method == "path":
+        struck = _met(library, plan, order, track, edit, footage, planted)
+        planted, track = replace(planted, root=struck.root, rotations=struck.rotations), replace(track, ball=struck.ball)
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     clock.append(time.perf_counter())
     seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
@@ -132,6 +136,24 @@ def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, i
     speed = np.abs(np.gradient(travelled)) * plan.fps if len(travelled) > 1 else np.zeros(1)
     angle = facing(direction, speed, footage.velocity, footage.turn)
     return angle, root_with_sway(place, footage.sway, angle)
+
+
+def _met(library, plan: Plan, order: Wanted, track: SampledTrack, edit: EditList, footage: Footage, planted) -> Struck:
+    """The motion and the ball with the striking part of the body on the ball at every key moment that is played."""
+    touches = []
+    for number in range(len(order.keys)):
+        placed = next((p for p in edit.keys if p.wanted == number), None)
+        if placed is not None:
+            result = _key_result(library, plan, order, edit, footage, number)
+            key = next(k for k in library.keys if (k.clip, k.frame) == (placed.clip, placed.clip_frame))
+            entry, leave = np.multiply(needed(library, key), plan.fps / library.fps)
+            touches.append(Touch(result.frame, result.words, float(entry), float(leave)))
+    known = plan.track.ball_height_known
+    height = np.interp(track.times, plan.track.times, known.astype(float)) > 0.5
+    return strike(
+        library.skeleton, planted.root, planted.rotations, footage.standing.all(axis=2), track.ball, touches, plan.fps,
+        measured=track.ball_measured, height_known=height,
+    )
 
 
 def along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -221,7 +243,8 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
             at = float(np.interp(placed.clip_frame, footage.clip_frame[inside], inside))
         shown = placed.clip_frame
     source = library.clips[clip]
-    return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, key.used_instead)
+    instead = words if key.used_instead and not key.choices else key.used_instead
+    return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
 
 
 def _made_seconds(library: Library, plan: Plan, footage: Footage) -> list[str]:

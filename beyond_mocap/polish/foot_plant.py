@@ -78,7 +78,8 @@ def _goal(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray,
 
 def _firmness(stands: np.ndarray) -> np.ndarray:
     """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, when it is still arriving, else 0."""
-    inner = stands & np.roll(stands, 1, axis=0) & np.roll(stands, -1, axis=0)
+    padded = np.pad(stands, ((1, 1), (0, 0)), mode="edge")
+    inner = stands & padded[:-2] & padded[2:]
     return np.where(inner, 1.0, np.where(stands, 0.5, 0.0))
 
 
@@ -132,8 +133,8 @@ def _add_differences(band: np.ndarray, stencil: np.ndarray, weight: np.ndarray) 
 def _lift(heel: np.ndarray, toe: np.ndarray, weight: np.ndarray, scale: float) -> np.ndarray:
     """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes on the ground, and keeps
     both above it at all times."""
-    standing = weight.max(axis=1) > 0
-    rest = np.percentile(heel[standing], 15) if np.any(standing) else 0.0
+    flat = weight.min(axis=1) > 0
+    rest = float(np.median((heel - toe)[flat])) if np.any(flat) else float(np.percentile(heel, 5))
     low = np.stack([heel - max(rest, 0.0), toe], axis=1)
     lift = _settle(-(low * weight).sum(axis=1), weight.sum(axis=1), scale)
     for _ in range(3):

@@ -71,7 +71,7 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     choices = nearest_serving(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].words
     used = tuple(sorted(choices[0].words)) if choices else gait_words
-    warnings.append(f"{text}; used instead: {' '.join(used)}")
+    warnings.append(f"{text}; used instead: {' '.join(used) if choices else 'locomotion goes on there'}")
     return WantedKey(moment, frame, choices, used)
 
 
