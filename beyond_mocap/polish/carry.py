@@ -54,27 +54,52 @@ def arm(limb: Limb) -> tuple[int, int, int]:
     return limb.upper_arm, limb.lower_arm, limb.hand
 
 
-def limb_carried(
-    body: Body, root: np.ndarray, rotations: np.ndarray, chain, shift: np.ndarray, soft: float = 0.01
-) -> np.ndarray:
-    """`rotations` (W, J, 4) with the limb's joints turned so that its end lies `shift` (W, 3) m from where `body` has
-    it.
+@dataclass(frozen=True, eq=False)
+class Resting:
+    """A limb that reaches for where its end is anyway, which a nearly straight limb misses a little: `chain` and `soft` as
+    for `reach.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
 
-    root (W, 3) m: where the body's root is now. chain, soft: as for `reach.two_bone`. The end joint keeps its world
-    rotation.
+    chain: tuple[int, int, int]
+    soft: float
+    world: dict[int, np.ndarray]
+
+    @classmethod
+    def of(cls, body: Body, chain: tuple[int, int, int], soft: float = 0.01) -> "Resting":
+        """The limb of a body."""
+        end = body.places[:, chain[2]]
+        still = two_bone(body.skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
+        return cls(chain, soft, _limb_world(body, still, chain))
+
+
+def limb_carried(
+    body: Body, limb: Resting, shift: np.ndarray, root: np.ndarray | None = None, rotations: np.ndarray | None = None
+) -> np.ndarray:
+    """Local rotations (W, J, 4) with the limb's joints turned so that its end lies `shift` (W, 3) m from where `body` has
+    it; the end joint keeps its world rotation.
+
+    root (W, 3) m: where the body's root is now, if elsewhere. rotations (W, J, 4): what the other joints have, if else.
     """
-    skeleton = body.skeleton
-    end = body.places[:, chain[2]]
-    still = two_bone(skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
-    moved = two_bone(skeleton, root, body.rotations, chain, end + shift, soft=soft).rotations
-    before, after = (pose_kinematics(skeleton, root, turned)[1] for turned in (still, moved))
-    world, out = body.world.copy(), rotations.copy()
-    for joint in _path(skeleton, chain[0], chain[2]):
-        turn = quaternion.multiply(after[:, joint], quaternion.inverse(before[:, joint]))
-        world[:, joint] = quaternion.multiply(turn, body.world[:, joint])
-        local = quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), world[:, joint])
+    skeleton, chain = body.skeleton, limb.chain
+    target = body.places[:, chain[2]] + shift
+    moved = two_bone(skeleton, body.root if root is None else root, body.rotations, chain, target, soft=limb.soft)
+    after = _limb_world(body, moved.rotations, chain)
+    out = (body.rotations if rotations is None else rotations).copy()
+    above = body.world[:, skeleton.parents[chain[0]]]
+    for joint, turned in after.items():
+        change = quaternion.multiply(turned, quaternion.inverse(limb.world[joint]))
+        world = quaternion.multiply(change, body.world[:, joint])
+        local = quaternion.multiply(quaternion.inverse(above), world)
         out[:, joint] = _same_sign(local, body.rotations[:, joint])
+        above = world
     return out
+
+
+def _limb_world(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
+    """World rotations (W, 4) of a limb's joints with other local ones, what is above the limb being as in `body`."""
+    world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
+    for joint in _path(body.skeleton, chain[0], chain[2]):
+        above = world[joint] = quaternion.multiply(above, rotations[:, joint])
+    return world
 
 
 def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.striking import Surface, ball_gap, contact_gap, surfaces
 from ..motion.track import BALL_RADIUS
-from .carry import Body, arm, leg, limb_carried, spine_bent
+from .carry import Body, Resting, arm, leg, limb_carried, spine_bent
 from .meeting import Room, best_meeting, eased, held_meeting, lofted, meeting, shifted
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
@@ -42,7 +42,7 @@ _SOLE = 0.02  # metres of the lowest foot joint above the ground
 _IN_THE_AIR = 0.2
 _STOPPING = {"receive", "trap", "catch", "catchb"}
 _HIGH = {"high", "volley", "bicycle"}
-_ROUNDS = 4
+_ROUNDS, _CLOSE = 4, 5e-4
 
 
 @dataclass(frozen=True)
@@ -272,17 +272,18 @@ def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
     What the parts lack and what the body makes of it are worked out in turns, since a nearly straight limb gives way
     softly and a spine bends on an arc.
     """
-    shifts, struck = [np.zeros(3) for _ in scene.parts], body
-    for _ in range(_ROUNDS):
+    shifts, struck, limbs = [np.zeros(3) for _ in scene.parts], body, []
+    for turn in range(_ROUNDS):
         _, needs = _ball_and_needs(scene, struck, scene.moment.frame)
-        if np.linalg.norm(needs) < 1e-4:
+        if np.linalg.norm(needs) < _CLOSE:
             break
+        limbs = limbs if turn else _carriers(body, scene.parts)
         shifts = [_bounded(body, part, scene.at, s + need) for part, s, need in zip(scene.parts, shifts, needs)]
-        struck = _moved(scene, body, shifts)
+        struck = _moved(scene, body, limbs, shifts)
     if np.linalg.norm(_ball_and_needs(scene, struck, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
         return body, 0.0
     before, after = (np.array([np.mean(b.line(p, scene.at), axis=0) for p in scene.parts]) for b in (body, struck))
-    return struck, float(np.linalg.norm(after - before, axis=1).max())
+    return _other_foot_kept(body, struck, scene.parts[0]), float(np.linalg.norm(after - before, axis=1).max())
 
 
 def _ball_and_needs(scene: _Scene, body: Body, frame: int) -> tuple[np.ndarray, np.ndarray]:
@@ -330,34 +331,38 @@ def _drop(body: Body, limb: Limb, at: int, ankle: np.ndarray) -> float:
     return float(np.clip(hip[2] - ankle[2] - np.sqrt(max(length**2 - level**2, 0.0)), 0.0, MOST_DROP))
 
 
-def _moved(scene: _Scene, body: Body, shifts: Sequence[np.ndarray]) -> Body:
-    """The body with each part moved by its shift (3,) m, blended by its share."""
-    part = scene.parts[0]
-    if part.part == "foot":
-        return _leg_moved(scene, body, shifts[0])
-    rotations = body.rotations
-    if part.part == "hand":
-        for hand, shift, share in zip(scene.parts, shifts, scene.shares):
-            rotations = limb_carried(body, body.root, rotations, arm(_limb(body, hand)), share[:, None] * shift)
-    else:
+def _carriers(body: Body, parts: Sequence[Surface]) -> list[Resting]:
+    """The limb of every foot or hand."""
+    limbs = [(_limb(body, part), part.part) for part in parts if part.part in ("foot", "hand")]
+    return [Resting.of(body, leg(limb) if part == "foot" else arm(limb)) for limb, part in limbs]
+
+
+def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: Sequence[np.ndarray]) -> Body:
+    """The body with each part moved by its shift (3,) m, blended by its share. A foot does not go through the ground, and
+    the pelvis sinks where its leg is too short."""
+    part, root, rotations = scene.parts[0], body.root, body.rotations
+    if not limbs:
         rotations = spine_bent(body, part, scene.at, shifts[0], scene.shares[0])
-    return Body.posed(body.skeleton, body.root, rotations)
-
-
-def _leg_moved(scene: _Scene, body: Body, shift: np.ndarray) -> Body:
-    """A foot moved, not through the ground; the pelvis sinks as it must and the other foot stays where it is."""
-    part, share, human = scene.parts[0], scene.shares[0], identify(body.skeleton)
-    limb = _limb(body, part)
-    other = human.right if limb is human.left else human.left
-    start, end = body.line(part, slice(None))
-    drop = _drop(body, limb, scene.at, start[scene.at] + shift)
-    root = body.root - share[:, None] * [0.0, 0.0, drop]
-    moves = share[:, None] * shift
-    moves[:, 2] = np.maximum(moves[:, 2], np.minimum(_SOLE - np.minimum(start[:, 2], end[:, 2]), 0.0))
-    rotations = limb_carried(body, root, body.rotations, leg(limb), moves)
-    if drop > 0.0:
-        rotations = limb_carried(body, root, rotations, leg(other), np.zeros_like(moves), soft=1e-3)
+    for limb, shift, share in zip(limbs, shifts, scene.shares):
+        moves = share[:, None] * shift
+        if part.part == "foot":
+            start, end = body.line(part, slice(None))
+            lowest = np.minimum(start[:, 2], end[:, 2])
+            moves[:, 2] = np.maximum(moves[:, 2], np.minimum(_SOLE - lowest, 0.0))
+            drop = _drop(body, _limb(body, part), scene.at, start[scene.at] + shift)
+            root = root - share[:, None] * [0.0, 0.0, drop]
+        rotations = limb_carried(body, limb, moves, root, rotations)
     return Body.posed(body.skeleton, root, rotations)
+
+
+def _other_foot_kept(body: Body, struck: Body, part: Surface) -> Body:
+    """Where the pelvis has sunk, the foot that does not strike stays where it is."""
+    if np.array_equal(struck.root, body.root):
+        return struck
+    human = identify(body.skeleton)
+    limb = Resting.of(body, leg(human.right if part.side == "left" else human.left), soft=1e-3)
+    rotations = limb_carried(body, limb, np.zeros_like(body.root), struck.root, struck.rotations)
+    return Body.posed(body.skeleton, struck.root, rotations)
 
 
 def _told(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
