@@ -56,8 +56,8 @@ def arm(limb: Limb) -> tuple[int, int, int]:
 
 @dataclass(frozen=True, eq=False)
 class Resting:
-    """A limb that reaches for where its end is anyway, which a nearly straight limb misses a little: `chain` and `soft` as
-    for `reach.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
+    """A limb that reaches for where its end is anyway, which a nearly straight limb misses a little: `chain` and `soft`
+    as for `reach.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
 
     chain: tuple[int, int, int]
     soft: float
@@ -74,8 +74,8 @@ class Resting:
 def limb_carried(
     body: Body, limb: Resting, shift: np.ndarray, root: np.ndarray | None = None, rotations: np.ndarray | None = None
 ) -> np.ndarray:
-    """Local rotations (W, J, 4) with the limb's joints turned so that its end lies `shift` (W, 3) m from where `body` has
-    it; the end joint keeps its world rotation.
+    """Local rotations (W, J, 4) with the limb's joints turned so that its end lies `shift` (W, 3) m from where `body`
+    has it; the end joint keeps its world rotation.
 
     root (W, 3) m: where the body's root is now, if elsewhere. rotations (W, J, 4): what the other joints have, if else.
     """

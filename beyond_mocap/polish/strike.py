@@ -338,8 +338,8 @@ def _carriers(body: Body, parts: Sequence[Surface]) -> list[Resting]:
 
 
 def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: Sequence[np.ndarray]) -> Body:
-    """The body with each part moved by its shift (3,) m, blended by its share. A foot does not go through the ground, and
-    the pelvis sinks where its leg is too short."""
+    """The body with each part moved by its shift (3,) m, blended by its share. A foot does not go through the ground,
+    and the pelvis sinks where its leg is too short."""
     part, root, rotations = scene.parts[0], body.root, body.rotations
     if not limbs:
         rotations = spine_bent(body, part, scene.at, shifts[0], scene.shares[0])
