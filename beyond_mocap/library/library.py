@@ -21,7 +21,7 @@ from ..motion import contacts as foot_contacts
 from ..motion.mirror import mirror
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
-from . import cache
+from . import cache, one_skeleton, repair
 from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
 from .features import Frames, describe, joined
 from .keys import Key, keys_of
@@ -29,7 +29,6 @@ from .made import MADE_FOLDER, made_clips
 from .scan import Annotations, find_clips
 
 FPS = 30.0
-SAME_BONES = 5e-3
 Progress = Callable[[float, str], None]
 
 
@@ -144,7 +143,8 @@ def build(
     rebuild: ignore the cache. cache_dir: where to keep it (default: the folder itself, else the user's cache folder).
     skeleton: a BVH file whose skeleton it is (default: the one with most frames, ties by name). unit: metres per file
     unit (default: guessed per file). seed: of the clustering.
-    Raises InputError for unreadable files, a folder without clips, or clips of more than one skeleton; Cancelled.
+    Clips of other skeletons are brought to this one and all are mended (`one_skeleton`, `repair`); notes say how.
+    Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled.
     """
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
@@ -206,30 +206,36 @@ def _example(library: Library) -> Motion:
 
 
 def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled) -> tuple[Clip, ...]:
-    """Reads all recordings, checks that they share one skeleton, sets each on the floor, and adds the twins."""
+    """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
     read = []
     for number, path in enumerate(paths):
         _check(cancelled)
-        report(0.5 * number / len(paths), f"Reading {path.name}")
+        report(0.4 * number / len(paths), f"Reading {path.name}")
         read.append(bvh.read(path, unit))
-    skeleton = _choose_skeleton(paths, read, chosen, unit)
     notes += _unit_notes(read)
-    clips = []
-    for number, (path, source) in enumerate(zip(paths, read)):
+    unpopped = [repair.without_pops(source.motion) for source in read]
+    carried = one_skeleton.bring(paths, [motion for motion, _ in unpopped], _chosen(chosen, unit), notes)
+    clips, mended = [], []
+    for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
         _check(cancelled)
-        report(0.5 + 0.2 * number / len(paths), f"Mirroring {path.name}")
-        motion = replace(source.motion, skeleton=skeleton)
-        floor = foot_contacts.floor_height(motion)
-        motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, floor])
+        report(0.4 + 0.3 * number / len(paths), f"Mending and mirroring {path.name}")
+        mended.append(repair.grounded(motion, standing, moved))
         rows = _rows(path, annotations.of(path, motion.fps), len(motion))
-        clip = Clip(path.relative_to(folder).as_posix(), False, motion, rows, foot_contacts.points(motion))
+        name = path.relative_to(folder).as_posix()
+        clip = Clip(name, False, mended[-1].motion, rows, mended[-1].standing)
         clips += [clip, clip.twin()]
+    notes += repair.told([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
     if not any(clip.annotations for clip in clips):
         raise InputError(
             folder, "no annotation for any clip", "NAME.txt beside NAME.bvh or an annotations.csv",
             "write which frames are standing, walking, jogging, running, kick ...",
         )
     return tuple(clips)
+
+
+def _chosen(path: Path | None, unit: float | None) -> Motion | None:
+    """The recording whose skeleton the user chose."""
+    return bvh.read(path, unit).motion if path is not None else None
 
 
 def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
@@ -240,25 +246,6 @@ def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[Cli
         if row.key is not None and row.key >= count:
             raise InputError(path, f"a key moment at frame {row.key:g}", f"frames 0 to {count - 1}", "mend the row")
     return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
-
-
-def _choose_skeleton(paths, read, chosen: Path | None, unit) -> Skeleton:
-    """The library's skeleton; InputError naming two files where the clips do not share one."""
-    if chosen is not None:
-        skeleton, name = bvh.read(chosen, unit).motion.skeleton, chosen
-    else:
-        frames: Counter[str] = Counter()
-        for source in read:
-            frames[source.motion.skeleton.fingerprint] += len(source.motion)
-        best = max(range(len(read)), key=lambda i: (frames[read[i].motion.skeleton.fingerprint], -i))
-        skeleton, name = read[best].motion.skeleton, paths[best]
-    for path, source in zip(paths, read):
-        if not source.motion.skeleton.same_bones(skeleton, SAME_BONES):
-            raise InputError(
-                path, f"another skeleton ({len(source.motion.skeleton)} joints) than {name} ({len(skeleton)} joints)",
-                "one skeleton in all clips of a library", "keep clips of one skeleton in the folder",
-            )
-    return skeleton
 
 
 def _unit_notes(read) -> list[str]:

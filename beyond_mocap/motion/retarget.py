@@ -14,6 +14,7 @@ standing still. Joints that a skeleton lacks go with the segment that carries th
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from . import limb, quaternion
 from .anatomy import Anatomy, head_chain, spine_shares, study
 from .bone_map import Pairs, pair
 from .humanoid import Limb
-from .motion import Motion, forward_kinematics, pose_kinematics
+from .motion import Motion, forward_kinematics
 from .skeleton import Skeleton
 
 _SOFT = 0.01
@@ -52,13 +53,36 @@ def retarget(
     Root positions are metres, world, Z up; heights are kept over the same floor. The skeleton itself given as target
     gives the motion back. Raises InputError where either skeleton has no legs or the map names an unknown joint.
     """
-    pairs = pair(motion, skeleton, bone_map, example)
-    source = study(motion.skeleton, pairs.source, motion, standing)
-    same = _same_rig(motion.skeleton, skeleton) if example is None else motion.skeleton.same_bones(skeleton)
-    if same:  # its own recording says best how the rig is used: this very skeleton gets this very motion
-        example = Motion(skeleton, motion.root_positions, motion.rotations, motion.fps)
-    target = study(skeleton, pairs.target, example, standing if same else None)
-    return _Transfer(motion, source, target, pairs).motion()
+    return Retargeter(motion, skeleton, bone_map, example=example, standing=standing).carry(motion)
+
+
+class Retargeter:
+    """Carries recordings of one rig to another: both are studied once."""
+
+    def __init__(
+        self,
+        sample: Motion,
+        skeleton: Skeleton,
+        bone_map: dict[str, str] | str | Path | None = None,
+        *,
+        example: Motion | None = None,
+        standing: np.ndarray | None = None,
+        example_standing: np.ndarray | None = None,
+    ):
+        """sample: frames of the recordings (their order does not matter); the others as in `retarget`.
+
+        standing, example_standing (T, 2) bool: feet on the ground in `sample` and in `example`.
+        """
+        self.pairs = pair(sample, skeleton, bone_map, example)
+        self.source = study(sample.skeleton, self.pairs.source, sample, standing)
+        same = _same_rig(sample.skeleton, skeleton) if example is None else sample.skeleton.same_bones(skeleton)
+        if same:  # its own recording says best how the rig is used: this very skeleton gets this very motion
+            example, example_standing = replace(sample, skeleton=skeleton), standing
+        self.target = study(skeleton, self.pairs.target, example, example_standing)
+
+    def carry(self, motion: Motion) -> Motion:
+        """`motion`, a recording of the sample's skeleton, on the other skeleton."""
+        return _Transfer(motion, self.source, self.target, self.pairs).motion()
 
 
 def _same_rig(a: Skeleton, b: Skeleton) -> bool:
@@ -245,7 +269,12 @@ def _between(shares: list[float], turns: list[np.ndarray], share: float) -> np.n
 
 def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
     """Positions (T, J, 3) for world rotations (T, J, 4), the root at the origin."""
-    return pose_kinematics(skeleton, np.zeros((len(world), 3)), _to_local(skeleton, world))[0]
+    parents = list(skeleton.parents[1:])
+    bones = quaternion.rotate(world[:, parents], skeleton.offsets[1:])
+    places = np.zeros((len(world), len(skeleton), 3))
+    for joint, parent in enumerate(parents, 1):
+        places[:, joint] = places[:, parent] + bones[:, joint - 1]
+    return places
 
 
 def _to_local(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ ROOMS = {
     "plan": ["motion", "annotation"],
     "take": ["motion", "annotation"],
     "files": ["motion", "take"],
-    "library": ["motion", "annotation", "files"],
+    "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "polish": ["motion"],
     "ball": ["motion", "library", "polish"],

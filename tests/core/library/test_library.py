@@ -130,17 +130,35 @@ def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
     )
 
 
-def test_two_skeletons_are_told_with_both_files(tmp_path, clip_file):
+def test_clips_of_different_skeletons_are_retargeted(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
     motion = gait(1.4, 1.0)
     clip_file(tmp_path / "child.bvh", 1.4, 1.0)
     small = Motion(scaled(motion.skeleton, 0.7), motion.root_positions * 0.7, motion.rotations, 30.0)
     bvh.write(tmp_path / "child.bvh", small)
-    with pytest.raises(InputError, match=r"child\.bvh: another skeleton .*walk\.bvh") as told:
-        build(tmp_path, unit=0.01)
+    library = build(tmp_path, unit=0.01)
+    assert all(clip.motion.skeleton is library.skeleton for clip in library.clips)
+    bvh.write(tmp_path / "child.bvh.full", motion)
+    full = bvh.read(tmp_path / "child.bvh.full", 0.01).motion
+    assert np.allclose(library.skeleton.offsets, full.skeleton.offsets, atol=1e-4)
+    child = clip_of(library, "child.bvh")
+    places, wanted = forward_kinematics(child.motion)[0], forward_kinematics(full)[0]
+    level = np.mean(places[..., 2] - wanted[..., 2])  # each stands on its own floor
+    off = np.linalg.norm(places - wanted - [0.0, 0.0, level], axis=-1)
+    assert off.mean() < 0.03 and off.max() < 0.1  # its second of walking shows another mean posture than the walk does
+    assert any("1 clips of 1 other skeletons brought to the one of" in note for note in library.notes)
+    small_too = build(tmp_path, unit=0.01, skeleton=tmp_path / "child.bvh")
+    assert np.allclose(small_too.skeleton.offsets, 0.7 * full.skeleton.offsets, atol=1e-4)
+    assert [clip.path for clip in small_too.clips] == [clip.path for clip in library.clips]
+
+
+def test_a_clip_without_legs_is_told_with_its_file(tmp_path, clip_file):
+    clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
+    stick = Skeleton(("root", "top"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    bvh.write(tmp_path / "stick.bvh", Motion(stick, np.zeros((4, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (4, 2, 1)), 30.0))
+    with pytest.raises(InputError, match=r"stick\.bvh.*no joint found for left upper_leg") as told:
+        build(tmp_path)
     one_line(told)
-    with pytest.raises(InputError, match=r"walk\.bvh: another skeleton .*child\.bvh"):
-        build(tmp_path, unit=0.01, skeleton=tmp_path / "child.bvh")
 
 
 def test_bones_that_differ_by_rounding_are_one_skeleton(tmp_path, clip_file):

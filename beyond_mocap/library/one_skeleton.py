@@ -1,0 +1,107 @@
+"""Clips of many bodies become clips of one: the skeleton that most frames have, or the one that the user names.
+
+Every rig is studied once, from frames of all its clips, so that one actor's clips share one neutral posture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion import contacts
+from ..motion.humanoid import identify
+from ..motion.motion import Motion
+from ..motion.retarget import Retargeter
+from ..motion.skeleton import Skeleton
+
+SAME_BONES = 5e-3
+_SAMPLE = 400
+
+
+def bring(
+    paths: Sequence[Path], motions: Sequence[Motion], chosen: Motion | None, notes: list[str]
+) -> Iterator[tuple[Motion, np.ndarray, bool]]:
+    """Each clip on the library's skeleton, its standing points (T, 2, 2) bool, and whether it came from another body.
+
+    motions: as read, in the order of `paths`; chosen: a recording whose skeleton is to be the library's (default: the
+    skeleton with most frames, the first path's among equals). `notes` gets one line about what was brought over.
+    Heels and toes stand where the recording's own do; where only the new body has toes they are looked for on it.
+    Raises InputError, naming the file, for a clip whose legs cannot be found.
+    """
+    standing = [_standing(path, motion) for path, motion in zip(paths, motions)]
+    groups = _groups(motions)
+    skeleton = chosen.skeleton if chosen is not None else _commonest(motions, groups)
+    home = [i for i, motion in enumerate(motions) if motion.skeleton.same_bones(skeleton, SAME_BONES)]
+    example, feet = _sample([motions[i] for i in home], [standing[i] for i in home]) if home else (chosen, None)
+    rigs = {}
+    for group in groups:
+        if group[0] not in home:
+            sample, down = _sample([motions[i] for i in group], [standing[i] for i in group])
+            known = {"example": example, "standing": down, "example_standing": feet}
+            rig = _named(paths[group[0]], lambda: Retargeter(sample, skeleton, **known))
+            rigs.update(dict.fromkeys(group, rig))
+    if rigs:
+        others = sum(group[0] in rigs for group in groups)
+        notes.append(f"{len(rigs)} clips of {others} other skeletons brought to the one of {len(skeleton)} joints")
+    return _brought(motions, standing, skeleton, rigs)
+
+
+def _brought(motions, standing, skeleton: Skeleton, rigs) -> Iterator[tuple[Motion, np.ndarray, bool]]:
+    toes = _has_toes(skeleton)
+    for number, (motion, points) in enumerate(zip(motions, standing)):
+        if number not in rigs:
+            yield replace(motion, skeleton=skeleton), points, False
+            continue
+        there = rigs[number].carry(motion)
+        found = contacts.points(there) if toes and not _has_toes(motion.skeleton) else points
+        yield there, found, True
+
+
+def _standing(path: Path, motion: Motion) -> np.ndarray:
+    return _named(path, lambda: contacts.points(motion))
+
+
+def _named(path: Path, work):
+    """The result of `work`; what it finds wrong with a skeleton is told with the file's name."""
+    try:
+        return work()
+    except InputError as error:
+        raise InputError(path, str(error)) from None
+
+
+def _has_toes(skeleton: Skeleton) -> bool:
+    body = identify(skeleton)
+    return body.left.toe is not None and body.right.toe is not None
+
+
+def _groups(motions: Sequence[Motion]) -> list[list[int]]:
+    """Clips by skeleton, in the order of their first."""
+    groups: dict[str, list[int]] = {}
+    for number, motion in enumerate(motions):
+        groups.setdefault(motion.skeleton.fingerprint, []).append(number)
+    return list(groups.values())
+
+
+def _commonest(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
+    best = max(groups, key=lambda group: (sum(len(motions[i]) for i in group), -group[0]))
+    return motions[best[0]].skeleton
+
+
+def _sample(motions: Sequence[Motion], standing: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
+    """Some frames of all clips of one rig, and which feet (T, 2) are flat on the ground in them; heights over one
+    floor."""
+    ends = np.cumsum([len(motion) for motion in motions])
+    frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE).astype(int))
+    roots, rotations, feet = [], [], []
+    for motion, points, end in zip(motions, standing, ends):
+        here = frames[(frames >= end - len(motion)) & (frames < end)] - (end - len(motion))
+        if len(here):
+            roots.append(motion.root_positions[here] - [0.0, 0.0, contacts.floor_height(motion)])
+            rotations.append(motion.rotations[here])
+            feet.append(points.all(axis=2)[here])
+    sample = Motion(motions[0].skeleton, np.concatenate(roots), np.concatenate(rotations), motions[0].fps)
+    return sample, np.concatenate(feet)

@@ -1,0 +1,227 @@
+"""Recordings mended on entry: single-frame pops, a floor that drifts or tilts, and feet that slide while they stand.
+
+Inertial suits dead-reckon the pelvis, so their travel and their floor drift and planted feet slide (0.35 to 0.7 m/s in
+real data); optical recordings have pops where a marker was swapped and a floor that is centimetres off. A library that
+is cut and joined from such clips would carry all of it into every result. What is done is told, one line per kind.
+
+The travel is mended before the feet: wherever a foot stands, the *pelvis* is moved with the opposite of its slide,
+smoothly, because there the suit's dead reckoning is wrong, not the leg; only what is left is taken out by bending the
+legs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from ..motion import contacts, quaternion
+from ..motion.humanoid import identify
+from ..motion.motion import Motion, forward_kinematics
+from ..polish.foot_plant import plant
+
+# a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
+_POP = np.radians(12.0)
+_POP_SHARE = 4.0
+_POP_SECONDS = 0.04  # longer than a pop
+# balls of feet that slide faster than this in the middle of stances (metres per second, mean over a clip): optical
+# recordings have 0.01 to 0.1, suits 0.12 to 0.25
+_SLIDES = 0.13
+# stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
+_FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2
+_FLOOR_MOST = 0.02  # metres of drift that are left alone: no floor is that even, and soles lie a little differently
+_KEEP_SPEED = 0.005
+_BALL = 0.7  # of the way from ankle to the foot's tip
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """A mended clip and what was done.
+
+    standing (T, 2, 2): left and right, heel and toe, on the ground. drift: metres between the lowest and the highest
+    floor. travel: metres by which the last frame was moved against the first. slide: m/s before and after, mean over
+    standing heels and toes. slid: whether it slid so much that way and feet were mended.
+    """
+
+    motion: Motion
+    standing: np.ndarray
+    drift: float
+    travel: float
+    slide: tuple[float, float]
+    slid: bool
+
+
+def without_pops(motion: Motion) -> tuple[Motion, int]:
+    """The motion without rotations that jump for one or two frames and return, and the number of rotations replaced.
+
+    A joint pops where it is more than 12 degrees off the slerp of the frames around the gap, and more than four times
+    as far as these are apart from each other or from their own outer neighbours (a fast swing moves on, a pop returns).
+    """
+    rotations, count = np.array(motion.rotations), 0
+    for width in range(1, 1 + min(2, int(_POP_SECONDS * motion.fps))):
+        here = _popped(rotations, width)
+        for frame, joint in np.argwhere(here):
+            before, after = rotations[frame - 1, joint], rotations[frame + width, joint]
+            for step in range(width):
+                rotations[frame + step, joint] = quaternion.slerp(before, after, (step + 1.0) / (width + 1.0))
+        count += int(here.sum()) * width
+    return (replace(motion, rotations=rotations), count) if count else (motion, 0)
+
+
+def _popped(rotations: np.ndarray, width: int) -> np.ndarray:
+    """(T, J) bool: first frames of runs of `width` frames that jump and return; rotations (T, J, 4)."""
+    out = np.zeros(rotations.shape[:2], bool)
+    count = len(rotations) - width - 3
+    if count < 1:
+        return out
+    outer, before = rotations[:count], rotations[1 : count + 1]
+    after, beyond = rotations[width + 2 : width + 2 + count], rotations[width + 3 : width + 3 + count]
+    still = np.max([_angle(outer, before), _angle(before, after), _angle(after, beyond)], axis=0)
+    off = np.full(still.shape, np.inf)
+    for step in range(width):
+        here = rotations[2 + step : 2 + step + count]
+        off = np.minimum(off, np.minimum(_angle(here, before), _angle(here, after)))
+    out[2 : 2 + count] = (off > _POP) & (off > _POP_SHARE * still)
+    return out
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The angle (...,) in radians between rotations (..., 4)."""
+    return 2.0 * np.arccos(np.clip(np.abs(np.sum(a * b, axis=-1)), 0.0, 1.0))
+
+
+def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = False) -> Repaired:
+    """The motion on a level floor at height 0 (2nd percentile of its toes), with feet that stand still.
+
+    standing (T, 2, 2) bool: left and right, heel and toe; found where it is not given. Feet are held, and the way is
+    corrected, where the balls of standing feet slide faster than 0.13 m/s; with `plants` feet are held in any case (a
+    body that got other feet). Bones and rate stay.
+    """
+    standing = contacts.points(motion) if standing is None else standing
+    motion, drift = _levelled(motion, standing)
+    before, travel = slide(motion, standing), 0.0
+    slides = _ball_slide(motion, standing) > _SLIDES
+    if slides:
+        motion, travel = _travelled(motion, standing)
+    motion = _on_floor(motion)
+    if slides or plants:
+        held = plant(motion.skeleton, motion.root_positions, motion.rotations, standing, motion.fps)
+        motion = _on_floor(replace(motion, root_positions=held.root, rotations=held.rotations))
+    return Repaired(motion, standing, drift, travel, (before, slide(motion, standing)), slides)
+
+
+def slide(motion: Motion, standing: np.ndarray) -> float:
+    """Mean horizontal speed in m/s of heels and toes while they stand, `standing` (T, 2, 2); 0 where none does."""
+    body = identify(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    points = np.stack([places[:, [limb.foot, limb.toe_or_foot], :2] for limb in (body.left, body.right)], axis=1)
+    firm = standing[1:] & standing[:-1]
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=-1)[firm].mean() * motion.fps) if firm.any() else 0.0
+
+
+def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
+    """Mean speed in m/s of the balls of the feet in the middle of their stances; 0 without stances."""
+    speed = np.linalg.norm(np.diff(_balls(motion)[..., :2], axis=0), axis=-1) * motion.fps
+    weight = _inner(standing[..., 1])
+    firm = np.minimum(weight[1:], weight[:-1])
+    return float((speed * firm).sum() / max(firm.sum(), 1e-9))
+
+
+def _on_floor(motion: Motion) -> Motion:
+    floor = contacts.floor_height(motion)
+    return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, floor])
+
+
+def _balls(motion: Motion) -> np.ndarray:
+    """Where the balls of both feet are, (T, 2, 3) metres: toe joints, else on the way from ankle to the foot's tip.
+
+    They stand from the foot's landing to its push off; a heel rises meanwhile and says little of floor and travel.
+    """
+    skeleton, body = motion.skeleton, identify(motion.skeleton)
+    places, world = forward_kinematics(motion)
+    balls = []
+    for limb in (body.left, body.right):
+        ball = places[:, limb.toe_or_foot]
+        if limb.toe is None and limb.foot in skeleton.end_parents:
+            tip = skeleton.end_offsets[skeleton.end_parents.index(limb.foot)]
+            ball = ball + quaternion.rotate(world[:, limb.foot], _BALL * tip)
+        balls.append(ball)
+    return np.stack(balls, axis=1)
+
+
+def _levelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
+    """The motion without the slow rise and fall of the floor under its standing feet, and its range in metres."""
+    weight = _inner(standing[..., 1])
+    held = np.flatnonzero(weight.any(axis=1))
+    if len(held) < 2:
+        return motion, 0.0
+    heights = _balls(motion)[..., 2]
+    usual = [np.median(heights[:, side][weight[:, side] > 0.0]) if weight[:, side].any() else 0.0 for side in (0, 1)]
+    floor = _smooth((heights - usual) * weight, weight, _FLOOR_SECONDS, motion.fps, 1e-6)
+    floor = floor[np.clip(np.arange(len(floor)), held[0], held[-1])]
+    drift = float(np.ptp(floor))
+    if drift < _FLOOR_MOST:
+        return motion, 0.0
+    return replace(motion, root_positions=motion.root_positions - floor[:, None] * [0.0, 0.0, 1.0]), drift
+
+
+def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
+    """The motion whose pelvis goes where its standing feet say, and by how far its way is longer or shorter, metres.
+
+    Only the middle of a stance tells: a foot that lands or leaves moves. On recordings without sliding the way comes
+    out as it was, to half a per cent.
+    """
+    velocity = np.diff(_balls(motion)[..., :2], axis=0) * motion.fps
+    weight = _inner(standing[..., 1])
+    firm = np.minimum(weight[1:], weight[:-1])
+    change = [-_smooth(velocity[..., axis] * firm, firm, _TRAVEL_SECONDS, motion.fps, _KEEP_SPEED) for axis in (0, 1)]
+    moved = np.zeros((len(motion), 3))
+    moved[1:, :2] = np.cumsum(np.stack(change, axis=1), axis=0) / motion.fps
+    return replace(motion, root_positions=motion.root_positions + moved), float(np.linalg.norm(moved[-1]))
+
+
+def _inner(stands: np.ndarray) -> np.ndarray:
+    """Weights (T, 2), 1 in the middle third of every stance and 0 in its outer sixths, from `stands` (T, 2) bool."""
+    weight = np.zeros(stands.shape)
+    for side, one in enumerate(stands.T):
+        edges = np.flatnonzero(np.diff(one, prepend=False, append=False))
+        for start, stop in zip(edges[::2], edges[1::2]):
+            share = (np.arange(stop - start) + 0.5) / (stop - start)
+            weight[start:stop, side] = np.clip(3.0 * np.minimum(share, 1.0 - share) - 0.5, 0.0, 1.0)
+    return weight
+
+
+def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, pull: float) -> np.ndarray:
+    """The curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2, from pushed = w v (T, P), weights (T,
+    P).
+
+    seconds: how slowly it can change; the stiffness is its fourth power.
+    """
+    count, stencil = len(pushed), (1.0, -2.0, 1.0)
+    band = np.zeros((3, count))
+    band[0] = weight.sum(axis=1) + pull
+    for i in range(3 if count > 2 else 0):
+        for j in range(i + 1):
+            band[i - j, j : j + count - 2] += (seconds * fps) ** 4 * stencil[i] * stencil[j]
+    return solveh_banded(band, pushed.sum(axis=1), lower=True)
+
+
+def told(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
+    """What was done to a library's clips, one line per kind. repaired: each clip's repair and its number of pops."""
+    lines = []
+    pops = [count for _, count in repaired if count]
+    if pops:
+        lines.append(f"{sum(pops)} single-frame jumps of joints taken out of {len(pops)} clips")
+    drifts = [one.drift for one, _ in repaired if one.drift > 0.0]
+    if drifts:
+        lines.append(f"floor levelled in {len(drifts)} clips, by {np.median(drifts) * 100:.0f} cm in the median")
+    held = [one for one, _ in repaired if one.slid]
+    if held:
+        before, after = (np.mean([one.slide[i] for one in held]) * 100 for i in (0, 1))
+        lines.append(
+            f"standing feet held in {len(held)} clips: they slid {before:.0f} cm/s and now {after:.0f} cm/s in the mean;"
+            f" the way corrected by {np.median([one.travel for one in held]):.2f} m in the median"
+        )
+    return lines

@@ -1,0 +1,127 @@
+"""Recordings mended on entry: planted pops, drift and sliding come out, good recordings stay as they are."""
+
+import glob
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from beyond_mocap.files import bvh
+from beyond_mocap.library import repair
+from beyond_mocap.motion import contacts, quaternion
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.gestures import strike
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.motion import Motion, forward_kinematics
+
+MOCAP = Path(__file__).resolve().parents[4] / "shared/data/mocap"
+
+
+@pytest.fixture(scope="module")
+def walk() -> Motion:
+    return gait(1.4, 6.0, 60.0, turn_rate=0.3, seed=2)
+
+
+@pytest.mark.parametrize("width", [1, 2])
+def test_planted_pops_are_taken_out(width):
+    motion = gait(2.5, 3.0, 120.0, seed=1)
+    rotations = motion.rotations.copy()
+    turn = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), 0.6)
+    joint = motion.skeleton.index("LeftForeArm")
+    for frame in (50, 200):
+        rotations[frame : frame + width, joint] = quaternion.multiply(turn, rotations[frame : frame + width, joint])
+    mended, count = repair.without_pops(replace(motion, rotations=rotations))
+    assert count == 2 * width
+    turned = 2.0 * np.arccos(np.clip(np.abs(np.sum(mended.rotations * motion.rotations, axis=-1)), 0.0, 1.0))
+    assert turned.max() < np.radians(1.5)
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])
+def test_fast_swings_are_no_pops(fps):
+    for motion in (strike("kick low inside", fps=fps).motion, gait(9.0, 2.0, fps)):
+        same, count = repair.without_pops(motion)
+        assert count == 0 and same is motion
+
+
+def test_a_good_recording_only_gets_its_floor(walk):
+    done = repair.grounded(walk)
+    assert not done.slid and done.drift == 0.0 and done.travel == 0.0
+    assert np.array_equal(done.motion.rotations, walk.rotations)
+    assert np.ptp(done.motion.root_positions - walk.root_positions, axis=0).max() < 1e-9
+    assert abs(contacts.floor_height(done.motion)) < 1e-9
+
+
+def test_a_drifting_floor_is_levelled(walk):
+    drift = 0.15 * np.sin(np.linspace(0.0, 1.5, len(walk)))
+    done = repair.grounded(replace(walk, root_positions=walk.root_positions + drift[:, None] * [0.0, 0.0, 1.0]))
+    assert abs(done.drift - np.ptp(drift)) < 0.03
+    inside = slice(40, -40)
+    off = (done.motion.root_positions - walk.root_positions)[inside, 2]
+    assert np.ptp(off) < 0.025
+
+
+def test_sliding_feet_are_held_and_the_way_is_mended(walk):
+    seconds = np.arange(len(walk)) / walk.fps
+    way = np.column_stack([0.3 * seconds, 0.06 * np.sin(3.0 * seconds), 0.0 * seconds])
+    standing = contacts.points(walk)
+    done = repair.grounded(replace(walk, root_positions=walk.root_positions + way), standing)
+    assert done.slid and done.slide[0] > 0.25 and done.slide[1] < 0.05
+    travelled = np.linalg.norm(done.motion.root_positions[-1, :2] - done.motion.root_positions[0, :2])
+    asked = np.linalg.norm(walk.root_positions[-1, :2] - walk.root_positions[0, :2])
+    assert abs(travelled - asked) < 0.05 * asked
+    lengths = np.linalg.norm(np.diff(forward_kinematics(done.motion)[0][:, [1, 2]], axis=1), axis=-1)
+    assert np.ptp(lengths) < 0.2  # two joints of the spine: the body is not torn
+
+
+def test_a_motion_that_never_stands_is_left_alone(walk):
+    done = repair.grounded(walk, np.zeros((len(walk), 2, 2), bool))
+    assert not done.slid and np.array_equal(done.motion.rotations, walk.rotations)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_the_shortest_clips_pass(walk, count):
+    short, pops = repair.without_pops(walk.frames(0, count))
+    assert pops == 0
+    assert len(repair.grounded(short, plants=count > 3).motion) == count
+
+
+def test_what_was_done_is_told_once_per_kind(walk):
+    done = repair.grounded(walk)
+    mended = replace(done, drift=0.04, slid=True, slide=(0.3, 0.05), travel=0.2)
+    lines = repair.told([(done, 0), (mended, 3), (mended, 0)])
+    assert lines == [
+        "3 single-frame jumps of joints taken out of 1 clips",
+        "floor levelled in 2 clips, by 4 cm in the median",
+        "standing feet held in 2 clips: they slid 30 cm/s and now 5 cm/s in the mean; "
+        "the way corrected by 0.20 m in the median",
+    ]
+    assert repair.told([(done, 0)]) == []
+
+
+def flat_slide(motion: Motion, standing: np.ndarray) -> float:
+    """Mean speed in m/s of heels and toes of feet that stand flat."""
+    flat = np.repeat(standing.all(axis=2)[:, :, None], 2, axis=2)
+    return repair.slide(motion, flat)
+
+
+def mean(slides: list[tuple[float, int]]) -> float:
+    """The mean over clips, each by its number of frames."""
+    return sum(slide * frames for slide, frames in slides) / sum(frames for _, frames in slides)
+
+
+def test_suits_slide_less_than_half_as_fast():
+    files = sorted(glob.glob(str(MOCAP / "lmd/Player1/*.bvh")))[::9]
+    if not files:
+        pytest.skip(f"no recordings in {MOCAP / 'lmd/Player1'}")
+    before, after = [], []
+    for path in files:
+        motion, _ = repair.without_pops(bvh.read(path).motion)
+        standing = contacts.points(motion)
+        done = repair.grounded(motion, standing)
+        frames = int(standing.all(axis=2).sum())
+        before.append((flat_slide(motion, standing), frames))
+        after.append((flat_slide(done.motion, standing), frames))
+        feet = [identify(motion.skeleton).left.foot, identify(motion.skeleton).right.foot]
+        assert forward_kinematics(done.motion)[0][:, feet, 2].min() > -0.02
+    assert mean(before) > 0.15 and mean(after) < 0.5 * mean(before)
