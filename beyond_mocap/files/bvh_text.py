@@ -241,7 +241,7 @@ def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, f
     time_text, start, line = _labelled(path, data, start, line, rb"Frame\s*Time\s*:", expected)
     frame_time = _number(time_text)
     if frame_time is None or not 1e-5 <= frame_time <= 1e3:
-        raise InputError(f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0", "correct that line")
+        raise InputError(f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0 (0.00001 to 1000)", "correct that line")
     return frames, frame_time, start, line
 
 
@@ -289,7 +289,7 @@ def _row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:
         words = row.split()
         bad = next((word for word in words if _number(word) is None or abs(float(word)) >= 1e300), None)
         if bad is not None:
-            return InputError(f"{path}:{at}", f"{bad[:30]!r}", "a number", _EXPORT_AGAIN)
+            return InputError(f"{path}:{at}", f"{bad[:30]!r}", "a number of ordinary size", _EXPORT_AGAIN)
         if words and len(words) != columns:
             expected = f"{columns}, one per channel of the hierarchy"
             return InputError(f"{path}:{at}", f"{len(words)} numbers", expected, _DAMAGED)

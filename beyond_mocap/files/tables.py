@@ -27,6 +27,7 @@ PROVENANCE_COLUMNS = (
     "frame", "time_s", "clip", "clip_frame", "mirrored", "labels", "contact_left", "contact_right",
 )  # fmt: skip
 _FARTHEST = 1e4  # metres
+_LATEST = 1e11  # seconds: feeds count from kick-off, some from 1970
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +169,7 @@ def read_rows(path: str | os.PathLike, required: Sequence[str]) -> Iterable[tupl
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) < len(names):
-                raise InputError(place, f"{len(cells)} cells", f"{len(names)} as in the header")
+                raise InputError(place, f"{len(cells)} cells", f"{len(names)} as in the header", "complete or delete the row")
             yield place, dict(zip(names, (cell.strip() for cell in cells)))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
@@ -187,6 +188,8 @@ def number(text: str, name: str, place: str, blank: bool = False) -> float:
         raise InputError(place, f"{name} {text!r}", "a number", "correct the cell" + " or leave it empty" * blank)
     if name.endswith("_m") and abs(value) > _FARTHEST:
         raise InputError(place, f"{name} {text}", "metres from the pitch's centre", "check the unit")
+    if name == "time_s" and abs(value) > _LATEST:
+        raise InputError(place, f"{name} {text}", "seconds", "check the unit")
     return value
 
 
@@ -196,7 +199,7 @@ def _text(path: str | os.PathLike) -> str:
     except OSError as error:
         raise InputError(path, error.strerror or "cannot be read", "a CSV file", "check the path") from None
     if not data.strip():
-        raise InputError(path, "an empty file", "a CSV file with a header")
+        raise InputError(path, "an empty file", "a CSV file with a header", "export it again")
     try:
         if b"\0" in data:
             raise ValueError
@@ -210,7 +213,7 @@ def _check_header(names: list[str], required: Sequence[str], path) -> None:
     if missing:
         shown = ",".join(names)[:80]
         found = f"no column {', '.join(missing)} in {shown!r}"
-        raise InputError(f"{path}:1", found, f"a header with {','.join(required)}")
+        raise InputError(f"{path}:1", found, f"a header with {','.join(required)}", "name the columns so, with commas")
     if any(names.count(name) > 1 for name in required):
         raise InputError(f"{path}:1", "a column twice", "each column once")
 

@@ -63,7 +63,8 @@ def _cells(rows, names) -> np.ndarray:
 def _check_rate(track: Track, path) -> None:
     known = np.isfinite(track.times) & track.measured
     if len(np.unique(track.times[known])) < 2:
-        raise InputError(path, f"{np.count_nonzero(known)} samples with time and position", "at least two")
+        found = f"{np.count_nonzero(known)} samples with a time of their own and a position"
+        raise InputError(path, found, "at least two", "export it again")
     rate = 1.0 / track.interval
     if not RATES[0] - 0.01 <= rate <= RATES[1] + 0.5:
         raise InputError(path, f"{rate:.3g} samples per second", "5 to 100", "check that time_s is in seconds")
@@ -171,7 +172,10 @@ def _guessed_provider(path: Path) -> tuple[str, list[str]]:
     for provider, form in _FORMS:
         if form.match(head):
             return provider, [f"{path.name} read as {provider}"]
-    raise InputError(path, "a form that is not known", f"a file of {', '.join(PROVIDERS)}", "name the provider")
+    if not head.strip():
+        raise InputError(path, "an empty file", "positions", "export it again")
+    expected = f"a CSV file with time_s,x_m,y_m, or one of {', '.join(PROVIDERS)}"
+    raise InputError(path, "a form that is not known", expected, "name the columns so, or the provider")
 
 
 def _meta_beside(path: Path, provider: str, notes: list[str]) -> Path:
@@ -184,7 +188,7 @@ def _meta_beside(path: Path, provider: str, notes: list[str]) -> Path:
         if beside.is_file() and beside != path:
             notes.append(f"{name} taken as its {'second' if beside.suffix == path.suffix else 'metadata'} file")
             return beside
-    raise InputError(path, f"no metadata file beside it for {provider}", names[0], "name it with --meta")
+    raise InputError(path, f"no metadata file beside it for {provider}", names[0], "put it there, or name it (--meta, in Blender Metadata)")
 
 
 _TEAMS = (("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home"))
@@ -205,7 +209,7 @@ def _load(path: Path, meta: Path, provider: str, pitch: tuple[float, float]):
     except Exception as error:  # kloppy raises whatever its parsers meet in a wrong file
         found = f"not readable as {provider} ({type(error).__name__}: {str(error)[:120]})"
         expected = f"a {provider} file and its metadata {meta.name}"
-        raise InputError(path, found, expected, "check both, or --provider") from None
+        raise InputError(path, found, expected, "check both, and the provider") from None
 
 
 def _read_with(reader, path: str, meta: str, provider: str, pitch: tuple[float, float]):

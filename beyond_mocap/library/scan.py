@@ -19,7 +19,8 @@ def find_clips(folder: str | Path) -> list[Path]:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(folder, "no such folder", "a folder with BVH files", "give the folder of your library")
+        found = "no folder but a file" if folder.is_file() else "no such folder"
+        raise InputError(folder, found, "a folder with BVH files", "give the folder of your library")
     found: list[Path] = []
     seen: set[tuple[int, int]] = set()
     for here, folders, files in os.walk(folder, followlinks=True):

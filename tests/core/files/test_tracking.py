@@ -226,7 +226,7 @@ def test_wrong_files_get_one_line(tmp_path):
         ((tmp_path / "odd.txt",), "a form that is not known"),
         ((file, tmp_path / "bad_meta.xml"), "not readable as tracab"),
         ((file, None, "fifa"), "one of tracab"),
-        ((tmp_path / "lonely.dat",), "name it with --meta"),
+        ((tmp_path / "lonely.dat",), "name it (--meta, in Blender Metadata)"),
         ((file, tmp_path / "none.xml"), "no such file"),
     ]
     for arguments, part in cases:
