@@ -7,7 +7,9 @@ What is wrong is told in one line on stderr. See the project's README for exampl
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import os
 import signal
 import sys
 import threading
@@ -16,7 +18,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from . import __version__
-from .errors import BeyondMocapError, Cancelled, InputError
+from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
 from .plan import METHODS
 
 Writer = Callable[[object, Path], None]
@@ -68,7 +70,7 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--method", choices=METHODS, default="path")
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
-    verb.add_argument("--fps", type=_positive, default=30.0)
+    verb.add_argument("--fps", type=_rate, default=30.0)
     verb.add_argument("--seed", type=int, default=0)
     verb.add_argument("--alpha", type=_share, default=0.2, help="weight of words against continuity, 0 to 1")
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
@@ -104,17 +106,24 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
 
 
 def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
-    return value
+    return _between(text, 1e-9, 1e6, "a positive number")
+
+
+def _rate(text: str) -> float:
+    return _between(text, 1.0, 480.0, "1 to 480 frames per second")
 
 
 def _share(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
-    return value
+    return _between(text, 0.0, 1.0, "between 0 and 1")
+
+
+def _between(text: str, low: float, high: float, expected: str) -> float:
+    """The number that an option's text says, where it lies from `low` to `high`."""
+    with contextlib.suppress(ValueError):
+        value = float(text)
+        if low <= value <= high:
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} is not {expected}")
 
 
 def run_library(options, told: "Told", writers: Mapping[str, Writer]) -> None:
@@ -162,8 +171,8 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     from .synthesize import synthesize
 
     begun = time.perf_counter()
+    _check_outputs(options.out, options.provenance, options.ball, options.report, never=(options.track, options.annotations))
     write = _writer(options.out, writers)
-    _check_outputs(options.out, options.provenance, options.ball, options.report)
     track, data = clean(read_track_csv(options.track))
     timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
     loaded = time.perf_counter()
@@ -175,7 +184,10 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
         catch_up=not options.no_catch_up, fps=options.fps, alpha=options.alpha, mirror=not options.no_mirror,
         nearest=options.nearest, seed=options.seed, made=not options.no_made,
     )
-    take = synthesize(library, plan, told.progress, told.cancelled)
+    try:
+        take = synthesize(library, plan, told.progress, told.cancelled)
+    except NotInLibrary as error:
+        raise NotInLibrary(f"{options.annotations}: {error}", error.nearest) from None
     take.seconds.update(load=loaded - begun, library=ready - loaded, total=time.perf_counter() - begun)
     if options.report:
         from .evaluation.report import evaluate
@@ -204,7 +216,11 @@ def run_mirror(options, told: "Told", writers: Mapping[str, Writer]) -> None:
 
     _check_outputs(options.output)
     clip = bvh.read(options.input, options.unit)
-    bvh.write(options.output, mirror(clip.motion), clip.form)
+    try:
+        twin = mirror(clip.motion)
+    except InputError as error:  # about a skeleton, which does not know its file
+        raise InputError(options.input, str(error)) from None
+    bvh.write(options.output, twin, clip.form)
     told.end()
     print(f"{options.output}: {len(clip.motion)} frames")
 
@@ -257,7 +273,8 @@ def _writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
     known = {".bvh": write_bvh, **writers}
     if out.suffix.lower() not in known:
         raise InputError(
-            out, f"cannot write '{out.suffix or 'no suffix'}' here", f"one of {', '.join(sorted(known))}",
+            out, f"no file ending in {out.suffix} can be written here" if out.suffix else "no file ending",
+            f"one of {', '.join(sorted(known))}",
             "inside Blender .blend, .fbx, .glb and .usdc can be written too",
         )
     return known[out.suffix.lower()]
@@ -270,13 +287,20 @@ def write_bvh(take, out: Path) -> None:
     bvh.write(out, take.motion)
 
 
-def _check_outputs(*paths: Path | None) -> None:
-    """Every output's folder has to exist before work begins."""
-    for path in paths:
-        if path is not None and not path.absolute().parent.is_dir():
-            raise InputError(path, "its folder does not exist", "an existing folder", "make the folder first")
-        if path is not None and path.is_dir():
+def _check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> None:
+    """Before work begins: every output's folder can be written to, and no output is another one or one of `never`."""
+    taken = {path.resolve() for path in never if path is not None}
+    for path in filter(None, paths):
+        folder = path.absolute().parent
+        if path.is_dir():
             raise InputError(path, "is a folder", "a file name", "add a file name")
+        if not folder.is_dir():
+            raise InputError(path, "its folder does not exist", "an existing folder", "make the folder first")
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise InputError(path, "its folder cannot be written to", "a folder of yours", "choose another folder")
+        if path.resolve() in taken:
+            raise InputError(path, "named twice, as an output and as something else", "a file for each", "rename one of them")
+        taken.add(path.resolve())
 
 
 class Told:
@@ -340,7 +364,7 @@ def main(argv: list[str] | None = None, writers: Mapping[str, Writer] | None = N
         return int(done.code or 0)
     if told is not None:
         told.end()
-    print(f"{prog}: {text}", file=sys.stderr)
+    print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
     return status
 
 
