@@ -65,9 +65,10 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     if choices:
         return WantedKey(moment, frame, choices, None)
     offered = nearest_words(usable, moment.words)
-    text = f"{moment.time:g} s: the library has no clip for '{' '.join(moment.words)}'; nearest: {_listed(offered)}"
+    line = f"line {moment.line}, " if moment.line else ""
+    text = f"{line}{moment.time:g} s: the library has no clip for '{' '.join(moment.words)}'; nearest: {_listed(offered)}"
     if not go_on:
-        raise NotInLibrary(f"{text}; ask for one of these, add such a clip, or go on with --nearest", offered)
+        raise NotInLibrary(f"{text}; ask for one of these, add such a clip, or go on with the nearest (--nearest, in Blender Nearest Words)", offered)
     choices = nearest_serving(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].words
     used = tuple(sorted(choices[0].words)) if choices else gait_words
