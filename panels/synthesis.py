@@ -28,5 +28,5 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
             if settings.method == "distance":
                 body.prop(settings, "catch_up")
             body.prop(settings, "alpha", slider=True)
-            for name in ("mirror", "nearest", "seed", "rate"):
+            for name in ("mirror", "nearest", "rate"):
                 body.prop(settings, name)
