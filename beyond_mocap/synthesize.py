@@ -151,7 +151,7 @@ def _met(library, plan: Plan, order: Wanted, track: SampledTrack, edit: EditList
     known = plan.track.ball_height_known
     height = np.interp(track.times, plan.track.times, known.astype(float)) > 0.5
     return strike(
-        library.skeleton, planted.root, planted.rotations, footage.standing.all(axis=2), track.ball, touches, plan.fps,
+        library.skeleton, planted.root, planted.rotations, footage.standing.any(axis=2), track.ball, touches, plan.fps,
         measured=track.ball_measured, height_known=height,
     )
 
