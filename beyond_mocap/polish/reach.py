@@ -130,6 +130,8 @@ def _own_pole(top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world:
         return limb.unit(off, limb.unit(np.array([1.0, 0.0, 0.0]) - line[..., :1] * line, np.array([0.0, 0.0, 1.0])))
     steady = quaternion.rotate(upper_world, mean / np.linalg.norm(mean))
     steady = limb.unit(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
-    weight = np.clip(bent / _CLEAR_BEND, 0.0, 1.0) ** 2
+    # a frame that bends the other way, as blended poses may, is not believed: its knee would flip
+    right_way = np.sum(limb.unit(off, steady) * steady, axis=-1, keepdims=True)
+    weight = np.clip(bent / _CLEAR_BEND, 0.0, 1.0) ** 2 * np.clip(2.0 * right_way, 0.0, 1.0)
     mixed = weight * limb.unit(off, steady) + (1.0 - weight) * steady
     return limb.unit(mixed, steady)

@@ -24,7 +24,7 @@ from .meeting import Room, best_meeting, eased, held_meeting, lofted, meeting, s
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from where it was measured, and where the feed has filled it in."""
 
-MOST_MOVED = {"foot": 0.4, "hand": 0.4, "head": 0.2, "chest": 0.12}
+MOST_MOVED = {"foot": 0.25, "hand": 0.4, "head": 0.2, "chest": 0.12}
 """Metres that a part may be moved from where the recording has it."""
 
 PELVIS_RANGE = (0.20, 0.64)

@@ -24,6 +24,7 @@ from .edit_list import EditList, PlacedKey, find_seams
 from .wanted import Wanted, needed, pool_frame
 
 SLOT = 8
+SHORTEST = 6
 RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
 KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])
 BEAM = 64
@@ -267,6 +268,9 @@ def slots_between_keys(library: Library, wanted: Wanted) -> list[Slot]:
         at = int(round(key.frame))
         first = max(reached, min(at, int(np.ceil(max(low, key.frame - entry)))))
         end = min(len(wanted), max(at + 1, int(min(high, key.frame + leave))))
+        # what is left beside a key moment is too short for a clip of its own: seams that close cannot be smoothed
+        first = reached if first - reached < SHORTEST else first
+        end = len(wanted) if len(wanted) - end < SHORTEST else end
         slots += _evenly(reached, first) + [Slot(first, end, (number, key.choices))]
         reached = end
     return slots + _evenly(reached, len(wanted))

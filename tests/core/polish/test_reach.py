@@ -135,3 +135,18 @@ def test_wrong_joints_are_refused(running):
         two_bone(
             running.skeleton, running.root_positions, running.rotations, (upper, end, middle), running.root_positions
         )
+
+
+def test_a_knee_that_bends_backwards_in_one_frame_does_not_flip():
+    """Blended poses may overstretch a knee for a frame; the plane it bends in comes from the frames before and after."""
+    motion = gait(2.0, 2.0, 30.0)
+    limb = identify(motion.skeleton).left
+    rotations = np.array(motion.rotations)
+    places, _ = kinematics(motion, motion.rotations)
+    straightest = int(np.argmin(np.abs(2.0 * np.arccos(np.clip(rotations[:, limb.lower_leg, 0], -1.0, 1.0)))))
+    back = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), np.array(-0.5))
+    rotations[straightest, limb.lower_leg] = back
+    chain = (limb.upper_leg, limb.lower_leg, limb.foot)
+    out = two_bone(motion.skeleton, motion.root_positions, rotations, chain, places[:, limb.foot]).rotations
+    knees = pose_kinematics(motion.skeleton, motion.root_positions, out)[0][:, limb.lower_leg]
+    assert np.abs(knees - places[:, limb.lower_leg]).max() < 0.08
