@@ -37,7 +37,7 @@ def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
     top = OneLineParser(prog=prog, description="From tracks, a few words and motion capture to moving bodies.")
     top.add_argument("--version", action="version", version=f"beyond-mocap {__version__}")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
-    for add in (_add_library, _add_synthesize, _add_mirror, _add_evaluate):
+    for add in (_add_library, _add_synthesize, _add_mirror, _add_retarget, _add_evaluate):
         verb = add(verbs)
         verb.add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
     return top
@@ -87,6 +87,18 @@ def _add_mirror(verbs) -> argparse.ArgumentParser:
     verb.add_argument("output", type=Path, metavar="OUT.bvh")
     verb.add_argument("--unit", type=_positive, metavar="METRES")
     verb.set_defaults(run=run_mirror)
+    return verb
+
+
+def _add_retarget(verbs) -> argparse.ArgumentParser:
+    verb = verbs.add_parser("retarget", help="the same motion on other bones")
+    verb.add_argument("input", type=Path, metavar="IN.bvh")
+    verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a recording or a pose of the skeleton")
+    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
+    verb.add_argument("--map", type=Path, metavar="M.json", help="a JSON object, joint of IN -> joint of SKELETON")
+    verb.add_argument("--unit", type=_positive, metavar="METRES", help="metres per unit of IN.bvh")
+    verb.add_argument("--to-unit", type=_positive, metavar="METRES", help="metres per unit of SKELETON.bvh")
+    verb.set_defaults(run=run_retarget)
     return verb
 
 
@@ -223,6 +235,21 @@ def run_mirror(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     bvh.write(options.output, twin, clip.form)
     told.end()
     print(f"{options.output}: {len(clip.motion)} frames")
+
+
+def run_retarget(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+    """`retarget`: the motion on another skeleton, whose joint names and channels the output has; at its own rate."""
+    from .files import bvh
+    from .library.one_skeleton import bring_one
+
+    _check_outputs(options.out)
+    clip, target = bvh.read(options.input, options.unit), bvh.read(options.to, options.to_unit)
+    motion = bring_one(clip.motion, target.motion, options.map)
+    notes = bvh.write(options.out, motion, target.form)
+    told.end()
+    for path, note in ((options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, n) for n in notes)):
+        print(f"note: {path}: {note}", file=sys.stderr)
+    print(f"{options.out}: {len(motion)} frames")
 
 
 def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:

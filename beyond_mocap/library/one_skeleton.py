@@ -17,6 +17,7 @@ from ..motion.humanoid import identify
 from ..motion.motion import Motion
 from ..motion.retarget import Retargeter
 from ..motion.skeleton import Skeleton
+from . import repair
 
 SAME_BONES = 5e-3
 _SAMPLE = 400
@@ -50,15 +51,44 @@ def bring(
     return _brought(motions, standing, skeleton, rigs)
 
 
+def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:
+    """`motion` on the skeleton of `target`, a recording or a pose of it, feet held where they stood; its rate and
+    floor.
+
+    bone_map: see `motion.retarget`. On its own skeleton a motion stays as it is. Raises InputError as there.
+    """
+    points, feet = _points_if_named(motion), _points_if_named(target)
+    rig = Retargeter(
+        motion, target.skeleton, bone_map, example=target,
+        standing=None if points is None else points.all(axis=2),
+        example_standing=None if feet is None else feet.all(axis=2),
+    )
+    there = rig.carry(motion)
+    if points is None or feet is None or motion.skeleton.same_bones(target.skeleton, 1e-6):
+        return there
+    return repair.held(there, _standing_there(there, motion.skeleton, points))
+
+
+def _points_if_named(motion: Motion) -> np.ndarray | None:
+    """Standing points (T, 2, 2); None for a skeleton whose joints only a bone map knows."""
+    try:
+        return contacts.points(motion)
+    except InputError:
+        return None
+
+
 def _brought(motions, standing, skeleton: Skeleton, rigs) -> Iterator[tuple[Motion, np.ndarray, bool]]:
-    toes = _has_toes(skeleton)
     for number, (motion, points) in enumerate(zip(motions, standing)):
-        if number not in rigs:
+        if number in rigs:
+            there = rigs[number].carry(motion)
+            yield there, _standing_there(there, motion.skeleton, points), True
+        else:
             yield replace(motion, skeleton=skeleton), points, False
-            continue
-        there = rigs[number].carry(motion)
-        found = contacts.points(there) if toes and not _has_toes(motion.skeleton) else points
-        yield there, found, True
+
+
+def _standing_there(there: Motion, skeleton: Skeleton, points: np.ndarray) -> np.ndarray:
+    """Heels and toes that stand (T, 2, 2): the recording's own `points`; where only the new body has toes, its own."""
+    return contacts.points(there) if _has_toes(there.skeleton) and not _has_toes(skeleton) else points
 
 
 def _standing(path: Path, motion: Motion) -> np.ndarray:

@@ -105,11 +105,16 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
     slides = _ball_slide(motion, standing) > _SLIDES
     if slides:
         motion, travel = _travelled(motion, standing)
-    motion = _on_floor(motion)
     if slides or plants:
-        held = plant(motion.skeleton, motion.root_positions, motion.rotations, standing, motion.fps)
-        motion = _on_floor(replace(motion, root_positions=held.root, rotations=held.rotations))
-    return Repaired(motion, standing, drift, travel, (before, slide(motion, standing)), slides)
+        motion = held(motion, standing)
+    return Repaired(_on_floor(motion), standing, drift, travel, (before, slide(motion, standing)), slides)
+
+
+def held(motion: Motion, standing: np.ndarray) -> Motion:
+    """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, on the floor it has."""
+    floor = np.array([0.0, 0.0, contacts.floor_height(motion)])
+    planted = plant(motion.skeleton, motion.root_positions - floor, motion.rotations, standing, motion.fps)
+    return replace(motion, root_positions=planted.root + floor, rotations=planted.rotations)
 
 
 def slide(motion: Motion, standing: np.ndarray) -> float:
@@ -154,13 +159,13 @@ def _balls(motion: Motion) -> np.ndarray:
 def _levelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
     """The motion without the slow rise and fall of the floor under its standing feet, and its range in metres."""
     weight = _inner(standing[..., 1])
-    held = np.flatnonzero(weight.any(axis=1))
-    if len(held) < 2:
+    firm = np.flatnonzero(weight.any(axis=1))
+    if len(firm) < 2:
         return motion, 0.0
     heights = _balls(motion)[..., 2]
     usual = [np.median(heights[:, side][weight[:, side] > 0.0]) if weight[:, side].any() else 0.0 for side in (0, 1)]
     floor = _smooth((heights - usual) * weight, weight, _FLOOR_SECONDS, motion.fps, 1e-6)
-    floor = floor[np.clip(np.arange(len(floor)), held[0], held[-1])]
+    floor = floor[np.clip(np.arange(len(floor)), firm[0], firm[-1])]
     drift = float(np.ptp(floor))
     if drift < _FLOOR_MOST:
         return motion, 0.0
@@ -217,11 +222,11 @@ def told(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
     drifts = [one.drift for one, _ in repaired if one.drift > 0.0]
     if drifts:
         lines.append(f"floor levelled in {len(drifts)} clips, by {np.median(drifts) * 100:.0f} cm in the median")
-    held = [one for one, _ in repaired if one.slid]
-    if held:
-        before, after = (np.mean([one.slide[i] for one in held]) * 100 for i in (0, 1))
+    slid = [one for one, _ in repaired if one.slid]
+    if slid:
+        before, after = (np.mean([one.slide[i] for one in slid]) * 100 for i in (0, 1))
         lines.append(
-            f"standing feet held in {len(held)} clips: they slid {before:.0f} cm/s and now {after:.0f} cm/s in the mean;"
-            f" the way corrected by {np.median([one.travel for one in held]):.2f} m in the median"
+            f"standing feet held in {len(slid)} clips: they slid {before:.0f} cm/s and now {after:.0f} cm/s in the mean;"
+            f" the way corrected by {np.median([one.travel for one in slid]):.2f} m in the median"
         )
     return lines

@@ -29,6 +29,7 @@ from .skeleton import Skeleton, frozen_array
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = np.array([0.0, 1.0, 0.0])
 _FRAMES = 400
+_FEW = 3  # fewer frames are a pose that is shown, no recording: a foot that looks flat in it is taken to be flat
 # frames count by the cosine of the trunk's lean to this power: 10 degrees 0.74, 20 degrees 0.29, 45 degrees 0.001
 _UPRIGHT = 20
 # how much a straight knee or elbow (sine of its bend: 0) is taken to bend about the body's own axes
@@ -100,7 +101,7 @@ class _Study:
     def __init__(self, skeleton: Skeleton, body: Humanoid, example: Motion | None, standing: np.ndarray | None):
         self.skeleton, self.body = skeleton, body
         root, local = np.zeros((1, 3)), quaternion.identity(1, len(skeleton))
-        self.resting = example is None
+        self.still = example is None or len(example) < _FEW
         if example is not None:
             frames = np.unique(np.linspace(0, len(example) - 1, _FRAMES).astype(int))
             root, local = example.root_positions[frames], example.rotations[frames]
@@ -268,9 +269,9 @@ class _Study:
     def _level_frames(self, limb: Limb) -> np.ndarray | None:
         """Weights (T,) of the frames in which the foot is flat on the ground; None where there are none."""
         heights = self.places[:, limb.foot, 2]
-        if self.resting:
+        if self.still:
             upright = self.trunk[0, 2] > 0.9 and self.direction(limb.lower_leg, 2)[0, 2] > 0.7
-            return np.ones(1) if upright else None
+            return np.ones(len(heights)) if upright else None
         side = 0 if limb is self.body.left else 1
         low = heights <= np.percentile(heights, 40) if self.standing is None else self.standing[:, side]
         low = low & (self.trunk[:, 2] > 0.5)

@@ -99,7 +99,8 @@ def identify(skeleton: Skeleton) -> Humanoid:
 
     InputError where no legs can be found.
     """
-    return _identify(skeleton.names, skeleton.parents, skeleton.offsets.tobytes())
+    tips = (skeleton.end_parents, skeleton.end_offsets.tobytes())
+    return _identify(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), tips)
 
 
 def identify_posed(motion: Motion) -> Humanoid:
@@ -112,20 +113,27 @@ def identify_posed(motion: Motion) -> Humanoid:
     roles = _named(parts, skeleton.parents)
     if not _has_legs(roles):
         frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
-        places, _ = pose_kinematics(skeleton, motion.root_positions[frames], motion.rotations[frames])
-        roles = structure.find(skeleton.parents, places) or roles
+        roles = _found(skeleton, motion.root_positions[frames], motion.rotations[frames]) or roles
     return assemble(skeleton.names, skeleton.parents, roles)
 
 
 @lru_cache(maxsize=256)
-def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes) -> Humanoid:
-    parts = [side_and_part(name) for name in names]
-    roles = _named(parts, parents)
+def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: tuple) -> Humanoid:
+    roles = _named([side_and_part(name) for name in names], parents)
     if not _has_legs(roles):
-        skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3))
-        rest, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names)))
-        roles = structure.find(parents, rest) or roles
+        ends = np.frombuffer(tips[1]).reshape(-1, 3)
+        skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3), tips[0], ends)
+        roles = _found(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))) or roles
     return assemble(names, parents, roles)
+
+
+def _found(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[str, int] | None:
+    """Roles by structure from poses: root (T, 3) metres, local rotations (T, J, 4)."""
+    places, world = pose_kinematics(skeleton, root, rotations)
+    tips = places.copy()
+    for joint, offset in zip(skeleton.end_parents, skeleton.end_offsets):
+        tips[:, joint] = places[:, joint] + quaternion.rotate(world[:, joint], offset)
+    return structure.find(skeleton.parents, places, tips)
 
 
 def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:

@@ -17,14 +17,18 @@ _NEARLY = 0.6
 _TELLING = 1e-2
 
 
-def find(parents: Sequence[int], places: np.ndarray) -> dict[str, int] | None:
-    """Roles ("left upper_leg", ...) -> joint from poses (T, J, 3) in metres; None where no pair of legs is found."""
+def find(parents: Sequence[int], places: np.ndarray, tips: np.ndarray) -> dict[str, int] | None:
+    """Roles ("left upper_leg", ...) -> joint from poses (T, J, 3) in metres; None where no pair of legs is found.
+
+    tips (T, J, 3): where each joint's bone ends, the joint itself where that is not known; shows how toeless feet
+    point.
+    """
     lengths = np.array([np.linalg.norm(places[0, j] - places[0, p]) if p >= 0 else 0.0 for j, p in enumerate(parents)])
     pairs = _limb_pairs(list(parents), lengths)
     if not pairs:
         return None
     legs, arms = _legs_and_arms(parents, pairs)
-    left, right = _sided(legs, places, parents, arms)
+    left, right = _sided(legs, places, tips, parents, arms)
     roles = {"hips": common_ancestor(parents, [left[0], right[0]])}
     across = places[:, left[0]] - places[:, right[0]]
     for side, leg in (("left", left), ("right", right)):
@@ -90,7 +94,7 @@ def _legs_and_arms(parents, pairs):
     return (first, second) if depth[0] <= depth[1] else (second, first)
 
 
-def _sided(legs, places, parents, arms):
+def _sided(legs, places, tips, parents, arms):
     """The pair of legs as (left, right): by feet that point forward and knees that bend backward, else as they
     stand."""
     a, b = legs
@@ -102,10 +106,9 @@ def _sided(legs, places, parents, arms):
     for leg in (a, b):
         thigh, shank = (_unit(places[:, leg[i + 1]] - places[:, leg[i]]) for i in (0, 1))
         vote += np.mean(np.sum(np.cross(thigh, shank) * across, axis=1))
-        feet = [child for child in children(parents, leg[2])]
-        if feet:
-            forward = _unit(places[:, feet].mean(axis=1) - places[:, leg[2]])
-            vote += np.mean(np.sum(np.cross(up, forward) * across, axis=1))
+        toes = children(parents, leg[2])
+        ends = places[:, toes].mean(axis=1) if toes else tips[:, leg[2]]
+        vote += np.mean(np.sum(np.cross(up, _unit(ends - places[:, leg[2]])) * across, axis=1))
     return (a, b) if vote > -_TELLING else (b, a)
 
 
