@@ -93,7 +93,7 @@ def _add_mirror(verbs) -> argparse.ArgumentParser:
 def _add_retarget(verbs) -> argparse.ArgumentParser:
     verb = verbs.add_parser("retarget", help="the same motion on other bones")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
-    verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a recording or a pose of the skeleton")
+    verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a recording or a pose of it")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     verb.add_argument("--map", type=Path, metavar="M.json", help="a JSON object, joint of IN -> joint of SKELETON")
     verb.add_argument("--unit", type=_positive, metavar="METRES", help="metres per unit of IN.bvh")
@@ -242,12 +242,18 @@ def run_retarget(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     from .files import bvh
     from .library.one_skeleton import bring_one
 
-    _check_outputs(options.out)
+    _check_outputs(options.out, never=(options.input, options.to, options.map))
     clip, target = bvh.read(options.input, options.unit), bvh.read(options.to, options.to_unit)
-    motion = bring_one(clip.motion, target.motion, options.map)
+    try:
+        motion = bring_one(clip.motion, target.motion, options.map)
+    except InputError as error:
+        if error.where != "skeleton":
+            raise
+        raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know their files
     notes = bvh.write(options.out, motion, target.form)
     told.end()
-    for path, note in ((options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, n) for n in notes)):
+    told_of = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
+    for path, note in told_of:
         print(f"note: {path}: {note}", file=sys.stderr)
     print(f"{options.out}: {len(motion)} frames")
 

@@ -226,7 +226,7 @@ def told(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
     if slid:
         before, after = (np.mean([one.slide[i] for one in slid]) * 100 for i in (0, 1))
         lines.append(
-            f"standing feet held in {len(slid)} clips: they slid {before:.0f} cm/s and now {after:.0f} cm/s in the mean;"
-            f" the way corrected by {np.median([one.travel for one in slid]):.2f} m in the median"
+            f"standing feet held in {len(slid)} clips: they slid {before:.0f} cm/s and now {after:.0f} cm/s "
+            f"in the mean; the way corrected by {np.median([one.travel for one in slid]):.2f} m in the median"
         )
     return lines

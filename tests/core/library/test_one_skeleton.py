@@ -10,11 +10,12 @@ from beyond_mocap.__main__ import main
 from beyond_mocap.files import bvh
 from beyond_mocap.library.one_skeleton import bring, bring_one
 from beyond_mocap.library.repair import slide
-from beyond_mocap.motion import contacts
+from beyond_mocap.motion import contacts, quaternion
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
+from beyond_mocap.motion.skeleton import Skeleton
 
 
 def legs_longer(factor: float):
@@ -97,3 +98,15 @@ def test_the_command_tells_bad_maps_in_one_line(walk, tmp_path, capsys, table, f
     told = capsys.readouterr().err.strip()
     assert "\n" not in told and "map.json" in told and found in told
     assert not (tmp_path / "out.bvh").exists()
+
+
+def test_the_command_tells_bodies_without_legs_and_keeps_its_inputs(walk, tmp_path, capsys):
+    stick = Skeleton(("root", "top"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    bvh.write(tmp_path / "stick.bvh", Motion(stick, np.zeros((4, 3)), quaternion.identity(4, 2), 30.0))
+    bvh.write(tmp_path / "in.bvh", walk)
+    names = {name: str(tmp_path / f"{name}.bvh") for name in ("in", "stick", "out")}
+    for one, other in (("in", "stick"), ("stick", "in")):
+        assert main(["retarget", names[one], "--to", names[other], "--out", names["out"]]) == 2
+        told = capsys.readouterr().err.strip()
+        assert "\n" not in told and "stick.bvh" in told and "no joint found" in told
+    assert main(["retarget", names["in"], "--to", names["in"], "--out", names["in"]]) == 2
