@@ -35,7 +35,9 @@ The result is kept in a cache, so that the next time takes a moment"""
     bl_label = "Build Library"
     kind = "library"
 
-    rebuild: BoolProperty(name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"})
+    rebuild: BoolProperty(
+        name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context):
@@ -72,5 +74,6 @@ def summary(built: "Library") -> str:
     keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
     lines = [f"{len(originals)} clips, {built.minutes:.1f} minutes, {len(built.skeleton)} joints"]
     lines += [f"{gait.word}: {gait.speed:.1f} m/s" for gait in built.gaits]
-    lines += [f"{word.replace('_', ' ')}: {count}" for word, count in keys.most_common()]
+    for word, count in keys.most_common():
+        lines.append(f"{word.replace('_', ' ')}: {count} {'moment' if count == 1 else 'moments'}")
     return "\n".join(lines)

@@ -27,6 +27,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
             body.prop(settings, "method")
             if settings.method == "distance":
                 body.prop(settings, "catch_up")
-            body.prop(settings, "alpha", slider=True)
+            if settings.method != "path":  # which weighs words and continuity by its own measure
+                body.prop(settings, "alpha", slider=True)
             for name in ("mirror", "nearest", "rate"):
                 body.prop(settings, name)

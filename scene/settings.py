@@ -1,7 +1,7 @@
 """What the panels show and the operators read: one group of settings per scene, saved with the file.
 
-Paths may be relative to the file. What is too large for a file's properties (a built library, a take) lives in `session`
-under the names kept here.
+Paths may be relative to the file. What is too large for a file's properties (a built library, a take) lives in
+`session` under the names kept here.
 """
 
 from __future__ import annotations
@@ -58,8 +58,12 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
-    moments: StringProperty(name="Key moments", options={"HIDDEN"}, description="A line for each key moment of the newest take")
-    warnings: StringProperty(name="Warnings", options={"HIDDEN"}, description="Lines about what to look at in the newest take")
+    moments: StringProperty(
+        name="Key moments", options={"HIDDEN"}, description="A line for each key moment of the newest take"
+    )
+    warnings: StringProperty(
+        name="Warnings", options={"HIDDEN"}, description="Lines about what to look at in the newest take"
+    )
 
 
 class BeyondMocapSettings(bpy.types.PropertyGroup):
@@ -89,15 +93,19 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Catch Up", default=True, description="Let the body catch up with the track smoothly after each warp"
     )
     alpha: FloatProperty(
-        name="Weight of Words", default=0.2, min=0.0, max=1.0,
-        description="0 looks only for smooth transitions, 1 only for the words asked for",
+        name="Word Weight", default=0.2, min=0.0, max=1.0,
+        description="Of Distance and Blocks: 0 looks only for smooth transitions, 1 only for the words asked for",
     )
-    mirror: BoolProperty(name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged")
+    mirror: BoolProperty(
+        name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged"
+    )
     nearest: BoolProperty(
         name="Nearest Words", default=False,
         description="Where the library lacks a key moment's words, go on with the nearest that it has, and say so",
     )
-    seed: IntProperty(name="Seed", default=0, min=0, description="Another number may choose other clips; the same repeats")
+    seed: IntProperty(
+        name="Seed", default=0, min=0, description="Kept in the report; nothing is chosen at random today"
+    )
     rate: FloatProperty(
         name="Frame Rate", default=30.0, min=10.0, max=240.0,
         description="Frames per second that are synthesized; the scene keeps its own rate",
