@@ -1,7 +1,7 @@
 """A take as a file of Blender's or of its exporters: .blend, .fbx, .glb, .usdc; for the command line.
 
-The take is put into an empty file of its own, at the take's rate, with its armature, body and ball; nothing that is open
-is asked for, since a command has nothing open that it could lose.
+The take is put into an empty file of its own, at the take's rate, with its armature, body and ball; nothing that is
+open is asked for, since a command has nothing open that it could lose.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def write(take: Take, out: Path) -> None:
         EXPORTERS[out.suffix.lower()](str(beside))
         os.replace(beside, out)
     except (RuntimeError, AttributeError) as error:  # what operators raise: trouble while writing; a disabled exporter
-        raise InputError(out, f"Blender could not write it ({error})", "a place that can be written", "see above") from None
+        found, expected = f"this Blender could not write it ({error})", "an exporter that it has, and a place to write"
+        raise InputError(out, found, expected, "choose another ending or place") from None
     finally:
         beside.unlink(missing_ok=True)
 
