@@ -1,6 +1,6 @@
 """The commands for farms that only know --python:
 
-    blender -b FILE.blend --python batch.py -- synthesize --library clips --track p.csv --annotations p.txt --out p.blend
+    blender -b FILE.blend --python batch.py -- synthesize --library clips --track p.csv --annotations p.txt --out p.fbx
 
 Takes the verbs of `python -m beyond_mocap` and ends with their exit status. Uses the extension where it is switched on,
 else the code that lies beside this file, so that nothing has to be installed.

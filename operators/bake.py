@@ -27,7 +27,8 @@ class BEYOND_MOCAP_OT_bake(Verb, bpy.types.Operator):
         chosen = [(player, session.made(player.take)) for player in plans.chosen(settings) if player.take]
         lost = [player.name for player, made in chosen if made is None]
         if lost or not chosen:
-            raise InputError("bake", f"no take of {', '.join(lost) or 'any player'} in this session", "", "synthesize again")
+            found = f"no take of {', '.join(lost) or 'any player'} in this session"
+            raise InputError("bake", found, "", "synthesize again")
         bodies = [bake.player(context, player, made) for player, made in chosen]
         takes = [made.take for _, made in chosen]
         ball = bake.ball_of(takes, settings)

@@ -1,4 +1,4 @@
-"""The command line inside Blender: `blender --command beyond_mocap VERB ...`, the core's verbs with Blender's own formats."""
+"""The command line inside Blender: `blender --command beyond_mocap VERB ...`, with Blender's own formats beside BVH."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class BEYOND_MOCAP_OT_import_clips(ImportVerb, bpy.types.Operator):
     )
     reuse: BoolProperty(
         name="Onto Selected Armature", default=False,
-        description="Add the clips' actions to the active armature where its bones are the same, instead of making new ones",
+        description="Add the clips' actions to the active armature, if its bones are the same, and make no new one",
     )
 
     def paths(self) -> list[Path]:
@@ -64,7 +64,8 @@ class BEYOND_MOCAP_OT_import_clips(ImportVerb, bpy.types.Operator):
         skeleton = armature.skeleton_of(body, scene)
         for name, clip in clips:
             if not clip.motion.skeleton.same_bones(skeleton, 5e-3):
-                raise InputError(name, f"other bones than {body.name}", "the same skeleton", "import it as a new armature")
+                found = f"other bones than {body.name}"
+                raise InputError(name, found, "the same skeleton", "import it as a new armature")
 
 
 class BEYOND_MOCAP_FH_clips(bpy.types.FileHandler):

@@ -19,7 +19,7 @@ SECTION = 60.0  # seconds of a whole match that are taken at first
 
 class BEYOND_MOCAP_OT_import_tracking(ImportVerb, bpy.types.Operator):
     """Import players' positions: CSV files with time_s, x_m, y_m, or a provider's tracking file (TRACAB, Metrica,
-SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name beside a CSV is taken as the player's words"""
+SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name beside a CSV is taken as its words"""
 
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
@@ -32,7 +32,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
     )
     provider: EnumProperty(
         name="Provider",
-        items=[("AUTO", "Guess", "By what the file looks like")] + [(name, name.capitalize(), name) for name in PROVIDERS],
+        items=[("AUTO", "Guess", "By what the file looks like")]
+        + [(name, name.capitalize(), name) for name in PROVIDERS],
         description="Whose form the file has",
     )
 

@@ -20,7 +20,7 @@ from .verb import BackgroundVerb
 if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a second, and switching on has to be quick
     from ..beyond_mocap.library.library import Library
 
-FIGURES = (  # of the report: what the panel's table shows, path in the report, factor (a negative one counts from 1), form
+FIGURES = (  # what the panel's table shows: name, path in the report, factor (a negative one counts from 1), form
     ("Off the track, mean", "root_error_m.mean", 100, "{:.1f} cm"),
     ("Off the track, 95 %", "root_error_m.p95", 100, "{:.1f} cm"),
     ("Feet slide", "skate.contact_cm_s", 1, "{:.1f} cm/s"),
@@ -47,7 +47,10 @@ class Order:
 
 @dataclass(frozen=True)
 class Result:
-    """What a run brings: the library it used and the unit of its clips, and per player the plan, the take, the report and the track's warnings."""
+    """What a run brings: the library it used and the unit of its clips.
+
+    made: (player's name, plan, take, report, warnings about the track).
+    """
 
     library: "Library"
     unit: float | None

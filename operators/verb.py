@@ -1,4 +1,4 @@
-"""What all verbs share: trouble becomes a report with a cause and a next step, and long work may run in the background."""
+"""What all verbs share: trouble becomes a report with a cause and a next step; long work may run in the background."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class Verb:
         except BeyondMocapError as error:
             return self.failed(str(error))
         except OSError as error:
-            return self.failed(f"{error.filename or 'file'}: {error.strerror or error}; check the path and its permissions")
+            found = f"{error.filename or 'file'}: {error.strerror or error}"
+            return self.failed(f"{found}; check the path and its permissions")
         return {"FINISHED"}
 
     def failed(self, message: str):
@@ -65,9 +66,10 @@ class ImportVerb(Verb, ImportHelper):
 class BackgroundVerb(Verb):
     """A verb in three parts, so that the middle one can run in a thread while the window stays alive.
 
-    `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled)`, a
-    static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called from a script
-    (`execute`) all three run at once, pressed as a button (`invoke`) the work goes to a thread and ESC cancels it.
+    `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled)`,
+    a static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called from a
+    script (`execute`) all three run at once; pressed as a button (`invoke`) the work goes to a thread, and ESC cancels
+    it.
     """
 
     kind = ""
@@ -77,7 +79,8 @@ class BackgroundVerb(Verb):
         window = context.window_manager
         window.progress_begin(0, 100)
         try:
-            result = self.work(self.order(context), lambda done, text: window.progress_update(int(100 * done)), lambda: False)
+            order = self.order(context)
+            result = self.work(order, lambda done, text: window.progress_update(int(100 * done)), lambda: False)
         finally:
             window.progress_end()
         self.apply(context.scene, result)
@@ -127,7 +130,7 @@ class BackgroundVerb(Verb):
         self.apply(scene, self.job.result)
 
     def cancel(self, context):
-        """Blender takes the operator away (a file is loaded, the window closes): let the thread end, drop its result."""
+        """Blender takes the operator away (a file is loaded, the window closes): let the thread end unheard."""
         self.job.cancel()
         self.ended(context)
 

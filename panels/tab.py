@@ -25,7 +25,7 @@ def table(layout, lines) -> None:
 
 
 def paragraph(layout, text: str, icon: str) -> None:
-    """Text over as many lines as the sidebar's width asks for, since labels are cut; the icon stands before the first."""
+    """Text over as many lines as the sidebar's width asks for, since labels are cut; an icon before the first."""
     width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
     column = layout.column(align=True)
     column.scale_y = 0.85

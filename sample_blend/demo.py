@@ -23,7 +23,7 @@ TILE = (480, 270)  # pixels
 
 
 def load_extension():
-    """The extension from this clone, switched on: a function that imports its modules by name, one that switches it off."""
+    """The extension from this clone, switched on: a function that imports its modules by name, one to switch it off."""
     os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="beyond-mocap-demo-"))
     sys.path.insert(0, str(HERE.parent))
     import batch
@@ -107,11 +107,12 @@ def synthesize(load, settings, steps) -> list[dict]:
 
 
 def moments(plans, takes, count: int) -> list[tuple[float, int]]:
-    """`count` moments to show, (seconds, which player to look at): key moments first, then the middles of what was asked
-    for by words, then whatever lies in the widest gaps."""
+    """`count` moments to show, (seconds, which player to look at): key moments first, then the middles of what was
+    asked for by words, then whatever lies in the widest gaps."""
     start, end = takes[0].start_time, takes[0].start_time + takes[0].motion.duration
     keys = [(key.asked.time, player) for player, take in enumerate(takes) for key in take.keys]
-    spans = [(0.5 * (span.start + span.end), player) for player, plan in enumerate(plans) for span in plan.timeline.spans]
+    asked = [(span, player) for player, plan in enumerate(plans) for span in plan.timeline.spans]
+    spans = [(0.5 * (span.start + span.end), player) for span, player in asked]
     shown = sorted([*keys, *sorted(spans, key=lambda span: -min(abs(span[0] - key[0]) for key in keys))][:count])
     while len(shown) < count:
         edges = [start, *(seconds for seconds, _ in shown), end]

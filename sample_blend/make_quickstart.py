@@ -1,5 +1,5 @@
-"""Writes quickstart.blend beside this file: a pitch, a camera, and settings filled in for the sample, with paths relative
-to the file, so that three buttons lead to two moving players.
+"""Writes quickstart.blend beside this file: a pitch, a camera, and settings filled in for the sample, with paths
+relative to the file, so that three buttons lead to two moving players.
 
     .venv-4.5/bin/python sample_blend/make_quickstart.py
 
@@ -46,7 +46,8 @@ def relative_paths(settings) -> None:
 
     settings.library_folder = from_here(settings.library_folder)
     for player in settings.players:
-        player.tracking_file, player.annotation_file = from_here(player.tracking_file), from_here(player.annotation_file)
+        player.tracking_file = from_here(player.tracking_file)
+        player.annotation_file = from_here(player.annotation_file)
 
 
 def open_the_tab(bpy) -> None:
@@ -63,7 +64,7 @@ def open_the_tab(bpy) -> None:
 
 
 def like_a_pitch(shading, overlay) -> None:
-    """Colours, shadows and a sky in the solid view, which every computer draws quickly; nothing in front of the players."""
+    """Colours, shadows and a sky in the solid view, which every computer draws quickly; nothing before the players."""
     shading.type, shading.light = "SOLID", "STUDIO"  # the light first: it says which studio lights there are
     shading.color_type, shading.studio_light = "MATERIAL", "paint.sl"
     shading.show_shadows, shading.shadow_intensity, shading.show_object_outline = True, 0.4, False

@@ -1,6 +1,7 @@
 """Motions as actions of an armature, and actions as motions, by time: the scene keeps its frame rate.
 
-A bone's pose is a turn in its own rest frame B, the core's local rotation q one in the armature's frame: q = B pose B^-1.
+A bone's pose is a turn in its own rest frame B, the core's local rotation q one in the armature's frame:
+q = B pose B^-1.
 Where the armature object is turned by O in the scene, the root takes that turn along: q_root = O B pose B^-1.
 """
 
@@ -48,10 +49,10 @@ def write(
 def read(
     body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None, slot=None
 ) -> Motion:
-    """The motion that an action plays on the armature `body`, at the scene's frame rate, from its first key to its last.
+    """The motion that an action plays on the armature `body`, at the scene's frame rate, from first key to last.
 
-    action and slot: those that the armature plays if None. Curves of any rotation mode are read; what has no curve stays
-    as it is posed now. Constraints and drivers are not part of an action and not read.
+    action and slot: those that the armature plays if None. Curves of any rotation mode are read; what has no curve
+    stays as it is posed now. Constraints and drivers are not part of an action and not read.
     """
     if action is None:
         action, slot = channels.playing(body)

@@ -160,7 +160,7 @@ def _tails(skeleton: Skeleton) -> np.ndarray:
 
 
 def _onward(skeleton: Skeleton, joint: int) -> np.ndarray:
-    """Offsets (n, 3) of the children on the joint's own side (the neck, not the shoulders), else of all, else of tips."""
+    """Offsets (n, 3) of the children on the joint's own side (the neck, not the shoulders), else of all, else tips."""
     children = skeleton.children(joint)
     side = side_and_part(skeleton.names[joint])[0]
     along = [c for c in children if side_and_part(skeleton.names[c])[0] == side] or children

@@ -22,8 +22,8 @@ _newest: dict[str, "Job"] = {}
 class Job:
     """Work of one kind ("library", "synthesis") in a thread of its own.
 
-    `work(progress, cancelled)` is called there. `fraction` and `text` say how far it is; after `poll()` has returned True
-    either `result` or `error` is set.
+    `work(progress, cancelled)` is called there. `fraction` and `text` say how far it is; after `poll()` has returned
+    True either `result` or `error` is set.
     """
 
     def __init__(self, kind: str, work: Work):

@@ -54,7 +54,7 @@ def the_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
 
 
 def camera(scene: bpy.types.Scene, takes: list[Take]) -> None:
-    """Let the stage's camera, where there is one, follow the middle of all players, smoothly, with all of them in view."""
+    """Let the stage's camera, where there is one, follow the middle of all players, smoothly, all of them in view."""
     start = min(take.start_time for take in takes)
     end = max(take.start_time + take.motion.duration for take in takes)
     fps = frames_per_second(scene)

@@ -36,7 +36,7 @@ def create(context: bpy.types.Context, name: str, collection) -> bpy.types.Objec
 
 
 def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float) -> bpy.types.Action:
-    """Bake the ball's way and roll, a key on every whole scene frame; the path's first sample is played at frame `start`."""
+    """Bake the ball's way and roll, a key on every whole scene frame; the path's first sample is at frame `start`."""
     fps = frames_per_second(scene)
     seconds = path.times - path.times[0]
     frames = whole_frames(start, float(seconds[-1]), fps)
@@ -51,8 +51,8 @@ def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start:
 
 
 def rolling(places: np.ndarray) -> np.ndarray:
-    """Rotations (F, 4) of a ball whose centre passes `places` (F, 3) metres: it rolls on the ground, in the air it keeps
-    the turn per frame with which it left the ground."""
+    """Rotations (F, 4) of a ball whose centre passes `places` (F, 3) metres: it rolls on the ground, in the air it
+    keeps the turn per frame with which it left the ground."""
     step = np.diff(places, axis=0)
     turn = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))], axis=1) / RADIUS  # up x step: rotation vectors
     for i in np.flatnonzero(places[1:, 2] > ROLLING_BELOW):

@@ -33,7 +33,8 @@ def create(player, name: str, shirt, collection, scene: bpy.types.Scene, example
     mesh.polygons.foreach_set("material_index", np.asarray(body.material, np.int32))
     mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
     for part in MATERIALS:
-        mesh.materials.append(colour(f"{name} {part}" if part == "shirt" else part.capitalize(), LOOKS.get(part, shirt)))
+        material = f"{name} {part}" if part == "shirt" else part.capitalize()
+        mesh.materials.append(colour(material, LOOKS.get(part, shirt)))
     person = bpy.data.objects.new(f"{name} body", mesh)
     collection.objects.link(person)
     person.parent = player

@@ -15,8 +15,8 @@ LINEAR = 1  # Keyframe.interpolation as foreach_set takes it
 def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]]):
     """Give `target` a new action `name` and return it.
 
-    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n)). The action that
-    was there before is kept in the file.
+    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n)). The action
+    that was there before is kept in the file.
     """
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type=target.id_type, name=target.name)
@@ -47,7 +47,8 @@ def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> Non
 
 
 def discard(target: bpy.types.Object, mark: str) -> None:
-    """Take off and remove the action that `target` plays, if it carries the custom property `mark` and nobody else uses it.
+    """Take off and remove the action that `target` plays, if it carries the custom property `mark` and has no other
+    user.
 
     For results that are made again and again, so that they do not pile up in the file.
     """
@@ -84,7 +85,7 @@ def keyed_range(found: dict) -> tuple[int, int] | None:
 
 
 def sample(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
-    """The curve's values (F,) at scene frames (F,): keys where there is one on every frame, else evaluated by Blender."""
+    """The curve's values (F,) at scene frames (F,): keys where every frame has one, else evaluated by Blender."""
     count = len(curve.keyframe_points)
     if not curve.modifiers and count >= len(frames):
         keys = np.empty(2 * count, np.float32)

@@ -12,7 +12,7 @@ HEIGHT, WIDTH = 0.015, 0.03  # metres above the ground, half the ribbon's width
 
 
 def write(context: bpy.types.Context, name: str, points: np.ndarray, rgb, collection) -> bpy.types.Object:
-    """A ribbon along `points` (N, 2) metres, coloured `rgb`; takes the place of the object of that name in `collection`."""
+    """A ribbon along `points` (N, 2) metres, coloured `rgb`; takes the place of that name's object in `collection`."""
     units = units_per_metre(context.scene)
     data = bpy.data.curves.new(name, "CURVE")
     data.dimensions = "3D"

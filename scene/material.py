@@ -16,5 +16,5 @@ def colour(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = (*rgb, 1.0)
     shader.inputs["Roughness"].default_value = roughness
-    material.diffuse_color = (*(channel**0.6 for channel in rgb), 1.0)  # brighter in the solid view, which has its own light
+    material.diffuse_color = (*(channel**0.6 for channel in rgb), 1.0)  # brighter: the solid view has its own light
     return material

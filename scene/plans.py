@@ -14,7 +14,7 @@ def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
     """The players that are switched on; InputError where there is none."""
     players = [player for player in settings.players if player.use]
     if not players:
-        raise InputError("players", "none is switched on", "at least one", "import tracking in step 2 and tick a player")
+        raise InputError("players", "none is ticked", "at least one", "import tracking in step 2 and tick a player")
     return players
 
 

@@ -50,8 +50,8 @@ def remove(scene: bpy.types.Scene) -> None:
 def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:
     """Let the stage's camera follow and stand back as far as it takes; nothing happens where there is no such camera.
 
-    frames: (F,) scene frames. places: (F, 2) metres, the middle of what is to be seen. reach: (F,) metres from there to the
-    farthest player. The camera hangs on an empty, whose size is its distance.
+    frames: (F,) scene frames. places: (F, 2) metres, the middle of what is to be seen. reach: (F,) metres from there to
+    the farthest player. The camera hangs on an empty, whose size is its distance.
     """
     stage = scene.collection.children.get(NAME)
     focus = stage.objects.get(FOCUS) if stage else None
@@ -78,7 +78,7 @@ def _ground(stage, units: float) -> None:
 
 
 def _lines(stage, units: float) -> None:
-    """All markings as ribbons a few millimetres above the grass, each a little higher so that crossings do not flicker."""
+    """All markings as ribbons a few millimetres above the grass, each a little higher, lest crossings flicker."""
     corners, faces = [], []
     for number, stroke in enumerate(_strokes()):
         height = 0.004 + 0.0004 * number

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Found(NamedTuple):
-    """One player in a file. feed_id: empty where the file is about one player. start, end: seconds on the file's clock."""
+    """One player in a file. feed_id: empty in a file about one player. start, end: seconds on the file's clock."""
 
     name: str
     feed_id: str
