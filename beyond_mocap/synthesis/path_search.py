@@ -29,6 +29,7 @@ RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
 KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])
 BEAM = 64
 CANDIDATES = 1500
+LOOKED_AT = 30000
 MEMORY_SLOTS = 15
 BUCKET = 40
 
@@ -94,11 +95,14 @@ class PathSearch:
         self.library, self.wanted, self.weights = library, wanted, weights
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
-        self.usable = wanted.allowed[library.frames.clip]
         made = np.array([clip.path.startswith(MADE_FOLDER) for clip in library.clips])
         self.made = made[library.frames.clip]
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
-        self.played = [played_speed_and_turn(library, rate) for rate in RATES]
+        self.speed, self.turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
+        self.valid = lasts & wanted.allowed[library.frames.clip]
+        usable = np.flatnonzero(self.valid)
+        self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
+        self.speeds = self.speed.ravel()[self.by_speed]
         self.off_travel = np.abs(np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]))
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
@@ -107,7 +111,7 @@ class PathSearch:
 
     def run(self) -> EditList:
         """The cheapest way through all slots that the beam finds; InputError where no clip is as long as a slot."""
-        if not np.any(self.played[0][2] & self.usable):
+        if not len(self.by_speed):
             raise InputError(
                 self.library.folder or "library", f"no clip of more than {SLOT} frames at {self.library.fps:g} per second",
                 "clips of a second or more", "add longer recordings",
@@ -123,8 +127,7 @@ class PathSearch:
 
     def _layer(self, slot: Slot, before: States | None, last: Slot) -> States:
         """The best states of one slot, given those of the slot before."""
-        table = None if slot.key else np.stack([self._unary(slot, number) for number in range(len(RATES))])
-        clip, start, rate, unary, choice = self._key_states(slot) if slot.key else self._free_states(table)
+        clip, start, rate, unary, choice = self._key_states(slot) if slot.key else self._free_states(slot)
         if before is None:
             return self._first(clip, start, rate, unary, choice)
         ends = before.start + before.rate * len(last)
@@ -133,7 +136,7 @@ class PathSearch:
         cost = through[back, np.arange(len(start))] + unary
         options = [(clip, start, rate, cost, back, choice)]
         if slot.key is None:
-            options.append(self._continued(slot, table, before, ends))
+            options.append(self._continued(slot, before, ends))
         return self._kept(before, *(np.concatenate(parts) for parts in zip(*options)))
 
     def _first(self, clip, start, rate, unary, choice) -> States:
@@ -154,27 +157,35 @@ class PathSearch:
     def _inside(self, frame: np.ndarray) -> np.ndarray:
         return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
 
-    def _free_states(self, table: np.ndarray):
-        """The CANDIDATES cheapest pairs of library frame and rate of a slot's misfits `table` (rates, N)."""
-        flat = table.ravel()
-        best = np.argpartition(flat, CANDIDATES)[:CANDIDATES] if len(flat) > CANDIDATES else np.arange(len(flat))
-        best = np.sort(best[np.isfinite(flat[best])])
-        number, start = np.divmod(best, table.shape[1])
-        return self.frames.clip[start], start.astype(float), RATES[number], flat[best], np.full(len(best), -1)
+    def _free_states(self, slot: Slot):
+        """The CANDIDATES cheapest pairs of library frame and rate for a slot without a key moment.
 
-    def _unary(self, slot: Slot, number: int) -> np.ndarray:
-        """(N,) misfit of every library frame, played at RATES[number], to what a slot asks."""
-        speed, turn, valid = self.played[number]
+        Only the LOOKED_AT pairs nearest to the asked speed are looked at: the others' misfit in speed alone would put them
+        behind, and a large library is searched as fast as a small one.
+        """
+        middle = int(np.searchsorted(self.speeds, self._asked(slot)[0]))
+        low = int(np.clip(middle - LOOKED_AT // 2, 0, max(0, len(self.by_speed) - LOOKED_AT)))
+        pairs = self.by_speed[low : low + LOOKED_AT]
+        number, start = np.divmod(pairs, len(self.frames))
+        cost = self._misfit(slot, number, start)
+        best = np.sort(np.argpartition(cost, CANDIDATES)[:CANDIDATES]) if len(cost) > CANDIDATES else np.arange(len(cost))
+        start, nothing = start[best], np.full(len(best), -1)
+        return self.frames.clip[start], start.astype(float), RATES[number[best]], cost[best], nothing
+
+    def _misfit(self, slot: Slot, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
+        """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in a slot; inf where the clip
+        ends before or may not be used."""
         wanted_speed, wanted_turn = self._asked(slot)
         w, moving = self.weights, min(1.0, wanted_speed)
-        cost = w.speed * np.abs(speed - wanted_speed)
-        cost += w.turn * (0.3 + 0.7 * moving) * np.abs(turn * (len(slot) / SLOT) - wanted_turn)
-        cost += w.facing * moving * self.off_travel + w.rate * abs(RATES[number] - 1.0)
+        cost = w.speed * np.abs(self.speed[number, frame] - wanted_speed)
+        turn = self.turn[number, frame] * (len(slot) / SLOT)
+        cost += w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
+        cost += w.facing * moving * self.off_travel[frame] + w.rate * np.abs(RATES[number] - 1.0)
         words = self.wanted.asked[(slot.first + slot.end) // 2]
         if words:
-            cost += w.words * self._missing_share(words)
-        cost += w.unasked * self._unasked(words or frozenset()) + w.made * self.made
-        return np.where(valid & self.usable, cost, np.inf)
+            cost += w.words * self._missing_share(words)[frame]
+        cost += w.unasked * self._unasked(words or frozenset())[frame] + w.made * self.made[frame]
+        return np.where(self.valid[number, frame], cost, np.inf)
 
     def _missing_share(self, words: frozenset[str]) -> np.ndarray:
         if words not in self._missing:
@@ -230,14 +241,14 @@ class PathSearch:
             seen[row, np.maximum(before.recent + shift, 0)] = True
         return seen[:, 1:-1]
 
-    def _continued(self, slot: Slot, table: np.ndarray, before: States, ends: np.ndarray):
-        """Going on without a cut, at each rate; a slot a little longer than the table's must still end inside the clip."""
+    def _continued(self, slot: Slot, before: States, ends: np.ndarray):
+        """Going on without a cut, at each rate; a slot a little longer than SLOT must still end inside the clip."""
         back = np.repeat(np.arange(len(ends)), len(RATES))
         number = np.tile(np.arange(len(RATES)), len(ends))
         clip, start, rate = before.clip[back], ends[back], RATES[number]
         first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         inside = (start >= first) & (start + rate * len(slot) <= last)
-        unary = np.where(inside, table[number, self._inside(start)], np.inf)
+        unary = np.where(inside, self._misfit(slot, number, self._inside(start)), np.inf)
         cost = before.cost[back] + unary + self.weights.rate_change * np.abs(rate - before.rate[back])
         return clip, start, rate, cost, back, np.full(len(back), -1)
 
