@@ -1,6 +1,7 @@
 """The command line: `python -m beyond_mocap VERB ...`; Blender's command and batch script use the same parser.
 
-Exit status: 0 done; 2 the command line or an input is wrong; 3 asked for something the library cannot do; 130 cancelled.
+Exit status: 0 done; 2 the command line or an input is wrong; 3 asked for something the library cannot do; 130
+cancelled.
 What is wrong is told in one line on stderr. See the project's README for examples.
 """
 
@@ -71,11 +72,11 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--method", choices=METHODS, default="path")
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
     verb.add_argument("--fps", type=_rate, default=30.0)
-    verb.add_argument("--seed", type=int, default=0)
-    verb.add_argument("--alpha", type=_share, default=0.2, help="weight of words against continuity, 0 to 1")
+    verb.add_argument("--seed", type=int, default=0, help="kept in the report; nothing is chosen at random today")
+    verb.add_argument("--alpha", type=_share, default=0.2, help="words against continuity, 0 to 1; not for 'path'")
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
     verb.add_argument("--no-made", action="store_true", help="no made running where the track outruns the recordings")
-    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words where the library lacks some")
+    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words that the library has")
     _add_library_options(verb)
     verb.set_defaults(run=run_synthesize)
     return verb
@@ -112,7 +113,7 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--library", type=Path)
     _add_library_options(verb)
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
-    verb.add_argument("--html", type=Path, metavar="R.html", help="the report as a page with pictures (needs matplotlib)")
+    verb.add_argument("--html", type=Path, metavar="R.html", help="the report as a page with pictures; needs matplotlib")
     verb.set_defaults(run=run_evaluate)
     return verb
 
@@ -183,7 +184,8 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     from .synthesize import synthesize
 
     begun = time.perf_counter()
-    _check_outputs(options.out, options.provenance, options.ball, options.report, never=(options.track, options.annotations))
+    outputs = (options.out, options.provenance, options.ball, options.report)
+    _check_outputs(*outputs, never=(options.track, options.annotations))
     write = _writer(options.out, writers)
     track, data = clean(read_track_csv(options.track))
     timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
@@ -214,8 +216,8 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     if options.report:
         write_report(options.report, report)
     told.end()
-    for warning in take.warnings:
-        told.note(warning)
+    for line in (*take.warnings, *(f"{options.track}: {line}" for line in data.lines)):
+        told.note(line)
     if options.ball and take.ball is None:
         told.note(f"{options.track} has no ball, so {options.ball} was not written")
     print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
@@ -234,6 +236,8 @@ def run_mirror(options, told: "Told", writers: Mapping[str, Writer]) -> None:
         raise InputError(options.input, str(error)) from None
     bvh.write(options.output, twin, clip.form)
     told.end()
+    for note in clip.notes:
+        told.note(note)
     print(f"{options.output}: {len(clip.motion)} frames")
 
 
@@ -254,7 +258,7 @@ def run_retarget(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     told.end()
     told_of = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
     for path, note in told_of:
-        print(f"note: {path}: {note}", file=sys.stderr)
+        told.note(f"{path}: {note}")
     print(f"{options.out}: {len(motion)} frames")
 
 
@@ -270,7 +274,8 @@ def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     from .files.tracking import read_track_csv
     from .motion.track import clean
 
-    _check_outputs(options.report, options.html)
+    inputs = (options.motion, options.track, options.annotations, options.provenance, options.ball)
+    _check_outputs(options.report, options.html, never=inputs)
     if options.html:
         require_matplotlib()
     motion = bvh.read(options.motion, None if options.library else options.unit).motion
@@ -332,7 +337,7 @@ def _check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> 
         if not os.access(folder, os.W_OK | os.X_OK):
             raise InputError(path, "its folder cannot be written to", "a folder of yours", "choose another folder")
         if path.resolve() in taken:
-            raise InputError(path, "named twice, as an output and as something else", "a file for each", "rename one of them")
+            raise InputError(path, "named for an output and for something else", "a file for each", "rename one of them")
         taken.add(path.resolve())
 
 
@@ -402,7 +407,7 @@ def main(argv: list[str] | None = None, writers: Mapping[str, Writer] | None = N
 
 
 class _interrupts:
-    """While it lasts, Ctrl-C asks the work to stop instead of breaking it off; outside the main thread nothing changes."""
+    """While it lasts, Ctrl-C asks the work to stop instead of breaking it off; outside the main thread nothing is done."""
 
     def __init__(self, told: Told):
         self._told, self._before = told, None
