@@ -36,4 +36,4 @@ class BEYOND_MOCAP_OT_bake(Verb, bpy.types.Operator):
             bake.the_ball(context, ball)
         bake.camera(context.scene, takes)
         context.view_layer.objects.active = bodies[-1]
-        self.report({"INFO"}, f"{len(bodies)} players baked{' with the ball' if ball else ''}")
+        self.report({"INFO"}, f"players baked: {len(bodies)}{', and the ball' if ball else ''}")

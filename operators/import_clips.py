@@ -56,7 +56,7 @@ class BEYOND_MOCAP_OT_import_clips(ImportVerb, bpy.types.Operator):
         for body in made:
             body.select_set(True)
         context.view_layer.objects.active = made[-1]
-        self.report({"INFO"}, f"{len(made)} clips imported at the scene's frame rate")
+        self.report({"INFO"}, f"clips imported at the scene's frame rate: {len(made)}")
 
     @staticmethod
     def check_bones(body, clips, scene):

@@ -58,7 +58,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
             for note in notes:
                 self.report({"INFO"}, note)
         settings.active_player = len(settings.players) - sum(len(found) for _, found, _ in read)
-        self.report({"INFO"}, f"{len(settings.players)} players in the list")
+        self.report({"INFO"}, f"players in the list: {len(settings.players)}")
 
     @staticmethod
     def set_clock(settings, found):

@@ -124,7 +124,7 @@ The scene changes with Bake only"""
             player.warnings = "\n".join(line for line in told if line not in result.library.notes)
         if lost:
             self.report({"WARNING"}, f"not in the list any more, so their takes are dropped: {', '.join(lost)}")
-        self.report({"INFO"}, f"{len(result.made) - len(lost)} players synthesized; press Bake to see them")
+        self.report({"INFO"}, f"players synthesized: {len(result.made) - len(lost)}; press Bake to see them")
 
 
 def quality(report: dict) -> str:

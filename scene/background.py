@@ -1,12 +1,11 @@
 """Long work in a thread, polled by whoever started it. Scripts and farms, which have no window, call the work itself.
 
-The thread sees plain values and arrays, never bpy. Each job has a number: when a newer job of its kind has started, or
-the user has cancelled, what it brings is dropped.
+The thread sees plain values and arrays, never bpy. When a newer job of its kind has started, or the user has cancelled,
+what a job brings is dropped.
 """
 
 from __future__ import annotations
 
-import itertools
 import queue
 import threading
 from typing import Any, Callable
@@ -15,7 +14,6 @@ from ..beyond_mocap.errors import Cancelled
 
 Work = Callable[[Callable[[float, str], None], Callable[[], bool]], Any]
 
-_numbers = itertools.count(1)
 _newest: dict[str, "Job"] = {}
 
 
@@ -29,7 +27,7 @@ class Job:
     def __init__(self, kind: str, work: Work):
         """Starts at once and takes the place of an older job of the same kind, which is cancelled."""
         stop(kind)
-        self.kind, self.number = kind, next(_numbers)
+        self.kind = kind
         self.fraction, self.text = 0.0, ""
         self.result, self.error = None, None
         self._stop, self._news = threading.Event(), queue.SimpleQueue()
