@@ -72,7 +72,7 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--method", choices=METHODS, default="path")
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
     verb.add_argument("--fps", type=_rate, default=30.0)
-    verb.add_argument("--seed", type=int, default=0, help="kept in the report; nothing is chosen at random today")
+    verb.add_argument("--seed", type=int, default=0, help="of the clustering that blocks and distance search in")
     verb.add_argument("--alpha", type=_share, default=0.2, help="words against continuity, 0 to 1; not for 'path'")
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
     verb.add_argument("--no-made", action="store_true", help="no made running where the track outruns the recordings")
@@ -190,7 +190,7 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     track, data = clean(read_track_csv(options.track))
     timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
     loaded = time.perf_counter()
-    library = _library(options, told)
+    library = _library(options, told, seed=options.seed)
     validate(timeline, library.words, float(track.times[0]), float(track.times[-1]), str(options.annotations))
     ready = time.perf_counter()
     plan = Plan(
@@ -298,12 +298,12 @@ def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     print(options.report)
 
 
-def _library(options, told: "Told", rebuild: bool = False):
+def _library(options, told: "Told", rebuild: bool = False, seed: int = 0):
     from .library.library import build
 
     return build(
         options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
-        progress=told.progress, cancelled=told.cancelled,
+        seed=seed, progress=told.progress, cancelled=told.cancelled,
     )
 
 

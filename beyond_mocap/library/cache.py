@@ -55,8 +55,8 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
     return elsewhere, f"{folder} cannot be written: its cache is kept in {elsewhere}"
 
 
-def save(place: Path, key: str, library, name: str = "library") -> None:
-    """Writes `library` as `place`/`name`.npz; a place that cannot be written is left alone."""
+def save(place: Path, key: str, library, name: str = "library") -> bool:
+    """Writes `library` as `place`/`name`.npz and says whether it could; a place that cannot be written is left alone."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     for length, clusters in library.clusters.items():
         for part in ("start", "label", "medoid"):
@@ -70,13 +70,15 @@ def save(place: Path, key: str, library, name: str = "library") -> None:
         place.mkdir(parents=True, exist_ok=True)
         handle, beside = tempfile.mkstemp(suffix=".part", dir=place)
     except OSError:
-        return
+        return False
     try:
         with os.fdopen(handle, "wb") as file:
             np.savez(file, **arrays)
         os.replace(beside, place / f"{name}.npz")
+        return True
     except OSError:
         Path(beside).unlink(missing_ok=True)
+        return False
 
 
 def _header(key: str, library) -> dict:

@@ -161,7 +161,9 @@ def build(
     notes: list[str] = [where] if where else []
     clips = _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled)
     built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
-    cache.save(place, key, built)
+    if not cache.save(place, key, built):
+        told = f"{place} cannot be written: the library is worked out anew each time; give --cache a folder of yours"
+        built = replace(built, notes=(*built.notes, told))
     report(1.0, "Library ready")
     return replace(built, kept=(place, key))
 

@@ -253,11 +253,3 @@ def leg_length(skeleton: Skeleton) -> float:
         for limb in (body.left, body.right)
     ]
     return float(np.mean(lengths))
-
-
-def rest_aligned(motion: Motion) -> np.ndarray:
-    """Local rotations (T, J, 4) of `motion` with the root's heading taken out, so that it faces +X in every frame."""
-    turn = quaternion.about_up(-heading(motion))
-    rotations = motion.rotations.copy()
-    rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])
-    return rotations

@@ -263,3 +263,10 @@ def test_a_failed_build_leaves_no_cache(folder):
     with pytest.raises(InputError):
         build(folder)
     assert not (folder / ".beyond_mocap").exists()
+
+
+def test_a_cache_that_cannot_be_written_is_told(folder, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    library = build(folder, cache_dir=blocked / "below", rebuild=True)
+    assert any("cannot be written" in note for note in library.notes)
