@@ -155,10 +155,12 @@ def run_library(options, told: "Told", writers: Mapping[str, Writer]) -> None:
 
 def summarize(library) -> dict:
     """What a library holds: clips, minutes, words, speeds, and the sentences that `library` prints."""
+    from .annotation import spoken
+
     own = [clip for clip in library.clips if not clip.mirrored]
     words = sorted(library.words)
     gaits = [{"word": g.word, "words": list(g.words), "speed_m_s": g.speed} for g in library.gaits]
-    keys = sorted({" ".join(sorted(key.words)) for key in library.keys})
+    keys = sorted({" ".join(spoken(key.words)) for key in library.keys})
     lines = [
         f"{library.folder}: {len(own)} clips (and their mirrors), {library.minutes:.1f} minutes, "
         f"{len(library.skeleton)} joints",

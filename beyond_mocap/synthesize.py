@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .annotation import spoken
 from .errors import InputError
 from .library.library import Library
 from .library.made import MADE_FOLDER
@@ -194,7 +195,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
     names = tuple(dict.fromkeys(clips[clip].path for clip in footage.clip))
     number = {name: i for i, name in enumerate(names)}
     words = tuple(
-        tuple(sorted(clips[clip].words_at(frame))) for clip, frame in zip(footage.clip, np.round(footage.clip_frame, 6))
+        spoken(clips[clip].words_at(frame)) for clip, frame in zip(footage.clip, np.round(footage.clip_frame, 6))
     )
     ball = None
     if np.any(np.isfinite(track.ball[:, :2])):
@@ -236,7 +237,7 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
     near = int(np.clip(round(at), 0, len(footage.clip) - 1))
     clip, shown = int(footage.clip[near]), float(footage.clip_frame[near])
     placed = next((p for p in edit.keys if p.wanted == number and p.clip == clip), None)
-    words = tuple(sorted(library.clips[clip].words_at(placed.clip_frame if placed else shown)))
+    words = spoken(library.clips[clip].words_at(placed.clip_frame if placed else shown))
     if placed is not None:
         inside = np.flatnonzero(footage.piece == footage.piece[near])
         if len(inside) > 1 and np.all(np.diff(footage.clip_frame[inside]) > 0):

@@ -13,6 +13,7 @@ The continuous list names dribble and turning without branches, and fall, fly an
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 
 _PACES: dict = {"standing": {}, "running": {}}
 
@@ -140,6 +141,20 @@ def _distance(asked: frozenset[str], choice: frozenset[str]) -> tuple[int, int, 
     kin = frozenset().union(*(relatives(word) for word in missing))
     weight = len(missing) + len(asked) * len(missing & actions)
     return weight, -len(kin & (choice - asked)), len(choice - asked)
+
+
+def spoken(words: Iterable[str]) -> tuple[str, ...]:
+    """The words in the order in which one says them: the action, the side, how, the gait, which way."""
+    return _spoken(frozenset(words))
+
+
+@lru_cache(maxsize=1024)
+def _spoken(words: frozenset[str]) -> tuple[str, ...]:
+    sides = [word for word in ("left", "right") if word in words]
+    ways = [word for word in ("front", "back") if word in words]
+    actions = [word for _, word in _in_tree_order(words & DISCRETE)]
+    rest = [word for _, word in _in_tree_order(words - DISCRETE - {*sides, *ways})]
+    return (*actions, *sides, *rest, *ways) if actions else (*rest, *ways, *sides)
 
 
 def _in_tree_order(words: frozenset[str]) -> list[tuple[int, str]]:

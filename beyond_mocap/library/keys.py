@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest
+from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
 
 # a foot meets the ball in all of these: where one is lacking, another shows at least the same contact
 _FOOT_ON_BALL = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"}, {"stomp"})
@@ -64,5 +64,5 @@ def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
 
 def nearest_words(keys: tuple[Key, ...], words, count: int = 3) -> tuple[str, ...]:
     """Word combinations of the library's key moments nearest to `words`, as text, best first."""
-    choices = sorted({tuple(sorted(key.words)) for key in keys})
+    choices = sorted({spoken(key.words) for key in keys})
     return tuple(" ".join(choice) for choice in nearest(tuple(words), choices, count))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, words_per_frame
+from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, spoken, words_per_frame
 from ..errors import NotInLibrary
 from ..library.keys import Key, nearest_serving, nearest_words, serving
 from ..library.library import Library
@@ -71,7 +71,7 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
         raise NotInLibrary(f"{text}; ask for one of these, add such a clip, or go on with the nearest (--nearest, in Blender Nearest Words)", offered)
     choices = nearest_serving(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].words
-    used = tuple(sorted(choices[0].words)) if choices else gait_words
+    used = spoken(choices[0].words) if choices else gait_words
     warnings.append(f"{text}; used instead: {' '.join(used) if choices else 'locomotion goes on there'}")
     return WantedKey(moment, frame, choices, used)
 

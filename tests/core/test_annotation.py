@@ -28,6 +28,7 @@ from beyond_mocap.annotation import (
     read_timeline,
     relatives,
     similar_words,
+    spoken,
     swap_sides,
     validate,
     vocabulary_words,
@@ -381,3 +382,9 @@ def test_the_scenarios_are_valid_and_what_the_recordings_lack_is_named(number):
     lacking = missing_keys(timeline, held)
     assert all(not set(key.words).isdisjoint({"receive", "slide", "header"}) for key, _ in lacking)
     assert all(len(offers) == 3 for _, offers in lacking)
+
+
+def test_words_are_told_as_one_says_them():
+    assert spoken({"low", "right", "front", "standing", "kick"}) == ("kick", "right", "standing", "low", "front")
+    assert spoken({"front", "walking"}) == ("walking", "front")
+    assert set(spoken({"mine", "header"})) == {"mine", "header"}

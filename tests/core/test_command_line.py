@@ -95,7 +95,7 @@ def test_the_library_is_told(run, clips_folder, library, tmp_path):
     lines = out.splitlines()
     assert "6 clips" in lines[0] and "0.5 minutes" in lines[0]
     assert "standing 0.0 m/s, walking 1.4 m/s, jogging 2.8 m/s, running 5.0 m/s" in out
-    assert "inside kick left low" in out and "inside kick low right" in out
+    assert "kick left inside low" in out and "kick right inside low" in out
     report = json.loads((tmp_path / "r.json").read_text())
     assert report["clips"] == 6 and len(report["gaits"]) == 4 and "kick" in report["words"]
 
