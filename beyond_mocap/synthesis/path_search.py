@@ -45,9 +45,9 @@ class Weights:
     speed: float = 1.0
     turn: float = 0.5
     facing: float = 0.1
-    words: float = 0.3
+    words: float = 0.6
     unasked: float = 0.5
-    made: float = 0.4
+    made: float = 0.2
     rate: float = 0.24
     switch: float = 0.1
     pose: float = 1.0
