@@ -19,6 +19,7 @@ import numpy as np
 
 from .annotation import spoken
 from .errors import InputError
+from .library.keys import Key
 from .library.library import Library
 from .library.made import MADE_FOLDER
 from .motion import quaternion
@@ -33,7 +34,7 @@ from .polish.smoothing import spread_rotations, spread_values
 from .polish.strike import Struck, Touch, strike
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
-from .synthesis.edit_list import EditList
+from .synthesis.edit_list import EditList, PlacedKey
 from .synthesis.footage import Footage, fetch
 from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
@@ -146,8 +147,7 @@ def _met(library, plan: Plan, order: Wanted, track: SampledTrack, edit: EditList
         placed = next((p for p in edit.keys if p.wanted == number), None)
         if placed is not None:
             result = _key_result(library, plan, order, edit, footage, number)
-            key = next(k for k in library.keys if (k.clip, k.frame) == (placed.clip, placed.clip_frame))
-            entry, leave = np.multiply(needed(library, key), plan.fps / library.fps)
+            entry, leave = np.multiply(needed(library, _key_of(library, placed)), plan.fps / library.fps)
             touches.append(Touch(result.frame, result.words, float(entry), float(leave)))
     known = plan.track.ball_height_known
     height = np.interp(track.times, plan.track.times, known.astype(float)) > 0.5
@@ -237,7 +237,7 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
     near = int(np.clip(round(at), 0, len(footage.clip) - 1))
     clip, shown = int(footage.clip[near]), float(footage.clip_frame[near])
     placed = next((p for p in edit.keys if p.wanted == number and p.clip == clip), None)
-    words = spoken(library.clips[clip].words_at(placed.clip_frame if placed else shown))
+    words = spoken(_key_of(library, placed).words if placed else library.clips[clip].words_at(shown))
     if placed is not None:
         inside = np.flatnonzero(footage.piece == footage.piece[near])
         if len(inside) > 1 and np.all(np.diff(footage.clip_frame[inside]) > 0):
@@ -248,12 +248,17 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
     return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
 
 
+def _key_of(library: Library, placed: PlacedKey) -> Key:
+    """The library's key moment that was placed."""
+    return next(key for key in library.keys if (key.clip, key.frame) == (placed.clip, placed.clip_frame))
+
+
 def _made_seconds(library: Library, plan: Plan, footage: Footage) -> list[str]:
     """How much of the take the made gait plays, told where it does."""
     made = np.array([clip.path.startswith(MADE_FOLDER) for clip in library.clips])[footage.clip]
     if not np.any(made):
         return []
     return [
-        f"{made.sum() / plan.fps:.1f} s ({made.mean():.0%}) are faster than the recordings and played by made running, "
-        "styled after the fastest of them"
+        f"{made.sum() / plan.fps:.1f} s ({made.mean():.0%}) are played by made running, styled after the fastest "
+        "recording: no recording has the speed that the track asks for there"
     ]

@@ -14,6 +14,9 @@ from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
 _FOOT_ON_BALL = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"}, {"stomp"})
 
 
+_SIDES = frozenset({"left", "right"})
+
+
 @dataclass(frozen=True)
 class Key:
     """A key moment of a clip: clip index, frame in the clip's own rate, first and last frame of its annotated row (the
@@ -27,13 +30,19 @@ class Key:
 
 
 def keys_of(clips) -> tuple[Key, ...]:
-    """Key moments of all clips, in their order. A key's words are those of every row that covers its frame."""
+    """Key moments of all clips, in their order. A key's words are its row's and those of every other row that covers its
+    frame, but for their sides: a kick with the right foot while the body turns left is no kick left."""
     found = []
     for index, clip in enumerate(clips):
         for row in clip.annotations:
             if row.key is not None:
-                found.append(Key(index, float(row.key), float(row.start), float(row.end), clip.words_at(row.key)))
+                found.append(Key(index, float(row.key), float(row.start), float(row.end), _key_words(clip, row)))
     return tuple(found)
+
+
+def _key_words(clip, row) -> frozenset[str]:
+    others = (other.words for other in clip.annotations if other is not row and other.start <= row.key <= other.end)
+    return frozenset(row.words) | (frozenset(word for words in others for word in words) - _SIDES)
 
 
 def serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:

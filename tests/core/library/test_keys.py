@@ -1,9 +1,12 @@
 """Which key moments can serve which words, and what stands in where none does."""
 
+import numpy as np
 import pytest
 
-from beyond_mocap.annotation import spoken
-from beyond_mocap.library.keys import Key, nearest_serving, nearest_words, serving
+from beyond_mocap.annotation import ClipAnnotation, spoken
+from beyond_mocap.library.keys import Key, keys_of, nearest_serving, nearest_words, serving
+from beyond_mocap.library.library import Clip
+from beyond_mocap.motion.gait import gait
 
 
 def key(words, clip=0):
@@ -88,3 +91,16 @@ def test_an_empty_library_of_keys():
 def test_nearest_words_are_offered_once_each():
     offered = nearest_words((*KICKS, *KICKS), ["kick", "low", "left"], 3)
     assert offered[0].split() == list(spoken(LEFT.words)) and len(set(offered)) == 3
+
+
+def test_the_side_of_another_row_is_not_the_kick_s():
+    """A right-footed kick while the body turns left: asked for a left kick, it must not answer."""
+    rows = (
+        ClipAnnotation(5, 15, 10, ("kick", "right", "low")),
+        ClipAnnotation(8, 20, None, ("turning", "left")),
+        ClipAnnotation(0, 20, None, ("walking", "front")),
+    )
+    motion = gait(1.4, 0.8, 30.0)
+    clip = Clip("made.bvh", False, motion, rows, np.zeros((len(motion), 2, 2), bool))
+    (found,) = keys_of((clip,))
+    assert found.words == {"kick", "right", "low", "turning", "walking", "front"}
