@@ -60,14 +60,18 @@ def _add_library_options(verb) -> None:
     verb.add_argument("--unit", type=_positive, metavar="METRES", help="metres per unit of the BVH files")
 
 
+def _add_take_files(verb) -> None:
+    verb.add_argument("--provenance", type=Path, metavar="P.csv")
+    verb.add_argument("--ball", type=Path, metavar="B.csv")
+
+
 def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb = verbs.add_parser("synthesize", help="one player's motion from a track, annotations and a library")
     verb.add_argument("--library", type=Path, required=True)
     verb.add_argument("--track", type=Path, required=True, metavar="T.csv")
     verb.add_argument("--annotations", type=Path, required=True, metavar="A.txt")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
-    verb.add_argument("--provenance", type=Path, metavar="P.csv")
-    verb.add_argument("--ball", type=Path, metavar="B.csv")
+    _add_take_files(verb)
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--method", choices=METHODS, default="path")
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
@@ -108,8 +112,7 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
     verb.add_argument("motion", type=Path, metavar="M.bvh")
     verb.add_argument("--track", type=Path, metavar="T.csv")
     verb.add_argument("--annotations", type=Path, metavar="A.txt")
-    verb.add_argument("--provenance", type=Path, metavar="P.csv")
-    verb.add_argument("--ball", type=Path, metavar="B.csv")
+    _add_take_files(verb)
     verb.add_argument("--library", type=Path)
     _add_library_options(verb)
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")

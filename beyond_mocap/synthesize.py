@@ -19,9 +19,7 @@ import numpy as np
 
 from .annotation import spoken
 from .errors import InputError
-from .library.keys import Key
 from .library.library import Library
-from .library.made import MADE_FOLDER
 from .motion import quaternion
 from .motion.humanoid import identify
 from .motion.motion import Motion, pose_kinematics
@@ -34,9 +32,9 @@ from .polish.smoothing import spread_rotations, spread_values
 from .polish.strike import Struck, Touch, strike
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
-from .synthesis.edit_list import EditList, PlacedKey
+from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, fetch
-from .synthesis.locomotion import match_distance
+from .synthesis.locomotion import match_distance, travelled_distance
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, needed, wanted
 from .take import BallPath, KeyResult, Take
@@ -81,21 +79,22 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Ta
     found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled)
     clock.append(time.perf_counter())
     report(0.8, "Constructing")
-    track = sample(plan.track, plan.fps)
+    track = order.track if plan.fps == library.fps else sample(plan.track, plan.fps)
     edit = exact_keys(library, found.edit, order)
     index = np.minimum(np.arange(len(track.times)) * (library.fps / plan.fps), len(edit) - 1)
     footage = fetch(library, edit, index, plan.fps)
+    keys = tuple(_key_result(library, plan, order, edit, footage, number) for number in range(len(order.keys)))
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
     planted = _polished(library, plan, track, footage, found, index)
     if plan.method == "path":
-        struck = _met(library, plan, order, track, edit, footage, planted)
+        struck = _met(library, plan, track, edit, footage, planted, keys)
         planted, track = replace(planted, root=struck.root, rotations=struck.rotations), replace(track, ball=struck.ball)
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     clock.append(time.perf_counter())
     seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
     report(1.0, "Done")
-    take = _take(library, plan, order, track, edit, footage, motion, seconds)
+    take = _take(library, plan, order, track, edit, footage, motion, keys, seconds)
     return replace(take, correction=planted.correction, ik_miss=planted.miss)
 
 
@@ -140,15 +139,13 @@ def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, i
     return angle, root_with_sway(place, footage.sway, angle)
 
 
-def _met(library, plan: Plan, order: Wanted, track: SampledTrack, edit: EditList, footage: Footage, planted) -> Struck:
+def _met(library, plan: Plan, track: SampledTrack, edit: EditList, footage: Footage, planted, keys) -> Struck:
     """The motion and the ball with the striking part of the body on the ball at every key moment that is played."""
     touches = []
-    for number in range(len(order.keys)):
-        placed = next((p for p in edit.keys if p.wanted == number), None)
-        if placed is not None:
-            result = _key_result(library, plan, order, edit, footage, number)
-            entry, leave = np.multiply(needed(library, _key_of(library, placed)), plan.fps / library.fps)
-            touches.append(Touch(result.frame, result.words, float(entry), float(leave)))
+    for placed in edit.keys:
+        result = keys[placed.wanted]
+        entry, leave = np.multiply(needed(library, placed.key), plan.fps / library.fps)
+        touches.append(Touch(result.frame, result.words, float(entry), float(leave)))
     known = plan.track.ball_height_known
     height = np.interp(track.times, plan.track.times, known.astype(float)) > 0.5
     return strike(
@@ -164,8 +161,7 @@ def along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray, np.nd
     the same path, the steps add up to the path itself. (As printed the difference points backwards.) Beyond the track's end
     the last direction is kept.
     """
-    step = np.linalg.norm(np.diff(track.positions, axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(step)]) + 1e-6 * np.arange(len(track.times))
+    way = travelled_distance(track) + 1e-6 * np.arange(len(track.times))
     place = np.stack([np.interp(travelled, way, track.positions[:, axis]) for axis in (0, 1)], axis=1)
     direction = np.interp(travelled, way, track.direction)
     beyond = np.maximum(travelled - way[-1], 0.0)[:, None]
@@ -190,7 +186,7 @@ def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
     return torso / np.maximum(np.linalg.norm(torso, axis=1, keepdims=True), 1e-9)
 
 
-def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage, motion, seconds) -> Take:
+def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage, motion, keys, seconds) -> Take:
     clips = library.clips
     names = tuple(dict.fromkeys(clips[clip].path for clip in footage.clip))
     number = {name: i for i, name in enumerate(names)}
@@ -211,7 +207,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         contacts=footage.standing.all(axis=2),
         seams=footage.seams,
         timeline=order.timeline,
-        keys=tuple(_key_result(library, plan, order, edit, footage, i) for i in range(len(order.keys))),
+        keys=keys,
         ball=ball,
         method=plan.method,
         seed=plan.seed,
@@ -236,26 +232,21 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
     at = key.frame * plan.fps / library.fps
     near = int(np.clip(round(at), 0, len(footage.clip) - 1))
     clip, shown = int(footage.clip[near]), float(footage.clip_frame[near])
-    placed = next((p for p in edit.keys if p.wanted == number and p.clip == clip), None)
-    words = spoken(_key_of(library, placed).words if placed else library.clips[clip].words_at(shown))
+    placed = next((p for p in edit.keys if p.wanted == number and p.key.clip == clip), None)
+    words = spoken(placed.key.words if placed else library.clips[clip].words_at(shown))
     if placed is not None:
         inside = np.flatnonzero(footage.piece == footage.piece[near])
         if len(inside) > 1 and np.all(np.diff(footage.clip_frame[inside]) > 0):
-            at = float(np.interp(placed.clip_frame, footage.clip_frame[inside], inside))
-        shown = placed.clip_frame
+            at = float(np.interp(placed.key.frame, footage.clip_frame[inside], inside))
+        shown = placed.key.frame
     source = library.clips[clip]
     instead = words if key.used_instead and not key.choices else key.used_instead
     return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
 
 
-def _key_of(library: Library, placed: PlacedKey) -> Key:
-    """The library's key moment that was placed."""
-    return next(key for key in library.keys if (key.clip, key.frame) == (placed.clip, placed.clip_frame))
-
-
 def _made_seconds(library: Library, plan: Plan, footage: Footage) -> list[str]:
     """How much of the take the made gait plays, told where it does."""
-    made = np.array([clip.path.startswith(MADE_FOLDER) for clip in library.clips])[footage.clip]
+    made = np.array([clip.made for clip in library.clips])[footage.clip]
     if not np.any(made):
         return []
     return [

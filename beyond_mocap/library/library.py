@@ -48,6 +48,11 @@ class Clip:
     standing: np.ndarray
 
     @property
+    def made(self) -> bool:
+        """Whether it is made running (`library.made`) and no recording."""
+        return self.path.startswith(MADE_FOLDER)
+
+    @property
     def contacts(self) -> np.ndarray:
         """(T, 2) bool: left and right foot flat on the ground."""
         return self.standing.all(axis=2)
@@ -170,8 +175,6 @@ def build(
 
 def _made(library: Library) -> Library:
     """The made gait for this library's skeleton and style, described like its recordings."""
-    from threadpoolctl import threadpool_limits
-
     clips = []
     for name, motion, words in made_clips(library.skeleton, _example(library), library.fastest):
         row = ClipAnnotation(0, len(motion) - 1, None, words)
@@ -179,10 +182,7 @@ def _made(library: Library) -> Library:
         clips += [clip, clip.twin()]
     if not clips:
         return replace(library, clips=())
-    vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
-    words_of = lambda clip, source: words_matrix(clip, source, vocabulary)  # noqa: E731
-    with threadpool_limits(limits=1):
-        frames = describe(library.skeleton, clips, words_of, vocabulary, library.fps, library.frames)
+    frames = _described(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
 
 
@@ -261,20 +261,25 @@ def _unit_notes(read) -> list[str]:
 
 def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
     """Features, words and clusters of `clips`."""
-    from threadpoolctl import threadpool_limits
-
     _check(cancelled)
     report(0.7, "Describing frames")
-    skeleton = clips[0].motion.skeleton
-    vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
-    with threadpool_limits(limits=1):  # with more, sums of products come out in another order
-        frames = describe(skeleton, clips, lambda clip, source: words_matrix(clip, source, vocabulary), vocabulary, FPS)
+    frames = _described(clips)
     clusters = {}
     for number, length in enumerate(BLOCK_LENGTHS):
         _check(cancelled)
         report(0.8 + 0.06 * number, f"Clustering blocks of {length} frames")
         clusters[length] = cluster_blocks(frames, length, seed)
-    return Library(folder, skeleton, clips, frames, clusters, FPS, notes)
+    return Library(folder, clips[0].motion.skeleton, clips, frames, clusters, FPS, notes)
+
+
+def _described(clips, like: Frames | None = None) -> Frames:
+    """Frames of `clips` with all words they carry, their features comparable with those of `like`."""
+    from threadpoolctl import threadpool_limits
+
+    vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
+    words_of = lambda clip, source: words_matrix(clip, source, vocabulary)  # noqa: E731
+    with threadpool_limits(limits=1):  # with more, sums of products come out in another order
+        return describe(clips[0].motion.skeleton, clips, words_of, vocabulary, FPS, like)
 
 
 def words_matrix(clip: Clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:
@@ -292,20 +297,19 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     """Speeds of the library's locomotion (Faustino §3.1.1): per gait word, distance over time of its most common rows.
 
     A gait without a direction in its words counts as well as one with; rows of key moments and dribbles do not count,
-    nor do made clips of a gait that is recorded, nor rows that a slower one would overtake in the mean (then the word is dropped, since thresholds need an order).
+    nor do made clips of a gait that is recorded, nor rows that a slower one would overtake in the mean (then the word is
+    dropped, since thresholds need an order).
     """
     seconds: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
     metres: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames
     step = np.linalg.norm(np.diff(frames.path, axis=0), axis=1)
-    clips = [clip for clip in library.clips if not clip.path.startswith(MADE_FOLDER)]
-    recorded = {word for clip in clips for row in clip.annotations for word in row.words}
+    recorded = {word for clip in library.clips if not clip.made for row in clip.annotations for word in row.words}
     for index, clip in enumerate(library.clips):
         first, rate = frames.first[index], library.fps / clip.motion.fps
-        made = clip.path.startswith(MADE_FOLDER)
         for row in () if clip.mirrored else clip.annotations:
             words = [word for word in row.words if word in seconds]
-            if made and recorded.intersection(words):
+            if clip.made and recorded.intersection(words):
                 continue
             if row.key is not None or len(words) != 1 or set(row.words) - {words[0]} - _DIRECTIONS:
                 continue

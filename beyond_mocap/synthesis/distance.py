@@ -10,15 +10,14 @@ from .blocks import FINEST, BlockSearch, Candidates
 from .edit_list import EditList, PlacedKey
 from .joints import edit_list
 from .locomotion import Section, travelled_distance
+from .wanted import pool_frame
 
 CATCH_UP_FRAMES = 60
 
 
 def placed_keys(search: BlockSearch) -> tuple[PlacedKey, ...]:
     """The key moments that the search's blocks show."""
-    return tuple(
-        PlacedKey(number, key.clip, key.frame) for _, (number, key) in sorted(search.key_in_slot.items())
-    )
+    return tuple(PlacedKey(*served) for _, served in sorted(search.key_in_slot.items()))
 
 
 def frames_of(blocks: Candidates) -> tuple[np.ndarray, np.ndarray]:
@@ -46,7 +45,7 @@ def warped_edit(search: BlockSearch, sections: list[Section], catching_up: bool)
     piece = np.zeros(len(source), int)
     piece[source.seams] = 1
     piece = np.cumsum(piece)
-    asked, own = travelled_distance(search.wanted), _own_distance(search.library, source)
+    asked, own = travelled_distance(search.wanted.track), _own_distance(search.library, source)
     shown, travelled, low = [], [], 0
     for section in sections:
         high = low + FINEST * len(section.blocks)
@@ -117,12 +116,12 @@ def _read_through(source: EditList, piece: np.ndarray, place: np.ndarray, keys) 
 def exact_keys(library: Library, edit: EditList, wanted) -> EditList:
     """The edit list with each key's piece shifted by the part of a frame that the search's grid left over."""
     frame = edit.frame.copy()
-    for key in edit.keys:
-        at = wanted.keys[key.wanted].frame
+    for placed in edit.keys:
+        at = wanted.keys[placed.wanted].frame
         low = next(piece for piece in edit.pieces if piece[0] <= int(round(at)) < piece[1])
         index = np.arange(*low)
         shown = np.interp(at, index, frame[index]) if len(index) > 1 else frame[index][0]
-        goal = library.frames.first[key.clip] + key.clip_frame * library.fps / library.clips[key.clip].motion.fps
-        if np.all(edit.clip[index] == key.clip) and abs(goal - shown) < 2.0:
+        goal = pool_frame(library, placed.key)
+        if np.all(edit.clip[index] == placed.key.clip) and abs(goal - shown) < 2.0:
             frame[index] += goal - shown
     return EditList(edit.clip, frame, edit.seams, edit.keys)

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..library.keys import Key
+
 
 @dataclass(frozen=True)
 class PlacedKey:
-    """Key moment number `wanted` is served by the library's clip `clip` at its own frame `clip_frame`."""
+    """Key moment number `wanted` of the order is served by `key` of the library."""
 
     wanted: int
-    clip: int
-    clip_frame: float
+    key: Key
 
 
 @dataclass(frozen=True, eq=False)

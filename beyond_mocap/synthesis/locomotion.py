@@ -19,6 +19,7 @@ import numpy as np
 
 from ..annotation import LOCOMOTION_WORDS
 from ..library.library import Library
+from ..motion.track import SampledTrack
 from .blocks import FINEST, BlockSearch, Candidates
 from .transition_cost import distances, windows
 from .wanted import Wanted
@@ -50,7 +51,7 @@ def split(wanted: Wanted, blocks: Candidates) -> list[Section]:
 def match_distance(search: BlockSearch, blocks: Candidates, delta: float) -> list[Section]:
     """Sections whose locomotion travels what the track does, each to within `delta` metres where cycles allow."""
     wanted, sections, travelled = search.wanted, [], 0.0
-    asked = travelled_distance(wanted)
+    asked = travelled_distance(wanted.track)
     for section in split(wanted, blocks):
         own = float(block_distances(search.library, section.blocks).sum())
         goal = float(asked[min(section.end * FINEST, len(asked) - 1)])
@@ -63,9 +64,9 @@ def match_distance(search: BlockSearch, blocks: Candidates, delta: float) -> lis
     return sections
 
 
-def travelled_distance(wanted: Wanted) -> np.ndarray:
+def travelled_distance(track: SampledTrack) -> np.ndarray:
     """(T,) metres along the smoothed track since its first frame."""
-    step = np.linalg.norm(np.diff(wanted.track.positions, axis=0), axis=1)
+    step = np.linalg.norm(np.diff(track.positions, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(step)])
 
 
@@ -147,7 +148,7 @@ def _cheapest_chain(search: BlockSearch, section: Section, blocks: Candidates, g
 def _words_by_distance(search: BlockSearch, section: Section, blocks: Candidates):
     """D of block l when `travelled` metres of the section lie behind: the words asked where the track has come as far (the
     paper's AA_d over travelled distance)."""
-    asked = travelled_distance(search.wanted)
+    asked = travelled_distance(search.wanted.track)
     low, high = section.first * FINEST, min(section.end * FINEST, len(asked))
     kinds = sorted({w for w in search.wanted.asked[low:high] if w is not None}, key=sorted)
     table = np.stack([search.annotation.of_blocks(blocks.start, [kind] * FINEST) for kind in kinds])

@@ -18,7 +18,6 @@ from ..annotation import DISCRETE
 from ..errors import Cancelled, InputError
 from ..library.keys import Key
 from ..library.library import Library
-from ..library.made import MADE_FOLDER
 from .annotation_cost import AnnotationCost
 from .edit_list import EditList, PlacedKey, find_seams
 from .wanted import Wanted, needed, pool_frame
@@ -95,7 +94,7 @@ class PathSearch:
         self.library, self.wanted, self.weights = library, wanted, weights
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
-        made = np.array([clip.path.startswith(MADE_FOLDER) for clip in library.clips])
+        made = np.array([clip.made for clip in library.clips])
         self.made = made[library.frames.clip]
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
         self.speed, self.turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
@@ -262,7 +261,7 @@ class PathSearch:
             clip[slot.first : slot.end] = states.clip[state]
             if slot.key:
                 key = slot.key[1][states.choice[state]]
-                keys.append(PlacedKey(slot.key[0], key.clip, key.frame))
+                keys.append(PlacedKey(slot.key[0], key))
             state = int(states.back[state])
         return EditList(clip, frame, find_seams(clip, frame), tuple(keys[::-1]))
 

@@ -48,8 +48,8 @@ def test_several_key_moments_each_at_its_own(library, order):
     assert [key.wanted for key in edit.keys] == [0, 1, 2]
     for placed in edit.keys:
         at = int(round(asked.keys[placed.wanted].frame))
-        assert edit.clip[at] == placed.clip
-        assert library.frames.source[int(edit.frame[at])] == pytest.approx(placed.clip_frame, abs=1.0)
+        assert edit.clip[at] == placed.key.clip
+        assert library.frames.source[int(edit.frame[at])] == pytest.approx(placed.key.frame, abs=1.0)
 
 
 def test_entry_and_exit_of_a_kick_are_played_whole(library, order):

@@ -34,7 +34,7 @@ def test_a_block_beyond_its_clip_travels_to_the_clip_s_end_only(library):
 
 
 def test_travelled_distance_of_the_track(order, track_of):
-    asked = travelled_distance(order(track=track_of(2.0, turn=0.5)))
+    asked = travelled_distance(order(track=track_of(2.0, turn=0.5)).track)
     assert asked[0] == 0.0 and asked[-1] == pytest.approx(16.0, abs=0.1) and np.all(np.diff(asked) >= 0)
 
 
@@ -58,7 +58,7 @@ def test_the_section_travels_what_the_track_does(library, order, track_of, found
     asked = order(track=track_of(asked_for, 8.0))
     search = BlockSearch(library, asked, 0.2)
     sections = match_distance(search, blocks_of(library, found, search.slots(FINEST)), delta)
-    goal = travelled_distance(asked)[-1]
+    goal = travelled_distance(asked.track)[-1]
     assert abs(total(library, asked, sections) - goal) <= delta + 0.1
 
 
@@ -94,7 +94,7 @@ def test_errors_do_not_add_up_over_sections(library, order, track_of):
     asked = order((2.0, "kick"), (4.0, "kick"), (6.0, "kick"), track=track_of(2.0, 8.0))
     search = BlockSearch(library, asked, 0.2)
     sections = match_distance(search, search.run(), 0.3)
-    way, travelled = travelled_distance(asked), 0.0
+    way, travelled = travelled_distance(asked.track), 0.0
     for section in sections:
         travelled += block_distances(library, section.blocks).sum()
         if section.locomotion and len(section.blocks) > 3:
@@ -112,14 +112,14 @@ def test_the_warped_motion_has_the_order_s_length_and_never_goes_back(library, o
     for low, high in edit.pieces:
         assert len(set(edit.clip[low:high])) == 1 and np.all(np.diff(edit.frame[low:high]) >= -1e-6)
     if catching_up and speed:
-        assert abs(travelled[-1] - travelled_distance(asked)[-1]) < 0.1
+        assert abs(travelled[-1] - travelled_distance(asked.track)[-1]) < 0.1
 
 
 def test_the_key_moment_stays_at_its_frame_when_the_rest_is_warped(library, order, track_of):
     asked = order((4.0, "kick right"), track=track_of(2.2, 8.0))
     search = BlockSearch(library, asked, 0.2)
     edit, _ = warped_edit(search, match_distance(search, search.run(), 0.5), True)
-    assert edit.clip[120] == edit.keys[0].clip
+    assert edit.clip[120] == edit.keys[0].key.clip
     assert np.interp(edit.frame[120], np.arange(len(library.frames)), library.frames.source) == pytest.approx(
-        edit.keys[0].clip_frame, abs=1e-6
+        edit.keys[0].key.frame, abs=1e-6
     )

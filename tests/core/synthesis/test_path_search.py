@@ -37,10 +37,10 @@ def test_a_key_moment_is_on_time(library, order, time):
     assert [key.wanted for key in edit.keys] == [0]
     at = asked.keys[0].frame
     near = int(round(at))
-    assert edit.clip[near] == edit.keys[0].clip
+    assert edit.clip[near] == edit.keys[0].key.clip
     step = edit.frame[near] + (at - near)
     assert np.interp(step, np.arange(len(library.frames)), library.frames.source) == pytest.approx(
-        edit.keys[0].clip_frame, abs=2.0
+        edit.keys[0].key.frame, abs=2.0
     )
 
 
