@@ -130,7 +130,7 @@ def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], f
             positions[:, 0],
             facing,
             path,
-            _turned(_gradient(path, fps), -facing),
+            quaternion.turned_level(_gradient(path, fps), -facing),
             raw_features(positions[:, joints], facing, fps).astype(np.float32),
             words_of(clip, source),
         )
@@ -166,11 +166,3 @@ def sampled_positions(motion, fps: float) -> tuple[np.ndarray, np.ndarray]:
     source = np.arange(count) * (motion.fps / fps)
     root, rotations = at_frames(motion, source)
     return source, pose_kinematics(motion.skeleton, root, rotations)[0]
-
-
-def _turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Ground vectors (T, 2) turned by `angle` (T,) radians."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.stack(
-        [cosine * vectors[:, 0] - sine * vectors[:, 1], sine * vectors[:, 0] + cosine * vectors[:, 1]], axis=1
-    )

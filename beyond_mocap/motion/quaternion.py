@@ -76,6 +76,13 @@ def about_up(angle: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
 
 
+def turned_level(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Vectors on the ground (..., 2) turned by `angle` (...,) radians about the world's up axis: (..., 2)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y = v[..., 0], v[..., 1]
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
 def from_rotation_vector(v: np.ndarray) -> np.ndarray:
     """The exponential map: rotation vectors (..., 3) in radians -> (..., 4)."""
     v = np.asarray(v, dtype=float)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import solveh_banded
 
+from ..motion import quaternion
 from ..motion.track import zero_phase_hann
 
 TURN_WEIGHT = 12.0
@@ -48,8 +49,7 @@ def _unwrapped(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:
 
 def root_with_sway(place: np.ndarray, sway: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """(T, 2) root on the ground: `place` (T, 2) plus sway (T, 2, in the facing frame) turned by facing `angle` (T,)."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return place + np.stack([cosine * sway[:, 0] - sine * sway[:, 1], sine * sway[:, 0] + cosine * sway[:, 1]], axis=1)
+    return place + quaternion.turned_level(sway, angle)
 
 
 def pulled_to_track(root: np.ndarray, track: np.ndarray, fps: float, rounds: int = 4) -> np.ndarray:
