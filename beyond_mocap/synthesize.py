@@ -19,6 +19,8 @@ import numpy as np
 
 from .annotation import spoken
 from .errors import InputError
+from .evaluation.give_way import give_way
+from .evaluation.played import played_from_take
 from .library.library import Library
 from .motion import quaternion
 from .motion.humanoid import identify
@@ -67,7 +69,8 @@ def synthesize(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled)
+        take = _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled)
+        return replace(take, warnings=(*take.warnings, *_gave_way(library, plan, take)))
 
 
 def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Take:
@@ -212,7 +215,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         method=plan.method,
         seed=plan.seed,
         seconds=seconds,
-        warnings=(*library.notes, *order.warnings, *_crowded_out(order, edit), *_made_seconds(library, plan, footage)),
+        warnings=(*library.notes, *order.warnings, *_crowded_out(order, edit)),
     )
 
 
@@ -244,12 +247,7 @@ def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, foo
     return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
 
 
-def _made_seconds(library: Library, plan: Plan, footage: Footage) -> list[str]:
-    """How much of the take the made gait plays, told where it does."""
-    made = np.array([clip.made for clip in library.clips])[footage.clip]
-    if not np.any(made):
-        return []
-    return [
-        f"{made.sum() / plan.fps:.1f} s ({made.mean():.0%}) are played by made running, styled after the fastest "
-        "recording: no recording has the speed that the track asks for there"
-    ]
+def _gave_way(library: Library, plan: Plan, take: Take) -> list[str]:
+    """What could not all hold, and when."""
+    played = played_from_take(take)
+    return give_way(played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss)

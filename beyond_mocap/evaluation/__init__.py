@@ -7,6 +7,7 @@
 - `words`      annotation similarity (Faustino §3.2.2 eq. 18)
 - `realism`    distance to the nearest recorded pose; the smoothness curve (Faustino App. D)
 - `moments`    what became of each key moment, and how near the striking surface was to the ball
+- `give_way`   what gave way, and at which seconds
 - `played`     what was played, from a take in memory or from files
 - `reference`  a library's own scores, once per library and rate
 - `view`, `figures`, `report`  the Report JSON, and reports side by side as a table

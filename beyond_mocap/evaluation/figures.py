@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..motion.contacts import floor_height
 from ..motion.track import sample
 from . import feet, jerk, pieces, realism, root, words
+from .give_way import give_way, jolts
 from .moments import Moment, ball_gap, ball_shift
 from .reference import source_poses
 from .view import View
@@ -217,17 +218,15 @@ def annotation_similarity(view: View) -> dict:
     }
 
 
-def coverage_warnings(view: View) -> list[str]:
-    """Names the seconds at which the track is faster than anything the library can play."""
-    if view.wanted is None or view.reference is None:
-        return []
-    fast = root.travel_speed(view.wanted, view.fps) > view.reference.fastest * 1.15
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], fast, [False]]).astype(np.int8)))
-    if not len(edges):
-        return []
-    times = view.played.start_time + edges / view.fps
-    spans = ", ".join(f"{start:.1f}-{end:.1f}" for start, end in zip(times[::2], times[1::2]))
-    return [f"the track is faster than the library's {view.reference.fastest:.1f} m/s x 1.15 at {spans} s"]
+def warnings(view: View, ik_miss: np.ndarray | None) -> list[str]:
+    """What gave way, and when."""
+    lines = give_way(view.played, track=view.track, timeline=view.timeline, library=view.library, ik_miss=ik_miss)
+    if view.reference is None:
+        return lines
+    hard = jerk.jerk(view.played.positions, view.fps)
+    ratios = jerk.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
+    told = jolts(view.played.times, view.seams, ratios)
+    return [*lines, told] if told else lines
 
 
 def _mean(values: np.ndarray) -> float:

@@ -8,6 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
+from ..library.library import Library
+from ..library.made import FPS as MADE_FPS
+from ..library.made import MADE_FOLDER
 from ..motion import contacts as foot_contacts
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, forward_kinematics
@@ -71,6 +74,22 @@ class Played:
     def feet(self) -> np.ndarray:
         """World positions (T, 2, 2, 3) m: side, (heel, toe)."""
         return self.positions[:, foot_joints(self.motion.skeleton)]
+
+    def stride(self, library: Library | None) -> np.ndarray:
+        """Source frames that pass per output frame at recorded speed, (T,); the usual step of clips whose own rate is not
+        known, as it is without a library."""
+        known = {} if library is None else {clip.path: clip.motion.fps for clip in library.clips}
+        rates = np.ones(len(self.clips) + 1)
+        for index, path in enumerate(self.clips):
+            fps = MADE_FPS if path.startswith(MADE_FOLDER) else known.get(path)
+            rates[index] = fps / self.motion.fps if fps else _usual_step(self.clip_frame, self.clip == index)
+        return rates[self.clip]
+
+
+def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
+    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
+    forward = steps[steps > 0]
+    return float(np.median(forward)) if len(forward) else 1.0
 
 
 def played_from_take(take: Take) -> Played:

@@ -29,7 +29,7 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
         played_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
-    warnings = [*take.warnings, *report["warnings"]]
+    warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
     return {**report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings}
 
 
@@ -61,7 +61,7 @@ def evaluate_played(
         **figures.seams_and_loops(view),
         **figures.poses(view),
         "annotation_similarity": figures.annotation_similarity(view),
-        "warnings": figures.coverage_warnings(view),
+        "warnings": figures.warnings(view, ik_miss),
     }
     return rounded(report)
 

@@ -25,7 +25,7 @@ class View:
         self.reference = None if library is None else library_reference(library, motion.fps)
         if library is not None and not motion.skeleton.same_bones(library.skeleton, 5e-3):
             raise InputError("motion", "another skeleton than the library's", "a motion made from this library")
-        self.stride = self._stride()
+        self.stride = played.stride(library)
         self.rows = self._rows()
         self.used = np.rint(self.rows[np.isfinite(self.rows)]).astype(int)
         self.seams = pieces.seams(*self.source)
@@ -42,23 +42,7 @@ class View:
         """A figure of the uncut recordings at the frames that were used: (U, ...), empty without library."""
         return np.zeros(0) if self.reference is None else getattr(self.reference, name)[self.used]
 
-    def _stride(self) -> np.ndarray:
-        """Source frames per output frame at recorded speed (T,); without a library the usual step of each clip."""
-        rates = np.ones(len(self.played.clips) + 1)
-        for index, path in enumerate(self.played.clips):
-            if self.reference is not None and path in self.reference.index:
-                rates[index] = self.reference.rate[self.reference.index[path]] / self.fps
-            else:
-                rates[index] = _usual_step(self.played.clip_frame, self.played.clip == index)
-        return rates[self.played.clip]
-
     def _rows(self) -> np.ndarray:
         if self.reference is None:
             return np.full(self.count, np.nan)
         return self.reference.rows(self.played.clips, self.played.clip, self.played.clip_frame)
-
-
-def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
-    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
-    forward = steps[steps > 0]
-    return float(np.median(forward)) if len(forward) else 1.0

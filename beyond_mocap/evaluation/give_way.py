@@ -1,0 +1,189 @@
+"""What gave way in a take, and at which seconds: the lines that `warnings` tells (../shared/metrics.md, "Where they cannot
+all hold": seconds, seam jerk, warp rate, skate, root error, key time, words, bones and ground).
+
+Every line is about one kind of thing and names its stretches. It is read off what was played, without the library's own
+figures, so that it costs a synthesis a few milliseconds; jolts at seams need those and are told by `jolts`, with the report.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..annotation import Timeline
+from ..library.library import Library
+from ..library.made import MADE_FOLDER
+from ..motion.track import Track
+from . import feet, jerk, root
+from .moments import Moment, ball_gap, moments
+from .pieces import played_rate, seams
+from .played import Played
+from .targets import KEY_TARGETS, TARGETS
+
+REACH = (TARGETS["warp_rate.min"].least, TARGETS["warp_rate.max"].most)
+OFF_TRACK = TARGETS["root_error_m.p95"].most
+SHORT_LEG = 0.005
+BELOW_GROUND = -TARGETS["ground_mm.min"].least / 1000.0
+OUT_OF_REACH = KEY_TARGETS["contact_gap_m"].most
+JOIN_SECONDS = 0.4
+MOST_STRETCHES = 6
+_TOLERANCE = 1e-3
+
+
+def give_way(
+    played: Played,
+    *,
+    track: Track | None = None,
+    timeline: Timeline | None = None,
+    library: Library | None = None,
+    ik_miss: np.ndarray | None = None,
+) -> list[str]:
+    """A line for each kind of thing that gave way in what was played, with its seconds on the track's clock.
+
+    track: the player's samples as measured; timeline: what was asked, for the key moments; library: what it was made
+    from, without made clips; ik_miss (T, 2) m: how far each leg was short of where its foot should stand. What is not
+    known is not told.
+    """
+    stride = played.stride(library)
+    source = played.clip, played.mirrored, played.clip_frame, stride
+    starts = seams(*source)
+    asked = moments(played, timeline.keys, stride, library) if timeline is not None else []
+    lines = [
+        _made_running(played),
+        _too_fast(played, track, library),
+        _warped(played, source, starts),
+        _sliding(played),
+        _short_legs(played, ik_miss),
+        _off_track(played, track),
+        _late(played, asked),
+        _out_of_reach(played, asked),
+        _below_ground(played),
+    ]
+    return [line for line in lines if line]
+
+
+def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> str | None:
+    """Seams that are harder than recordings are: times (T,) s, starts (S,) frames of seams, ratios (S,) of
+    `jerk.seam_ratios`; None where there is none."""
+    most = TARGETS["seam_jerk_ratio.max"].most
+    hard = ratios > most
+    if not np.any(hard):
+        return None
+    flags = np.zeros(len(times), bool)
+    for start in starts[hard]:
+        flags[max(start - jerk.REACH // 2, 0) : start + jerk.REACH // 2] = True
+    told = stretches(times, flags)
+    return f"{told}: cuts jolt up to {ratios[hard].max():.2f} times as hard as recordings of that speed ({most:g} wanted)"
+
+
+def stretches(times: np.ndarray, flags: np.ndarray) -> str:
+    """Where flags (T,) hold, as text: "4.2-6.0, 7.3 s". Stretches less than JOIN_SECONDS apart are one; of more than
+    MOST_STRETCHES the longest are named."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    first, last = times[edges[::2]], times[edges[1::2] - 1]
+    apart = np.flatnonzero(first[1:] - last[:-1] >= JOIN_SECONDS)
+    first, last = first[np.append(0, apart + 1)], last[np.append(apart, len(last) - 1)]
+    longest = np.sort(np.argsort(first - last, kind="stable")[:MOST_STRETCHES])
+    named = ", ".join(_span(first[i], last[i]) for i in longest)
+    left = len(first) - len(longest)
+    return f"{named} s" + (f" and {left} shorter" if left else "")
+
+
+def _span(first: float, last: float) -> str:
+    low, high = f"{first:.1f}", f"{last:.1f}"
+    return low if low == high else f"{low}-{high}"
+
+
+def _made(played: Played) -> np.ndarray:
+    """(T,) bool: frames of made running."""
+    table = np.array([path.startswith(MADE_FOLDER) for path in played.clips] + [False])
+    return table[played.clip]
+
+
+def _made_running(played: Played) -> str | None:
+    made = _made(played)
+    if not np.any(made):
+        return None
+    return (
+        f"{stretches(played.times, made)} ({np.sum(made) / played.motion.fps:.1f} s in all): made running, styled after the "
+        "fastest recording, since none has the speed that the track asks for"
+    )
+
+
+def _too_fast(played: Played, track: Track | None, library: Library | None) -> str | None:
+    """Recordings stretched to a speed that they have not, even within the limit of the warp."""
+    if track is None or library is None:
+        return None
+    speed = root.travel_speed(root.track_at(track, played.times), played.motion.fps)
+    fast = (speed > library.fastest * REACH[1]) & ~_made(played)
+    if not np.any(fast):
+        return None
+    return (
+        f"{stretches(played.times, fast)}: the track asks for up to {speed[fast].max():.1f} m/s, faster than the library's "
+        f"{library.fastest:.1f} m/s x {REACH[1]:g}: strides are stretched"
+    )
+
+
+def _warped(played: Played, source, starts: np.ndarray) -> str | None:
+    rate = played_rate(*source)
+    rate[starts - 1] = np.nan
+    beyond = np.append((rate < REACH[0] - _TOLERANCE) | (rate > REACH[1] + _TOLERANCE), False)
+    if not np.any(beyond):
+        return None
+    low, high = np.nanmin(rate), np.nanmax(rate)
+    return (
+        f"{stretches(played.times, beyond)}: clips are played at {low:.2f} to {high:.2f} times their recorded speed "
+        f"({REACH[0]:g} to {REACH[1]:g} wanted)"
+    )
+
+
+def _sliding(played: Played) -> str | None:
+    """Stances whose toe travels farther than eyes overlook."""
+    stances = feet.stances(played.contacts)
+    travel = feet.stance_travel(played.feet[:, :, 1], stances)
+    flags = np.zeros(len(played.motion), bool)
+    for first, end, _ in stances[travel > feet.NOTICED_SLIDE]:
+        flags[first:end] = True
+    if not np.any(flags):
+        return None
+    return f"{stretches(played.times, flags)}: a standing foot slides, by up to {100 * travel.max():.0f} cm"
+
+
+def _short_legs(played: Played, ik_miss: np.ndarray | None) -> str | None:
+    if ik_miss is None:
+        return None
+    miss = np.asarray(ik_miss).reshape(len(played.motion), -1).max(axis=1)
+    if not np.any(miss > SHORT_LEG):
+        return None
+    told = stretches(played.times, miss > SHORT_LEG)
+    return f"{told}: a leg cannot reach where its foot should stand and ends up to {100 * miss.max():.1f} cm short"
+
+
+def _off_track(played: Played, track: Track | None) -> str | None:
+    if track is None:
+        return None
+    error = root.root_error(played.pelvis, root.track_at(track, played.times), played.motion.fps)
+    if not np.any(error > OFF_TRACK):
+        return None
+    told = stretches(played.times, error > OFF_TRACK)
+    return f"{told}: the body is off the track, by up to {error.max():.2f} m"
+
+
+def _late(played: Played, asked: list[Moment]) -> str | None:
+    half = 0.5 / played.motion.fps + _TOLERANCE
+    late = [(moment.asked.time, moment.played_at - moment.asked.time) for moment in asked]
+    told = [f"{time:g} s by {error:+.2f} s" for time, error in late if np.isfinite(error) and abs(error) > half]
+    return f"key moments not at their time: {', '.join(told)}" if told else None
+
+
+def _out_of_reach(played: Played, asked: list[Moment]) -> str | None:
+    gaps = [(moment.asked.time, ball_gap(played, moment)) for moment in asked]
+    told = [f"{time:g} s by {gap:.2f} m" for time, gap in gaps if np.isfinite(gap) and gap > OUT_OF_REACH]
+    return f"the ball is out of the body's reach at key moments: {', '.join(told)}" if told else None
+
+
+def _below_ground(played: Played) -> str | None:
+    lowest = played.positions[..., 2].min(axis=1)
+    below = lowest < -BELOW_GROUND
+    if not np.any(below):
+        return None
+    return f"{stretches(played.times, below)}: the body goes into the ground, by up to {-100 * lowest.min():.1f} cm"
