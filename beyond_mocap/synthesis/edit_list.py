@@ -43,6 +43,22 @@ def find_seams(clip: np.ndarray, frame: np.ndarray, step: float = 1.5) -> np.nda
     return np.flatnonzero((np.diff(clip) != 0) | (jump > step) | (jump < 0.0)) + 1
 
 
+def replaced(
+    edit: EditList, first: int, end: int, clip: np.ndarray, frame: np.ndarray, keys: tuple[PlacedKey, ...]
+) -> EditList:
+    """The edit list with frames first .. end of clip (T,) and frame (T,) in their place, and `keys` beside its own.
+
+    Seams outside stay as they are; those inside and at both ends of the stretch are found anew.
+    """
+    inside = slice(first, end)
+    new_clip, new_frame = edit.clip.copy(), edit.frame.copy()
+    new_clip[inside], new_frame[inside] = clip[inside], frame[inside]
+    low, high = max(first - 1, 0), min(end + 1, len(edit))
+    found = find_seams(new_clip[low:high], new_frame[low:high]) + low
+    seams = np.concatenate([edit.seams[edit.seams < first], found, edit.seams[edit.seams > end]])
+    return EditList(new_clip, new_frame, seams, tuple(sorted((*edit.keys, *keys), key=lambda key: key.wanted)))
+
+
 def at_times(edit: EditList, index: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Clip (N,), frame (N,) and piece (N,) at fractional output frames `index` (N,), never mixing two pieces."""
     starts = np.array([low for low, _ in edit.pieces])

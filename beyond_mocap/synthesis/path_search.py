@@ -9,8 +9,9 @@ beam has to pass through one of these clips at exactly the asked time.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,18 +20,29 @@ from ..errors import Cancelled, InputError
 from ..library.keys import Key
 from ..library.library import Library
 from .annotation_cost import AnnotationCost
-from .edit_list import EditList, PlacedKey, find_seams
+from .edit_list import EditList, PlacedKey, find_seams, replaced
 from .wanted import Wanted, needed, pool_frame
 
 SLOT = 8
 SHORTEST = 6
 RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
 KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])
-BEAM = 64
-CANDIDATES = 1500
-LOOKED_AT = 30000
 MEMORY_SLOTS = 15
 BUCKET = 40
+
+
+@dataclass(frozen=True)
+class Width:
+    """How much a search looks at: `beam` states are kept of every slot; `candidates` pairs of library frame and rate are
+    weighed against them, the cheapest of the `looked_at` pairs nearest to the asked speed."""
+
+    beam: int = 64
+    candidates: int = 1500
+    looked_at: int = 30000
+
+
+NARROW = Width(beam=4, candidates=100, looked_at=2000)
+"""What is left when somebody waits for the end."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +79,16 @@ class Slot:
 
 
 @dataclass(frozen=True, eq=False)
+class Between:
+    """A stretch to be searched anew, frames first .. end of `edit` at the library's rate. What `edit` shows before and
+    behind stays: the search sets out from the one and pays for the way to the other."""
+
+    edit: EditList
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, eq=False)
 class States:
     """B ways to fill a slot: clip (B,), start (B,) library frame, rate (B,), cost (B,) of the best way here, back (B,)
     state of the slot before, choice (B,) of a key's clips or -1, recent (B, M) buckets shown lately."""
@@ -80,8 +102,57 @@ class States:
     recent: np.ndarray
 
 
+class Offer:
+    """What a library offers to a slot, whatever is asked: speed, turn and validity (R, N) of every frame at every rate,
+    the pairs in the order of their speed, and words by frame. Worked out once and kept as long as the library."""
+
+    _kept: weakref.WeakKeyDictionary[Library, dict[bytes, "Offer"]] = weakref.WeakKeyDictionary()
+
+    @classmethod
+    def of(cls, library: Library, allowed: np.ndarray) -> "Offer":
+        """The library's offer with the clips of `allowed` (C,) bool."""
+        kept = cls._kept.setdefault(library, {})
+        if allowed.tobytes() not in kept:
+            kept[allowed.tobytes()] = cls(library, allowed)
+        return kept[allowed.tobytes()]
+
+    def __init__(self, library: Library, allowed: np.ndarray):
+        """Works it all out; `of` does so only once."""
+        self.frames = library.frames
+        self.annotation = AnnotationCost(library.frames)
+        made = np.array([clip.made for clip in library.clips])
+        self.made = made[library.frames.clip]
+        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
+        self.speed, self.turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
+        self.valid = lasts & allowed[library.frames.clip]
+        usable = np.flatnonzero(self.valid)
+        self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
+        self.speeds = self.speed.ravel()[self.by_speed]
+        self.off_travel = np.abs(np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]))
+        self._missing: dict[frozenset[str], np.ndarray] = {}
+        self._other: dict[frozenset[str], np.ndarray] = {}
+
+    def missing_share(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) share of the words that each frame lacks."""
+        if words not in self._missing:
+            self._missing[words] = self.annotation.missing_share(words)
+        return self._missing[words]
+
+    def unasked(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) bool: frames that show an action (a kick, a jump) nobody asked for, or nothing that is annotated."""
+        if words not in self._other:
+            names = self.frames.vocabulary
+            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
+            self._other[words] = self.frames.words[:, actions].any(axis=1) | ~self.frames.words.any(axis=1)
+        return self._other[words]
+
+
 class PathSearch:
-    """One search; `run()` gives the edit list."""
+    """One search; `run()` gives the edit list.
+
+    between: search this stretch only and keep the rest. hurry: when it says so the rest is searched by a narrow beam, and
+    `hurried` is the frame from which on, else None; before the first slot is filled it ends the search as `cancelled` does.
+    """
 
     def __init__(
         self,
@@ -90,41 +161,64 @@ class PathSearch:
         weights: Weights = Weights(),
         progress: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
+        hurry: Callable[[], bool] | None = None,
+        between: Between | None = None,
     ):
-        self.library, self.wanted, self.weights = library, wanted, weights
+        self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
         self.frames = library.frames
-        self.annotation = AnnotationCost(library.frames)
-        made = np.array([clip.made for clip in library.clips])
-        self.made = made[library.frames.clip]
-        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
-        self.speed, self.turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
-        self.valid = lasts & wanted.allowed[library.frames.clip]
-        usable = np.flatnonzero(self.valid)
-        self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
-        self.speeds = self.speed.ravel()[self.by_speed]
-        self.off_travel = np.abs(np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]))
+        self.offer = Offer.of(library, wanted.allowed)
+        self.width, self.hurried = Width(), None
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
-        self._missing: dict[frozenset[str], np.ndarray] = {}
-        self._other: dict[frozenset[str], np.ndarray] = {}
+        self._hurry = hurry or (lambda: False)
 
     def run(self) -> EditList:
         """The cheapest way through all slots that the beam finds; InputError where no clip is as long as a slot."""
-        if not len(self.by_speed):
+        if not len(self.offer.by_speed):
             raise InputError(
                 self.library.folder or "library", f"no clip of more than {SLOT} frames at {self.library.fps:g} per second",
                 "clips of a second or more", "add longer recordings",
             )
-        slots = slots_between_keys(self.library, self.wanted)
+        first, end = (self.between.first, self.between.end) if self.between else (0, len(self.wanted))
+        slots = slots_between_keys(self.library, self.wanted, first, end)
+        before, last = self._arriving() if first > 0 else (None, None)
         layers: list[States] = []
         for number, slot in enumerate(slots):
-            if self._cancelled():
-                raise Cancelled("synthesis: cancelled")
+            self._stop_or_hurry(slot, number)
             self._report(number / len(slots), "Searching")
-            layers.append(self._layer(slot, layers[-1] if layers else None, slots[number - 1]))
+            before, last = self._layer(slot, before, last), slot
+            layers.append(before)
+        if end < len(self.wanted):
+            layers[-1] = self._leaving(layers[-1], slots[-1])
         return self._read(slots, layers)
 
-    def _layer(self, slot: Slot, before: States | None, last: Slot) -> States:
+    def _stop_or_hurry(self, slot: Slot, number: int) -> None:
+        if self._cancelled() or number == 0 and self._hurry():
+            raise Cancelled("synthesis: cancelled")
+        if self.hurried is None and self._hurry():
+            self.width, self.hurried = NARROW, slot.first
+
+    def _arriving(self) -> tuple[States, Slot]:
+        """The one state from which a stretch sets out, and its slot: the frame before, and what was shown up to there."""
+        first, edit = self.between.first, self.between.edit
+        at = np.array([first - 1])
+        shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
+        recent = self.offer.bucket[self._inside(shown)][None, :]
+        nothing = np.zeros(1, int)
+        state = States(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), nothing, nothing - 1, recent)
+        return state, Slot(first - 1, first)
+
+    def _leaving(self, states: States, last: Slot) -> States:
+        """The last states, with what it costs to come to the frame that stays behind the stretch."""
+        edit, at = self.between.edit, np.array([self.between.end])
+        ends = states.start + states.rate * len(last)
+        start, rate = edit.frame[at], _steps(edit, at)
+        cut = self._switch_costs(states, ends, start, rate)[:, 0]
+        same = (states.clip == edit.clip[at]) & (np.abs(ends - start) < 1e-6)
+        on = self.weights.rate_change * np.abs(states.rate - rate)
+        return replace(states, cost=states.cost + np.where(same, on, cut))
+
+    def _layer(self, slot: Slot, before: States | None, last: Slot | None) -> States:
         """The best states of one slot, given those of the slot before."""
         clip, start, rate, unary, choice = self._key_states(slot) if slot.key else self._free_states(slot)
         if before is None:
@@ -139,65 +233,66 @@ class PathSearch:
         return self._kept(before, *(np.concatenate(parts) for parts in zip(*options)))
 
     def _first(self, clip, start, rate, unary, choice) -> States:
-        best = np.argsort(unary, kind="stable")[:BEAM]
+        best = np.argsort(unary, kind="stable")[: self.width.beam]
         recent = np.full((len(best), MEMORY_SLOTS), -1)
-        recent[:, -1] = self.bucket[self._inside(start[best])]
+        recent[:, -1] = self.offer.bucket[self._inside(start[best])]
         back = np.zeros(len(best), int)
         return States(clip[best], start[best], rate[best], unary[best], back, choice[best], recent)
 
     def _kept(self, before: States, clip, start, rate, cost, back, choice) -> States:
-        """The BEAM cheapest, with their memory moved on by one slot."""
-        best = np.argsort(cost, kind="stable")[:BEAM]
+        """The cheapest, as many as the beam keeps, with their memory moved on by one slot."""
+        best = np.argsort(cost, kind="stable")[: self.width.beam]
         start, back = start[best], back[best]
         recent = np.roll(before.recent[back], -1, axis=1)
-        recent[:, -1] = self.bucket[self._inside(start)]
+        recent[:, -1] = self.offer.bucket[self._inside(start)]
         return States(clip[best], start, rate[best], cost[best], back, choice[best], recent)
 
     def _inside(self, frame: np.ndarray) -> np.ndarray:
         return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
 
     def _free_states(self, slot: Slot):
-        """The CANDIDATES cheapest pairs of library frame and rate for a slot without a key moment.
+        """The cheapest pairs of library frame and rate for a slot without a key moment.
 
-        Only the LOOKED_AT pairs nearest to the asked speed are looked at: the others' misfit in speed alone would put them
-        behind, and a large library is searched as fast as a small one.
+        Only the pairs nearest to the asked speed are looked at: the others' misfit in speed alone would put them behind,
+        and a large library is searched as fast as a small one.
         """
-        middle = int(np.searchsorted(self.speeds, self._asked(slot)[0]))
-        low = int(np.clip(middle - LOOKED_AT // 2, 0, max(0, len(self.by_speed) - LOOKED_AT)))
-        pairs = self.by_speed[low : low + LOOKED_AT]
+        many, looked_at = self.width.candidates, self.width.looked_at
+        middle = int(np.searchsorted(self.offer.speeds, self._asked(slot)[0]))
+        low = int(np.clip(middle - looked_at // 2, 0, max(0, len(self.offer.by_speed) - looked_at)))
+        pairs = self.offer.by_speed[low : low + looked_at]
         number, start = np.divmod(pairs, len(self.frames))
         cost = self._misfit(slot, number, start)
-        best = np.sort(np.argpartition(cost, CANDIDATES)[:CANDIDATES]) if len(cost) > CANDIDATES else np.arange(len(cost))
-        start, nothing = start[best], np.full(len(best), -1)
-        return self.frames.clip[start], start.astype(float), RATES[number[best]], cost[best], nothing
+        best = np.sort(np.argpartition(cost, many)[:many]) if len(cost) > many else np.arange(len(cost))
+        number, start, cost = number[best], start[best], cost[best]
+        states = self.frames.clip[start], start.astype(float), RATES[number], cost, np.full(len(cost), -1)
+        kept = self._as_before(slot)
+        return tuple(np.concatenate(pair) for pair in zip(states, kept)) if kept else states
+
+    def _as_before(self, slot: Slot):
+        """What the edit list shows in a slot of a stretch that is searched anew, as one more state, so that the search
+        may come back to it; None where it is cut there."""
+        if self.between is None or np.any((self.between.edit.seams > slot.first) & (self.between.edit.seams < slot.end)):
+            return None
+        edit, at = self.between.edit, np.array([slot.first])
+        rate = _steps(edit, at)
+        number = np.abs(RATES[:, None] - rate).argmin(axis=0)
+        cost = self._misfit(slot, number, self._inside(edit.frame[at]))
+        return edit.clip[at], edit.frame[at], rate, cost, np.full(1, -1)
 
     def _misfit(self, slot: Slot, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
         """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in a slot; inf where the clip
         ends before or may not be used."""
         wanted_speed, wanted_turn = self._asked(slot)
-        w, moving = self.weights, min(1.0, wanted_speed)
-        cost = w.speed * np.abs(self.speed[number, frame] - wanted_speed)
-        turn = self.turn[number, frame] * (len(slot) / SLOT)
+        w, moving, offer = self.weights, min(1.0, wanted_speed), self.offer
+        cost = w.speed * np.abs(offer.speed[number, frame] - wanted_speed)
+        turn = offer.turn[number, frame] * (len(slot) / SLOT)
         cost += w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
-        cost += w.facing * moving * self.off_travel[frame] + w.rate * np.abs(RATES[number] - 1.0)
+        cost += w.facing * moving * offer.off_travel[frame] + w.rate * np.abs(RATES[number] - 1.0)
         words = self.wanted.asked[(slot.first + slot.end) // 2]
         if words:
-            cost += w.words * self._missing_share(words)[frame]
-        cost += w.unasked * self._unasked(words or frozenset())[frame] + w.made * self.made[frame]
-        return np.where(self.valid[number, frame], cost, np.inf)
-
-    def _missing_share(self, words: frozenset[str]) -> np.ndarray:
-        if words not in self._missing:
-            self._missing[words] = self.annotation.missing_share(words)
-        return self._missing[words]
-
-    def _unasked(self, words: frozenset[str]) -> np.ndarray:
-        """(N,) bool: frames that show an action (a kick, a jump) nobody asked for, or nothing that is annotated."""
-        if words not in self._other:
-            names = self.frames.vocabulary
-            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
-            self._other[words] = self.frames.words[:, actions].any(axis=1) | ~self.frames.words.any(axis=1)
-        return self._other[words]
+            cost += w.words * offer.missing_share(words)[frame]
+        cost += w.unasked * offer.unasked(words or frozenset())[frame] + w.made * offer.made[frame]
+        return np.where(offer.valid[number, frame], cost, np.inf)
 
     def _asked(self, slot: Slot) -> tuple[float, float]:
         """Mean speed in m/s and change of direction in radians that the track asks over a slot."""
@@ -230,11 +325,11 @@ class PathSearch:
         square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
         cost = self.weights.switch + self.weights.pose * np.sqrt(np.maximum(square, 0.0))
         cost += self.weights.rate_change * np.abs(before.rate[:, None] - rate[None, :])
-        return cost + self.weights.replay * self._seen(before)[:, self.bucket[self._inside(start)]]
+        return cost + self.weights.replay * self._seen(before)[:, self.offer.bucket[self._inside(start)]]
 
     def _seen(self, before: States) -> np.ndarray:
         """(B, buckets) whether a state has lately shown a bucket of frames or its neighbours."""
-        seen = np.zeros((len(before.start), self.bucket[-1] + 3), bool)
+        seen = np.zeros((len(before.start), self.offer.bucket[-1] + 3), bool)
         row = np.arange(len(before.start))[:, None]
         for shift in (0, 1, 2):
             seen[row, np.maximum(before.recent + shift, 0)] = True
@@ -263,27 +358,40 @@ class PathSearch:
                 key = slot.key[1][states.choice[state]]
                 keys.append(PlacedKey(slot.key[0], key))
             state = int(states.back[state])
-        return EditList(clip, frame, find_seams(clip, frame), tuple(keys[::-1]))
+        keys = tuple(keys[::-1])
+        if self.between:
+            return replaced(self.between.edit, slots[0].first, slots[-1].end, clip, frame, keys)
+        return EditList(clip, frame, find_seams(clip, frame), keys)
 
 
-def slots_between_keys(library: Library, wanted: Wanted) -> list[Slot]:
-    """The output cut into slots: one per served key moment, as long as its clips' entry and exit, and slots of about
-    eight frames between. Key moments that crowd each other share the frames between them."""
-    served = [(number, key) for number, key in enumerate(wanted.keys) if key.choices]
-    edges = [0.0, *[(a[1].frame + b[1].frame) / 2 for a, b in zip(served, served[1:])], float(len(wanted))]
+def _steps(edit: EditList, at: np.ndarray) -> np.ndarray:
+    """(K,) library frames that an edit list goes on by at its frames `at` (K,), as played within their pieces."""
+    starts = np.array([low for low, _ in edit.pieces])
+    piece = np.searchsorted(starts, at, side="right") - 1
+    low, high = starts[piece], np.append(starts[1:], len(edit))[piece]
+    one = np.clip(at, low, np.maximum(high - 2, low))
+    return np.where(high - low > 1, edit.frame[np.minimum(one + 1, len(edit) - 1)] - edit.frame[one], 1.0)
+
+
+def slots_between_keys(library: Library, wanted: Wanted, first: int = 0, last: int | None = None) -> list[Slot]:
+    """Frames first .. last (all of them) cut into slots: one per served key moment there, as long as its clips' entry and
+    exit, and slots of about eight frames between. Key moments that crowd each other share the frames between them."""
+    last = len(wanted) if last is None else last
+    served = [(number, key) for number, key in enumerate(wanted.keys) if key.choices and first <= round(key.frame) < last]
+    edges = [float(first), *[(a[1].frame + b[1].frame) / 2 for a, b in zip(served, served[1:])], float(last)]
     slots: list[Slot] = []
-    reached = 0
+    reached = first
     for (number, key), low, high in zip(served, edges, edges[1:]):
         entry, leave = np.mean([needed(library, choice) for choice in key.choices], axis=0)
         at = int(round(key.frame))
         first = max(reached, min(at, int(np.ceil(max(low, key.frame - entry)))))
-        end = min(len(wanted), max(at + 1, int(min(high, key.frame + leave))))
+        end = min(last, max(at + 1, int(min(high, key.frame + leave))))
         # what is left beside a key moment is too short for a clip of its own: seams that close cannot be smoothed
         first = reached if first - reached < SHORTEST else first
-        end = len(wanted) if len(wanted) - end < SHORTEST else end
+        end = last if last - end < SHORTEST else end
         slots += _evenly(reached, first) + [Slot(first, end, (number, key.choices))]
         reached = end
-    return slots + _evenly(reached, len(wanted))
+    return slots + _evenly(reached, last)
 
 
 def _evenly(first: int, end: int) -> list[Slot]:

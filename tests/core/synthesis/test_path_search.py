@@ -1,12 +1,14 @@
 """The search over the whole track: whatever it weighs, it plays clips forward, on time, at the asked speed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from beyond_mocap.errors import Cancelled, InputError
 from beyond_mocap.library.library import build
 from beyond_mocap.plan import Plan
-from beyond_mocap.synthesis.path_search import PathSearch
+from beyond_mocap.synthesis.path_search import Between, PathSearch
 from beyond_mocap.synthesis.wanted import wanted
 
 
@@ -76,6 +78,43 @@ def test_it_can_be_stopped_and_tells_how_far_it_is(library, order):
     assert told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
     with pytest.raises(Cancelled):
         PathSearch(library, order(), cancelled=lambda: True).run()
+
+
+def test_a_stretch_is_searched_between_frames_that_stay(library, order):
+    before = found(library, order((4.0, "kick right")))
+    after = order((4.3, "kick right"))
+    edit = PathSearch(library, after, between=Between(replace(before, keys=()), 60, 180)).run()
+    outside = np.r_[0:60, 180:241]
+    assert np.array_equal(edit.clip[outside], before.clip[outside])
+    assert np.array_equal(edit.frame[outside], before.frame[outside])
+    assert [seam for seam in edit.seams if not 60 <= seam <= 180] == [s for s in before.seams if not 60 <= s <= 180]
+    key, = edit.keys
+    near = int(round(after.keys[0].frame))
+    assert edit.clip[near] == key.key.clip
+    assert source_frame(library, edit, near) == pytest.approx(key.key.frame, abs=1.0)
+    for low, high in edit.pieces:
+        assert len(set(edit.clip[low:high])) == 1 and np.all(np.diff(edit.frame[low:high]) > 0.6)
+
+
+def test_a_stretch_whose_order_is_the_same_is_joined_without_a_cut(library, order, track_of):
+    """A steady walk, cut nowhere: what is shown goes on, so coming back to it costs nothing and leaving it does."""
+    asked = order(track=track_of(1.4, seconds=4.0))
+    before = found(library, asked)
+    assert len(before.seams) == 0
+    edit = PathSearch(library, asked, between=Between(before, 40, 80)).run()
+    assert len(edit.seams) == 0 and np.allclose(edit.frame, before.frame)
+
+
+def test_in_a_hurry_the_rest_is_searched_quickly(library, order):
+    asked, told = order((6.0, "kick right")), []
+    search = PathSearch(library, asked, progress=lambda fraction, text: told.append(fraction), hurry=lambda: len(told) > 9)
+    edit = search.run()
+    whole = found(library, asked)
+    assert 70 < search.hurried < 100 and len(edit) == 241
+    assert search.width.beam < 10
+    assert [key.key.clip for key in edit.keys] == [key.key.clip for key in whole.keys]
+    with pytest.raises(Cancelled):
+        PathSearch(library, asked, hurry=lambda: True).run()
 
 
 def test_clips_shorter_than_a_slot_are_told(tmp_path, clip_file, track_of):
