@@ -25,6 +25,8 @@ PULL = 2e-4
 MOST_DROP = 0.10
 MOST_SHIFT = 0.25
 EASE = 0.012
+HOLD = 1e6
+"""Weight of a shift that is given: so much more than all else that it stays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +102,13 @@ def _held(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.nd
     return ground, weight
 
 
-def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0) -> np.ndarray:
+def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np.ndarray | None = None) -> np.ndarray:
     """The smooth shift D (T, K) that cancels velocities where they carry weight.
 
     velocity (T - 1, P, K) or, for one point, (T - 1, K): movement per frame of P points; weight (T, P): how firmly each
     point stands. Minimizes sum w |D' + v|^2 + SMOOTH |D'''|^2 + PULL |D|^2 with differences per frame at 30 frames per
-    second; `scale` is 30 over the rate, which keeps the balance at other rates.
+    second; `scale` is 30 over the rate, which keeps the balance at other rates. kept: (T, K) shifts that are given, rows of
+    NaN where D is free.
     """
     count = len(weight)
     if velocity.ndim == 2:
@@ -120,6 +123,10 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0) -> np.nd
     _add_differences(band, np.array([-1.0, 1.0]), total)
     _add_differences(band, np.array([-1.0, 3.0, -3.0, 1.0]), np.full(max(count - 3, 0), SMOOTH / scale**4))
     band[0] += PULL * scale**2
+    if kept is not None:
+        given = ~np.isnan(kept[:, 0])
+        band[0] += HOLD * given
+        right += HOLD * np.where(given[:, None], kept, 0.0)
     return solveh_banded(band, right, lower=True)
 
 

@@ -13,22 +13,31 @@ from ..motion import quaternion
 from ..motion.track import zero_phase_hann
 
 TURN_WEIGHT = 12.0
+HOLD = 1e6
+"""Weight of a facing that is given: so much more than all else that it stays."""
+
 ROOT_WINDOW = 1.5
 
 
-def facing(direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray) -> np.ndarray:
+def facing(
+    direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, kept: np.ndarray | None = None
+) -> np.ndarray:
     """(T,) facing in radians, unwrapped: the least squares compromise between travel and the recording's own turning.
 
     direction (T,) of travel on the track and speed (T,) m/s there; velocity (T, 2) m/s of the recording in its facing
     frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle to
     the direction of travel; where either stands still there is no such angle and the recording's turning decides alone.
-    Every term is quadratic, so the whole is one tridiagonal system.
+    Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the facing has to be, NaN where
+    it is free: what lies around a stretch that is made anew.
     """
     count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
     offset = np.arctan2(velocity[:, 1], velocity[:, 0])
-    goal = _unwrapped(direction - offset, turn)
+    goal = direction - offset
     trust = np.minimum(1.0, speed) ** 2 * np.minimum(1.0, own_speed) ** 2 + 1e-4
+    if kept is not None:
+        goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
+    goal = _unwrapped(goal, turn)
     diagonal = trust.copy()
     diagonal[1:] += TURN_WEIGHT
     diagonal[:-1] += TURN_WEIGHT

@@ -159,3 +159,13 @@ def test_the_shift_cancels_velocity_where_it_has_weight_and_is_gentle_elsewhere(
     assert np.allclose(np.diff(found)[22:37], -0.01, atol=1e-3) and np.allclose(np.diff(found)[62:77], -0.01, atol=1e-3)
     assert np.abs(np.diff(found, 3)).max() < 0.01 and np.abs(found).max() < 0.25
     assert np.allclose(shift(velocity, weight * 0.0), 0.0)
+
+
+def test_a_given_shift_is_reached_and_kept_while_the_foot_stands():
+    weight = np.zeros((60, 1))
+    weight[20:40] = 1.0
+    kept = np.full((60, 2), np.nan)
+    kept[:25] = [0.03, -0.01]
+    found = shift(np.zeros((59, 2)), weight, kept=kept)
+    assert np.allclose(found[:25], [0.03, -0.01], atol=1e-6)
+    assert np.abs(np.diff(found[25:40], axis=0)).max() < 5e-4 and np.abs(found[55:]).max() < 2e-3

@@ -55,6 +55,15 @@ def test_few_frames(count):
     assert np.allclose(found, 0.3, atol=1e-6)
 
 
+def test_a_given_facing_stays_and_the_rest_joins_it():
+    """One end is given a full turn further: the free middle takes the short way there."""
+    given = np.full(90, np.nan)
+    given[:20], given[70:] = 0.2, 0.5 + 2 * np.pi
+    found = facing(np.full(90, 0.3), np.full(90, 0.0), ahead(90), np.zeros(90), given)
+    assert np.allclose(found[:20], 0.2, atol=1e-6) and np.allclose(found[70:], 0.5, atol=1e-6)
+    assert np.all(np.diff(found[20:70]) > 0) and np.abs(np.diff(found)).max() < 0.02
+
+
 def test_sway_turns_with_the_body():
     sway = np.tile([0.1, 0.02], (3, 1))
     out = root_with_sway(np.array([[5.0, 5.0]] * 3), sway, np.array([0.0, np.pi / 2, np.pi]))
