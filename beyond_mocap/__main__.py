@@ -16,11 +16,12 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from . import __version__
 from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
-from .plan import METHODS
+from .plan import LIMITS, METHODS, Plan, gait_choices
 
 Writer = Callable[[object, Path], None]
 
@@ -77,13 +78,34 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
     verb.add_argument("--fps", type=_rate, default=30.0)
     verb.add_argument("--seed", type=int, default=0, help="of the clustering that blocks and distance search in")
-    verb.add_argument("--alpha", type=_share, default=0.2, help="words against continuity, 0 to 1; not for 'path'")
+    _add_settings(verb)
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
     verb.add_argument("--no-made", action="store_true", help="no made running where the track outruns the recordings")
     verb.add_argument("--nearest", action="store_true", help="go on with the nearest words that the library has")
     _add_library_options(verb)
     verb.set_defaults(run=run_synthesize)
     return verb
+
+
+def _add_settings(verb) -> None:
+    """The numbers of a plan, their defaults and limits its own."""
+    for name, unit, meaning in (
+        ("alpha", "SHARE", "words against continuity"),
+        ("delta", "METRES", "travelled distance that may stay wrong ('distance')"),
+        ("omega", "NUMBER", "between two gaits' speeds the faster gait begins at 1/omega of the way up"),
+        ("seam-window", "SECONDS", "over which the jump at a cut is spread"),
+        ("track-window", "SECONDS", "of the window that takes the jitter out of the track"),
+        ("root-window", "SECONDS", "of the window behind which the body is on the track ('path')"),
+    ):
+        field = name.replace("-", "_")
+        low, high = LIMITS[field]
+        of = partial(_between, low=low, high=high, expected=f"between {low:g} and {high:g}")
+        default = getattr(Plan, field)
+        verb.add_argument(f"--{name}", type=of, default=default, metavar=unit, help=f"{meaning}; default {default:g}")
+    verb.add_argument(
+        "--gait", action="append", default=[], metavar="WORD=CLIP",
+        help="the clip that stands for a gait, such as walking=folder/walk.bvh; once for each gait",
+    )
 
 
 def _add_mirror(verbs) -> argparse.ArgumentParser:
@@ -127,10 +149,6 @@ def _positive(text: str) -> float:
 
 def _rate(text: str) -> float:
     return _between(text, 1.0, 480.0, "1 to 480 frames per second")
-
-
-def _share(text: str) -> float:
-    return _between(text, 0.0, 1.0, "between 0 and 1")
 
 
 def _between(text: str, low: float, high: float, expected: str) -> float:
@@ -185,7 +203,6 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     from .files.tables import write_ball, write_provenance, write_report
     from .files.tracking import read_track_csv
     from .motion.track import clean
-    from .plan import Plan
     from .synthesize import synthesize
 
     begun = time.perf_counter()
@@ -201,7 +218,9 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     plan = Plan(
         track=track, timeline=timeline, library=str(options.library), method=options.method,
         catch_up=not options.no_catch_up, fps=options.fps, alpha=options.alpha, mirror=not options.no_mirror,
-        nearest=options.nearest, seed=options.seed, made=not options.no_made,
+        nearest=options.nearest, seed=options.seed, made=not options.no_made, delta=options.delta, omega=options.omega,
+        seam_window=options.seam_window, track_window=options.track_window, root_window=options.root_window,
+        gaits=gait_choices(options.gait),
     )
     try:
         take = synthesize(library, plan, told.progress, told.cancelled)

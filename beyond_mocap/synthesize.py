@@ -21,6 +21,7 @@ from .annotation import spoken
 from .errors import InputError
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
+from .library.chosen import with_chosen_gaits
 from .library.library import Library
 from .motion import quaternion
 from .motion.humanoid import identify
@@ -32,6 +33,7 @@ from .polish.joining import chained_facing, chained_root, torso_corrections
 from .polish.on_track import facing, pulled_to_track, root_with_sway
 from .polish.smoothing import spread_rotations, spread_values
 from .polish.strike import Struck, Touch, strike
+from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.edit_list import EditList
@@ -74,15 +76,16 @@ def synthesize(
 
 
 def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Take:
-    if plan.method == "path" and plan.made and sample(plan.track, library.fps).speed.max() > library.fastest:
+    if plan.method == "path" and plan.made and sample(plan.track, library.fps, plan.track_window).speed.max() > library.fastest:
         report(0.0, "Making faster gaits")
         library = library.extended
+    library = with_chosen_gaits(library, dict(plan.gaits))
     clock = [time.perf_counter()]
     order = wanted(library, plan)
     found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled)
     clock.append(time.perf_counter())
     report(0.8, "Constructing")
-    track = order.track if plan.fps == library.fps else sample(plan.track, plan.fps)
+    track = order.track if plan.fps == library.fps else sample(plan.track, plan.fps, plan.track_window)
     edit = exact_keys(library, found.edit, order)
     index = np.minimum(np.arange(len(track.times)) * (library.fps / plan.fps), len(edit) - 1)
     footage = fetch(library, edit, index, plan.fps)
@@ -103,7 +106,7 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Ta
 
 def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cancelled) -> Found:
     if plan.method == "path":
-        return Found(PathSearch(library, order, progress=report, cancelled=cancelled).run())
+        return Found(PathSearch(library, order, balanced(plan.alpha), report, cancelled).run())
     search = BlockSearch(library, order, plan.alpha, report, cancelled)
     blocks = search.run()
     if plan.method == "blocks":
@@ -113,9 +116,10 @@ def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cance
 
 def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index) -> Planted:
     """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand."""
-    pose = spread_rotations(footage.pose, footage.seams, footage.ahead_pose)
-    height = spread_values(footage.height, footage.seams, footage.ahead_height)
-    sway = spread_values(footage.sway, footage.seams, footage.ahead_sway)
+    reach = 0.5 * plan.seam_window * plan.fps
+    pose = spread_rotations(footage.pose, footage.seams, footage.ahead_pose, reach)
+    height = spread_values(footage.height, footage.seams, footage.ahead_height, reach)
+    sway = spread_values(footage.sway, footage.seams, footage.ahead_sway, reach)
     smooth = replace(footage, pose=pose, height=height, sway=sway)
     if plan.method == "blocks":
         angle, ground = _chained(library, footage, smooth, track, plan.fps)
@@ -134,7 +138,7 @@ def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, i
     if found.travelled is None:
         angle = facing(track.direction, track.speed, footage.velocity, footage.turn)
         root = root_with_sway(track.positions, footage.sway, angle)
-        return angle, pulled_to_track(root, track.raw, plan.fps)
+        return angle, pulled_to_track(root, track.raw, plan.fps, plan.root_window)
     travelled = np.interp(index, np.arange(len(found.travelled)), found.travelled)
     place, direction = along(track, travelled)
     speed = np.abs(np.gradient(travelled)) * plan.fps if len(travelled) > 1 else np.zeros(1)

@@ -27,7 +27,17 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
             body.prop(settings, "method")
             if settings.method == "distance":
                 body.prop(settings, "catch_up")
-            if settings.method != "path":  # which weighs words and continuity by its own measure
-                body.prop(settings, "alpha", slider=True)
             for name in ("mirror", "nearest", "rate"):
                 body.prop(settings, name)
+            self.fine_tuning(body, settings)
+
+    def fine_tuning(self, layout, settings):
+        """What seldom needs another value, closed at first."""
+        header, body = layout.panel("beyond_mocap_synthesis_tuning", default_closed=True)
+        header.label(text="Fine Tuning")
+        if not body:
+            return
+        body.prop(settings, "alpha", slider=True)
+        own = {"path": ("root_window", "made"), "distance": ("delta",)}.get(settings.method, ())
+        for name in ("omega", "gaits", "track_window", "seam_window", *own):
+            body.prop(settings, name)

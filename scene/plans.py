@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion.track import Track, clean
-from ..beyond_mocap.plan import Plan
+from ..beyond_mocap.plan import Plan, gait_choices
 from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 from .tracks import read_track
 
@@ -32,6 +32,13 @@ def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> tuple[P
         mirror=settings.mirror,
         nearest=settings.nearest,
         seed=settings.seed,
+        delta=settings.delta,
+        omega=settings.omega,
+        made=settings.made,
+        seam_window=settings.seam_window,
+        track_window=settings.track_window,
+        root_window=settings.root_window,
+        gaits=gait_choices(text for text in settings.gaits.split(";") if text.strip()),
     )
     return plan, found.warnings
 

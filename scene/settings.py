@@ -94,7 +94,35 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     alpha: FloatProperty(
         name="Word Weight", default=0.2, min=0.0, max=1.0,
-        description="Of Distance and Blocks: 0 looks only for smooth transitions, 1 only for the words asked for",
+        description="Words asked for against smooth transitions: 0 looks only for these, 1 only for the words",
+    )
+    delta: FloatProperty(
+        name="Distance Slack", default=0.5, min=0.0, max=100.0, unit="LENGTH", subtype="DISTANCE",
+        description="Of Distance: travelled distance of a stretch that may stay wrong before steps are added or left out",
+    )
+    omega: FloatProperty(
+        name="Gait Threshold", default=4.0, min=1.0, max=100.0, precision=1,
+        description="Between the speeds of two gaits the faster one begins at one part in so many of the way up",
+    )
+    seam_window: FloatProperty(
+        name="Cut Smoothing", default=0.8, min=0.0, max=4.0, precision=2, unit="TIME_ABSOLUTE",
+        description="Time over which the jump at a cut between two clips is spread",
+    )
+    track_window: FloatProperty(
+        name="Track Smoothing", default=1.2, min=0.2, max=5.0, precision=2, unit="TIME_ABSOLUTE",
+        description="Window that takes the jitter out of the track",
+    )
+    root_window: FloatProperty(
+        name="Sway Kept", default=1.5, min=0.2, max=5.0, precision=2, unit="TIME_ABSOLUTE",
+        description="Of On the path: the body is on the track when both are seen through this window; shorter keeps less sway",
+    )
+    gaits: StringProperty(
+        name="Gait Clips",
+        description="Which clip stands for which gait, where you choose: walking=folder/walk.bvh; jogging=folder/jog.bvh",
+    )
+    made: BoolProperty(
+        name="Made Running", default=True,
+        description="Of On the path: make running where the track is faster than any recording",
     )
     mirror: BoolProperty(
         name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged"

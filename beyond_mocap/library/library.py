@@ -79,7 +79,8 @@ class Gait:
 @dataclass(frozen=True, eq=False)
 class Library:
     """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was decided;
-    kept: where its cache is and under which key, for what is worked out later."""
+    kept: where its cache is and under which key, for what is worked out later; chosen: which clip stands for which gait,
+    (word, path) pairs (`library.chosen`)."""
 
     folder: str
     skeleton: Skeleton
@@ -89,6 +90,7 @@ class Library:
     fps: float = FPS
     notes: tuple[str, ...] = ()
     kept: tuple[Path, str] | None = None
+    chosen: tuple[tuple[str, str], ...] = ()
 
     @cached_property
     def keys(self) -> tuple[Key, ...]:
@@ -297,25 +299,24 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     """Speeds of the library's locomotion (Faustino §3.1.1): per gait word, distance over time of its most common rows.
 
     A gait without a direction in its words counts as well as one with; rows of key moments and dribbles do not count,
-    nor do made clips of a gait that is recorded, nor rows that a slower one would overtake in the mean (then the word is
-    dropped, since thresholds need an order).
+    nor do made clips of a gait that is recorded, nor other clips than the chosen one, nor rows that a slower one would
+    overtake in the mean (then the word is dropped, since thresholds need an order).
     """
     seconds: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
     metres: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames
     step = np.linalg.norm(np.diff(frames.path, axis=0), axis=1)
+    chosen = dict(library.chosen)
     recorded = {word for clip in library.clips if not clip.made for row in clip.annotations for word in row.words}
     for index, clip in enumerate(library.clips):
         first, rate = frames.first[index], library.fps / clip.motion.fps
         for row in () if clip.mirrored else clip.annotations:
-            words = [word for word in row.words if word in seconds]
-            if clip.made and recorded.intersection(words):
-                continue
-            if row.key is not None or len(words) != 1 or set(row.words) - {words[0]} - _DIRECTIONS:
+            word = gait_word(row)
+            if word is None or (clip.made and word in recorded) or chosen.get(word, clip.path) != clip.path:
                 continue
             low, high = first + int(np.ceil(row.start * rate)), first + int(row.end * rate)
-            seconds[words[0]][row.words] += (row.end - row.start) / clip.motion.fps
-            metres[words[0]][row.words] += float(step[low:high].sum())
+            seconds[word][row.words] += (row.end - row.start) / clip.motion.fps
+            metres[word][row.words] += float(step[low:high].sum())
     found = []
     for word, times in seconds.items():
         if times:
@@ -328,6 +329,13 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
         )
     ordered = [gait for i, gait in enumerate(found) if all(gait.speed > other.speed for other in found[:i])]
     return tuple(ordered)
+
+
+def gait_word(row: ClipAnnotation) -> str | None:
+    """The gait that a row shows and nothing else, but for a direction; None of a key moment, an action or a dribble."""
+    words = [word for word in row.words if word in LOCOMOTION]
+    alone = row.key is None and len(words) == 1 and not set(row.words) - {words[0]} - _DIRECTIONS
+    return words[0] if alone else None
 
 
 _DIRECTIONS = frozenset({"front", "back", "left", "right"})

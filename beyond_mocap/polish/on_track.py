@@ -61,11 +61,13 @@ def root_with_sway(place: np.ndarray, sway: np.ndarray, angle: np.ndarray) -> np
     return place + quaternion.turned_level(sway, angle)
 
 
-def pulled_to_track(root: np.ndarray, track: np.ndarray, fps: float, rounds: int = 4) -> np.ndarray:
-    """(T, 2) root without what drifts slowly from the track (T, 2): the difference of the two, both seen through a 1.5 s
-    Hann window (../shared/metrics.md, root error), is removed `rounds` times; once would leave a third of it, since the
+def pulled_to_track(
+    root: np.ndarray, track: np.ndarray, fps: float, window: float = ROOT_WINDOW, rounds: int = 4
+) -> np.ndarray:
+    """(T, 2) root without what drifts slowly from the track (T, 2): the difference of the two, both seen through a
+    Hann window of `window` seconds (../shared/metrics.md, root error), is removed `rounds` times; once would leave a third of it, since the
     window is not sharp."""
-    smooth = zero_phase_hann(track, fps, ROOT_WINDOW)
+    smooth = zero_phase_hann(track, fps, window)
     for _ in range(rounds):
-        root = root - (zero_phase_hann(root, fps, ROOT_WINDOW) - smooth)
+        root = root - (zero_phase_hann(root, fps, window) - smooth)
     return root

@@ -46,7 +46,7 @@ class Wanted:
 
 def wanted(library: Library, plan: Plan) -> Wanted:
     """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless plan.nearest)."""
-    track = sample(plan.track, library.fps)
+    track = sample(plan.track, library.fps, plan.track_window)
     gaits = library.gaits
     gait = automatic_gaits(track.speed, library.fps, np.array([g.speed for g in gaits]), plan.omega)
     timeline = fill(plan.timeline, track.times, [gaits[g].words for g in gait])

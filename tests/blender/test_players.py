@@ -95,6 +95,23 @@ def test_words_of_a_text_count_more_than_those_on_disk(extension, ready, core):
         bpy.ops.beyond_mocap.synthesize()
 
 
+def test_what_the_panel_lets_one_set_is_what_the_plan_asks(extension, ready, core):
+    plans = importlib.import_module(f"{extension.__name__}.scene.plans")
+    player = ready.players[0]
+    plain, planned = plans.plan_of(ready, player)[0], core("plan").Plan
+    numbers = {"alpha": 0.5, "delta": 0.25, "omega": 3.0, "seam_window": 0.5, "track_window": 1.5, "root_window": 1.0}
+    for name, value in numbers.items():
+        assert getattr(plain, name) == pytest.approx(getattr(planned, name))
+        setattr(ready, name, value)
+    ready.made, ready.gaits = False, "walking = walk.bvh; jogging=jog.bvh;"
+    plan = plans.plan_of(ready, player)[0]
+    assert {name: getattr(plan, name) for name in numbers} == pytest.approx(numbers)
+    assert plain.made and not plan.made and plan.gaits == (("walking", "walk.bvh"), ("jogging", "jog.bvh"))
+    ready.gaits = "walking"
+    with pytest.raises(RuntimeError, match="WORD=CLIP"):
+        bpy.ops.beyond_mocap.synthesize()
+
+
 def test_the_whole_road(extension, ready, core, session):
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = 24, 1.001

@@ -7,11 +7,12 @@
 
 from .cleaning import FASTEST, DataReport, clean
 from .data import BALL_RADIUS, SampledTrack, Track
-from .sampling import sample, smoothed, travel_direction, zero_phase_hann
+from .sampling import SMOOTHING_SECONDS, sample, smoothed, travel_direction, zero_phase_hann
 
 __all__ = [
     "BALL_RADIUS",
     "FASTEST",
+    "SMOOTHING_SECONDS",
     "DataReport",
     "SampledTrack",
     "Track",

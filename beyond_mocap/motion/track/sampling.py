@@ -23,15 +23,16 @@ _TURN_SECONDS = 0.5
 _LONGEST = 6 * 3600.0
 
 
-def sample(track: Track, fps: float) -> SampledTrack:
+def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> SampledTrack:
     """`track` (cleaned) at `fps` frames per second: floor(duration * fps) + 1 frames from its first time on.
 
+    window: seconds of `smoothed`.
     The ball is interpolated linearly, held before its first and after its last sample, and lies no lower than its
     radius, which is also its height where the feed has none. InputError where there are fewer than two measured
     samples.
     """
     times, fine, step = _grids(track, fps)
-    positions = smoothed(_linear(fine, track.times, track.positions), fps * step)[::step]
+    positions = smoothed(_linear(fine, track.times, track.positions), fps * step, window)[::step]
     measured = track.measured
     velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2) if len(times) > 2 else _chord(positions, fps)
     speed = np.linalg.norm(velocity, axis=1)
@@ -50,7 +51,7 @@ def sample(track: Track, fps: float) -> SampledTrack:
     )
 
 
-def smoothed(positions: np.ndarray, fps: float) -> np.ndarray:
+def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECONDS) -> np.ndarray:
     """Positions (T, k) at `fps` without the feed's jitter: a Hann window of 1.2 s, its bias put back twice.
 
     One pass of a window pulls curves inward by half its variance times the acceleration (0.037 s^2 for 1.5 s: 15 cm at
@@ -60,9 +61,9 @@ def smoothed(positions: np.ndarray, fps: float) -> np.ndarray:
     0.18 / 0.5 cm and jerk 10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The
     window also has an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
     """
-    out = zero_phase_hann(positions, fps, SMOOTHING_SECONDS)
+    out = zero_phase_hann(positions, fps, window)
     for _ in range(2):
-        out = out + zero_phase_hann(positions - out, fps, SMOOTHING_SECONDS)
+        out = out + zero_phase_hann(positions - out, fps, window)
     return out
 
 
