@@ -1,0 +1,207 @@
+"""A quick look at a take without Blender: its body, shadow and ball, frame by frame, in one picture.
+
+    python sample_blend/look.py TAKE.bvh --out sheet.png --ball ball.csv --provenance p.csv --from 8.5 --to 10 --every 0.1
+
+The lines on the grass are half a metre apart and stay where they are, so a foot that slides is seen to slide; what is
+more than 1 cm below the grass is drawn in magenta. `--camera follow` stays beside the player, `fixed` stands still and
+sees the whole way, `strobe` puts all moments into one picture. Needs numpy and Pillow.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from beyond_mocap.errors import InputError  # noqa: E402
+from beyond_mocap.files import bvh  # noqa: E402
+from beyond_mocap.files.tables import read_ball, read_provenance  # noqa: E402
+from beyond_mocap.motion.body import deformed, low_poly_body  # noqa: E402
+from beyond_mocap.motion.motion import Motion, at_frames, pose_kinematics  # noqa: E402
+
+COLOURS = np.array([(190, 140, 110), (200, 40, 35), (235, 235, 230), (40, 60, 150), (30, 30, 34), (40, 28, 22)], float)
+GRASS, LINE, SHADOW, SKY, BALL = (96, 140, 84), (134, 178, 118), (60, 92, 52), (200, 216, 232), (250, 250, 245)
+BELOW = (255, 0, 255)
+SUN = np.array([0.35, -0.45, 0.82])
+BALL_RADIUS = 0.11
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera at `eye` (3,) m that looks at `at` (3,) m, `size` pixels square, `wide` metres across at that distance."""
+
+    eye: np.ndarray
+    at: np.ndarray
+    size: int
+    wide: float
+
+    def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pixels (..., 2) and depth (...,) m of points (..., 3) m."""
+        ahead = self.at - self.eye
+        far = np.linalg.norm(ahead)
+        ahead = ahead / far
+        right = np.cross(ahead, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        seen = (points - self.eye) @ np.stack([right, -np.cross(right, ahead), ahead], axis=1)
+        depth = np.maximum(seen[..., 2], 0.05)
+        return self.size * (0.5 + seen[..., :2] / depth[..., None] * far / self.wide), seen[..., 2]
+
+
+def picture(view: View, skins, body, balls):
+    """One picture (Pillow) of bodies `skins` (N, V, 3) m and `balls` (N, 3) m, NaN rows for none."""
+    from PIL import Image, ImageDraw
+
+    image = Image.new("RGB", (view.size, view.size), GRASS)
+    draw = ImageDraw.Draw(image)
+    _grid(draw, view)
+    balls = np.asarray(balls, dtype=float).reshape(-1, 3)
+    balls = balls[np.isfinite(balls).all(axis=1)]
+    quads = np.array([face if len(face) == 4 else (*face, face[-1]) for face in body.faces])
+    for skin in skins:
+        flat, _ = view(_on_grass(skin))
+        for corners in flat[quads]:
+            draw.polygon(list(map(tuple, corners)), fill=SHADOW)
+    for centre in balls:
+        _disc(draw, view, _on_grass(centre), SHADOW, 0.4)
+    for skin in sorted(skins, key=lambda skin: -np.linalg.norm(skin.mean(axis=0) - view.eye)):
+        _body(draw, view, skin, quads, body.material, balls)
+    return image
+
+
+def _body(draw, view: View, skin, quads, material, balls) -> None:
+    """The faces of one body and the balls (N, 3) m, the far ones first."""
+    flat, depth = view(skin)
+    corners = skin[quads]
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    light = 0.5 + 0.5 * np.clip(normal @ SUN, -0.4, 1.0)
+    colour = (COLOURS[material] * light[:, None]).astype(int)
+    colour[corners[..., 2].mean(axis=1) < -0.01] = BELOW
+    seen = np.flatnonzero(np.sum(normal * (view.eye - corners[:, 0]), axis=1) > 0)
+    far = np.concatenate([depth[quads[seen]].mean(axis=1), view(balls)[1]])
+    for item in np.argsort(-far):
+        if item < len(seen):
+            draw.polygon(list(map(tuple, flat[quads[seen[item]]])), fill=tuple(colour[seen[item]]))
+        else:
+            _disc(draw, view, balls[item - len(seen)], BALL, 1.0)
+
+
+def _on_grass(points: np.ndarray) -> np.ndarray:
+    """Where the sun throws points (..., 3) onto the ground."""
+    return points - np.maximum(points[..., 2:], 0.0) * SUN / SUN[2] * [1.0, 1.0, 1.0]
+
+
+def _disc(draw, view: View, centre, colour, flat: float) -> None:
+    (x, y), depth = view(centre)
+    if depth > 0.1:
+        r = view.size * BALL_RADIUS / depth * np.linalg.norm(view.at - view.eye) / view.wide
+        draw.ellipse([x - r, y - flat * r, x + r, y + flat * r], fill=colour, outline=(90, 90, 90))
+
+
+def _grid(draw, view: View, step: float = 0.5) -> None:
+    """The sky, and lines on the grass around what the camera looks at; every second metre is brighter."""
+    reach = min(3.0 * view.wide, 60.0)
+    middle = np.round(view.at[:2] / step) * step
+    for axis in (0, 1):
+        for offset in np.arange(-reach, reach + step, step):
+            ends = np.zeros((2, 3))
+            ends[:, axis] = middle[axis] + offset
+            ends[:, 1 - axis] = middle[1 - axis] + np.array([-reach, reach])
+            points = ends[0] + np.linspace(0.0, 1.0, 60)[:, None] * (ends[1] - ends[0])
+            flat, depth = view(points)
+            bright = abs(ends[0, axis] / 2.0 - round(ends[0, axis] / 2.0)) < 1e-6
+            row = [tuple(p) for p, far in zip(flat, depth) if far > 0.3]
+            if len(row) > 1:
+                draw.line(row, fill=(230, 240, 225) if bright else LINE, width=1)
+    horizon = view(view.eye + 1e4 * (view.at - view.eye) * [1, 1, 0])[0][1]
+    if horizon > 0:
+        draw.rectangle([0, 0, view.size, horizon], fill=SKY)
+
+
+def sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220, wide=2.2):
+    """Writes the contact sheet of `frames` (N,) to `out`. side: degrees from +x at which the camera stands; ball:
+    (N, 3) m or None; labels: N texts or None; wide: metres across a tile of the following camera."""
+    from PIL import Image, ImageDraw
+
+    frames = np.asarray(frames, dtype=float)
+    body = low_poly_body(motion.skeleton, example=motion)
+    root, local = at_frames(motion, frames)
+    skins = deformed(body, motion.skeleton, *pose_kinematics(motion.skeleton, root, local))
+    balls = np.full((len(frames), 3), np.nan) if ball is None else np.asarray(ball, dtype=float)
+    span = root[:, :2].max(axis=0) - root[:, :2].min(axis=0)
+    whole = 0.5 * (root[:, :2].max(axis=0) + root[:, :2].min(axis=0))
+    across = wide if camera == "follow" else max(float(span.max()) + 1.6, wide)
+    if camera == "strobe":
+        big = _view(whole, side, across, 5 * tile)
+        picture(big, skins, body, balls).save(out)
+        return
+    rows = -(-len(frames) // columns)
+    page = Image.new("RGB", (min(columns, len(frames)) * tile, rows * tile))
+    for i in range(len(frames)):
+        view = _view(root[i, :2] if camera == "follow" else whole, side, across, 2 * tile)
+        one = picture(view, skins[i : i + 1], body, balls[i : i + 1]).resize((tile, tile), Image.Resampling.LANCZOS)
+        if labels is not None:
+            ImageDraw.Draw(one).text((4, 2), labels[i], fill=(0, 0, 0))
+        page.paste(one, (i % columns * tile, i // columns * tile))
+    page.save(out)
+
+
+def _view(ground, side: float, wide: float, size: int) -> View:
+    at = np.array([*ground, 0.85 if wide < 4 else 0.5])
+    way = np.array([np.cos(np.radians(side)), np.sin(np.radians(side)), 0.0])
+    return View(at + (2.5 * wide) * way + [0.0, 0.0, 0.55 * wide], at, size, wide)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Parse the command line and draw."""
+    parser = argparse.ArgumentParser(description="A contact sheet of a take, without Blender.")
+    parser.add_argument("take", help="BVH that synthesize wrote")
+    parser.add_argument("--out", required=True, help="PNG to write")
+    parser.add_argument("--ball", help="its ball CSV")
+    parser.add_argument("--provenance", help="its provenance CSV: marks standing feet (L, R) and seams (|) on the labels")
+    parser.add_argument("--camera", choices=("follow", "fixed", "strobe"), default="follow")
+    parser.add_argument("--side", type=float, default=-90.0, help="degrees from +x at which the camera stands")
+    parser.add_argument("--from", dest="start", type=float, default=0.0, help="seconds from the take's first frame")
+    parser.add_argument("--to", dest="end", type=float, help="seconds from the take's first frame")
+    parser.add_argument("--every", type=float, default=0.2, help="seconds between pictures; 0: every frame")
+    parser.add_argument("--columns", type=int, default=6)
+    parser.add_argument("--tile", type=int, default=220, help="pixels")
+    parser.add_argument("--wide", type=float, default=2.2, help="metres across a tile of the following camera")
+    options = parser.parse_args(arguments)
+    try:
+        run(options)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+def run(options) -> None:
+    """Read the files and write the sheet."""
+    motion = bvh.read(options.take, unit=0.01).motion
+    last = len(motion) - 1 if options.end is None else min(options.end * motion.fps, len(motion) - 1)
+    step = max(options.every * motion.fps, 1.0)
+    frames = np.unique(np.rint(np.arange(options.start * motion.fps, last + 0.5, step)).astype(int).clip(0, len(motion) - 1))
+    if not len(frames):
+        raise InputError("--from", f"{options.start:g} s", f"before the take's end, {motion.duration:g} s")
+    ball = read_ball(options.ball).positions if options.ball else None
+    if ball is not None:
+        ball = ball[np.minimum(frames, len(ball) - 1)]
+    labels = [f"{frame / motion.fps:.2f}" for frame in frames]
+    if options.provenance:
+        told = read_provenance(options.provenance)
+        marks = [("L" if l else ".") + ("R" if r else ".") for l, r in told.contacts[frames]]
+        new = [f > 0 and (told.clip[f] != told.clip[f - 1] or told.mirrored[f] != told.mirrored[f - 1]) for f in frames]
+        labels = [f"{a} {m}{'|' if s else ''}" for a, m, s in zip(labels, marks, new)]
+    sheet(
+        motion, frames, options.out, camera=options.camera, side=options.side, ball=ball, labels=labels,
+        columns=options.columns, tile=options.tile, wide=options.wide,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
