@@ -11,7 +11,7 @@
 - `played`     what was played, from a take in memory or from files
 - `reference`  a library's own scores, once per library and rate
 - `view`, `figures`, `report`  the Report JSON, and reports side by side as a table
-- `targets`    what each figure aims for; `html` and `plots` the report as a page
+- `targets`    what each figure aims for, and `judged` whether it is met; `html` and `plots` the report as a page
 
     report = evaluate(take, track, library)
     print(table({"path": report, "blocks": other}))

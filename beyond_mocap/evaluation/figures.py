@@ -167,7 +167,10 @@ def poses(view: View) -> dict:
     """Pose realism and smoothness."""
     played = view.played
     features = realism.pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
-    out = {"pose_realism": None, "smoothness_m": _spread(realism.smoothness(features), ("mean", "p95", "max"))}
+    curve = realism.smoothness(played.motion.skeleton, played.positions, view.fps)
+    own = _spread(view.own("smoothness"), ("mean", "p95", "max"))
+    smoothness = {**_spread(curve, ("mean", "p95", "max")), **{f"source_{name}": value for name, value in own.items()}}
+    out = {"pose_realism": None, "smoothness_m": smoothness}
     if view.reference is not None and np.isfinite(view.reference.pose_p95).all():
         distance = realism.nearest_distance(features, view.reference.poses)
         out["pose_realism"] = _mean(realism.unreal(distance, view.speed, view.reference.pose_p95))

@@ -9,9 +9,8 @@ The page loads nothing and runs nothing: pictures are inside it, all names are e
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from html import escape
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,9 +19,8 @@ from ..library.library import Library
 from ..motion.track import Track
 from . import jerk, plots
 from .feet import contact_speeds
+from .judged import judged
 from .played import Played
-from .report import flat
-from .targets import target_of
 from .view import View
 
 MOST_MOMENTS = 12
@@ -84,11 +82,11 @@ def html_report(
 
 
 def _head(view: View, report: Mapping, title: str) -> str:
-    judged = [row.status for row in _rows(report) if row.status]
+    statuses = [row.status for row in judged(report) if row.status]
     method = f"method {escape(str(report['method']))}, " if report.get("method") else ""
     told = f"{view.count} frames at {view.fps:g} per second, {view.played.motion.duration:.1f} s, {method}"
     return (
-        f"<h1>{escape(title)}</h1>\n<p class=quiet>{told}{judged.count('met')} of {len(judged)} targets met</p>"
+        f"<h1>{escape(title)}</h1>\n<p class=quiet>{told}{statuses.count('met')} of {len(statuses)} targets met</p>"
     )
 
 
@@ -174,7 +172,7 @@ def _figures(report: Mapping) -> str:
     lines = [
         f"<tr><td>{escape(row.name)}<td class=n>{escape(row.value)}<td class=n>{escape(row.own)}"
         f"<td>{escape(row.target)}<td class={row.status or 'quiet'}>{row.status}</tr>"
-        for row in _rows(report)
+        for row in judged(report)
         if not row.name.startswith("keys ")
     ]
     table = f"<div class=scroll><table>{head}\n" + "\n".join(lines) + "\n</table></div>"
@@ -185,7 +183,7 @@ def _key_table(report: Mapping) -> str:
     """One line per key moment, one column per figure; the targets stand in the head."""
     if not report["keys"]:
         return ""
-    rows = {row.name: row for row in _rows(report)}
+    rows = {row.name: row for row in judged(report)}
     numbers = range(1, len(report["keys"]) + 1)
     known = {leaf: [rows[name] for k in numbers if (name := f"keys {k}.{leaf}") in rows] for leaf in report["keys"][0]}
     columns = {leaf: found[0].target for leaf, found in known.items() if found}
@@ -197,41 +195,6 @@ def _key_table(report: Mapping) -> str:
         lines.append(f"<tr><td>{number}{''.join(told)}</tr>")
     table = f"<table class=keys><tr><th>{head}</tr>\n" + "\n".join(lines) + "\n</table>"
     return f"<h3>Key moments</h3><div class=scroll>{table}</div>"
-
-
-class _Row(NamedTuple):
-    """One figure as text: `own` is the recordings' score, status "met", "missed" or ""."""
-
-    name: str
-    value: str
-    own: str
-    target: str
-    status: str
-
-
-def _rows(report: Mapping) -> Iterator[_Row]:
-    """Every figure that is known or has a target."""
-    table = flat(report)
-    fps = float(report.get("fps") or 30.0)
-    for name, value in table.items():
-        group, _, leaf = name.rpartition(".")
-        target = target_of(name, fps)
-        if leaf.startswith("source_") or leaf == "own" or (value is None and target is None):
-            continue
-        own = table.get(f"{group}.source_{leaf}", table.get(f"{group}.own") if leaf == "mean" else None)
-        known = isinstance(value, (int, float))
-        met = target.met(value, table) if target and known else None
-        status = "" if met is None else ("met" if met else "missed")
-        aim = target.text(table) if target else ""
-        yield _Row(name, _shown(value), "" if own is None else _shown(own), aim, status)
-
-
-def _shown(value) -> str:
-    if value is None:
-        return "–"
-    if isinstance(value, list):
-        return " ".join(map(str, value)) or "–"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _section(title: str, body: str) -> str:

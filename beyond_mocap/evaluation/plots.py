@@ -175,16 +175,20 @@ def _draw_speed(ax, view: View) -> None:
 
 
 def _draw_smoothness(ax, view: View) -> None:
+    """Faustino's App. D, with his cuts and the recordings' own level."""
     played = view.played
-    features = realism.pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
-    ax.plot(played.times[1:], realism.smoothness(features), color=MIDDLE, lw=1, label="pose distance")
+    curve = realism.smoothness(played.motion.skeleton, played.positions, view.fps)
+    ax.plot(played.times[1:], 100 * curve, color=MIDDLE, lw=1, label="from the frame before")
+    if view.reference is not None:
+        level = view.reference.smoothness_p95[root.speed_class(view.speed)]
+        ax.plot(played.times, 100 * level, color=LEFT, lw=1, ls="--", label="95 % of recordings at that speed")
     for number, seam in enumerate(view.seams):
         label = "seam" if number == 0 else None
         ax.axvline(played.times[seam], color=BALL, lw=0.8, alpha=0.7, zorder=0, label=label)
     ax.set_ylim(bottom=0.0)
-    ax.set_title("smoothness: distance of each pose from the one before (Faustino, App. D)", loc="left", fontsize=9.5)
-    ax.set_ylabel("m")
-    _legend(ax, 2)
+    ax.set_title("smoothness: distance of features (Faustino App. D)", loc="left", fontsize=9.5)
+    ax.set_ylabel("cm")
+    _legend(ax, 3)
 
 
 def _mark_moments(ax, view: View) -> None:

@@ -27,7 +27,7 @@ class Recording:
 
     features (T, 6 J) float32 m, of `realism.pose_features`. sway, surge, speed (T,): m, m/s, m/s. contact_speed (T, 2)
     m/s, NaN without contact. skating (T,) bool. heel_rest: height of its heel joint on a flat foot, m. support (T, 2)
-    m. jerk (T-3,) m/s^3. stances (S, 3) of its own frames and their travel (S,) m.
+    m. jerk (T-3,) m/s^3. smoothness (T,) m from each frame to the next, NaN at the end. stances (S, 3) of its own frames and their travel (S,) m.
     """
 
     path: str
@@ -41,6 +41,7 @@ class Recording:
     heel_rest: float
     support: np.ndarray
     jerk: np.ndarray
+    smoothness: np.ndarray
     stances: np.ndarray
     travel: np.ndarray
 
@@ -51,7 +52,7 @@ class LibraryReference:
 
     index: path -> recording; first (C + 1,): each recording's first row; rate (C,): its own frames per second; the
     per-frame arrays are Recording's, joined; jerk_above_real (N,): 1 where the window around a frame is above jerk_p95,
-    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, pose_p95 (5,) m. poses (M, 6 J):
+    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95 (5,) m. poses (M, 6 J):
     some ten a second of all clips, twins included. heel_rest: height of the heel joint on a flat foot, m. fastest:
     highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
     """
@@ -67,10 +68,12 @@ class LibraryReference:
     skating: np.ndarray
     support: np.ndarray
     jerk_above_real: np.ndarray
+    smoothness: np.ndarray
     stances: np.ndarray
     travel: np.ndarray
     heel_rest: float
     jerk_p95: np.ndarray
+    smoothness_p95: np.ndarray
     poses: np.ndarray
     pose_p95: np.ndarray
     fastest: float
@@ -125,6 +128,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         travel=_joined(measured, "travel"),
         heel_rest=float(np.median([recording.heel_rest for recording in measured])),
         jerk_p95=jerk_p95,
+        smoothness_p95=realism.smoothness_p95(joined["smoothness"], joined["speed"]),
         poses=poses,
         pose_p95=pose_p95,
         fastest=float(joined["speed"].max()),
@@ -133,7 +137,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     )
 
 
-_PER_FRAME = ("sway", "surge", "speed", "contact_speed", "skating", "support")
+_PER_FRAME = ("sway", "surge", "speed", "contact_speed", "skating", "support", "smoothness")
 
 
 def _joined(measured: list[Recording], name: str) -> np.ndarray:
@@ -172,6 +176,7 @@ def measure(clip: Clip, fps: float) -> Recording:
         heel_rest=heel_rest,
         support=feet.support_height(planted, contacts, heel_rest),
         jerk=jerk.jerk(positions, fps),
+        smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
         stances=spans,
         travel=feet.stance_travel(planted[:, :, 1], spans),
     )

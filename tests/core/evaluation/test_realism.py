@@ -78,7 +78,14 @@ def test_unreal_compares_at_the_speed():
 
 
 def test_smoothness_peaks_at_a_cut():
-    joined = np.concatenate([features(swinging(seed=1))[:40], features(swinging(seed=2))[40:80]])
-    curve = realism.smoothness(joined)
-    assert len(curve) == 79 and np.argmax(curve) == 39
-    assert realism.smoothness(np.ones((5, 3), np.float32)) == pytest.approx(np.zeros(4))
+    places = [forward_kinematics(swinging(seed=seed))[0] for seed in (1, 2)]
+    cut = realism.smoothness(SKELETON, np.concatenate([places[0][:40], places[1][40:80]]), FPS)
+    uncut = realism.smoothness(SKELETON, places[0], FPS)
+    assert len(cut) == 79 and 37 <= np.argmax(cut) <= 41 and cut.max() > 3 * uncut.max()
+    assert realism.smoothness(SKELETON, np.repeat(places[0][:1], 5, axis=0), FPS) == pytest.approx(np.zeros(4))
+
+
+def test_smoothness_is_real_at_its_speed():
+    curve = np.concatenate([np.linspace(0.0, 1.0, 101), [np.nan], np.linspace(2.0, 3.0, 101)])
+    real = realism.smoothness_p95(curve, np.repeat([0.5, 0.5, 3.5], [101, 1, 101]))
+    assert real == pytest.approx([0.95, 0.95, 2.95, 2.95, 2.95])
