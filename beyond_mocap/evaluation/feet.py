@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..motion import quaternion
 from ..motion.humanoid import identify
 from ..motion.skeleton import Skeleton
 
@@ -82,6 +83,21 @@ def support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> 
     """
     lower = np.minimum(feet[..., 1, 2], feet[..., 0, 2] - heel_rest)
     return np.where(contacts, lower, np.nan)
+
+
+def tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Height (T,) m of the lower foot's tip, the end site of its toe (of the foot where it has no toe); NaN without
+    one.
+
+    positions (T, J, 3) m and rotations (T, J, 4) of the joints, world. Where a skeleton has no toe joints the floor is
+    told by ankles, and only the tips show a boot that is in the ground.
+    """
+    body, lowest = identify(skeleton), np.full(len(positions), np.nan)
+    for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets):
+        if parent in (body.left.toe_or_foot, body.right.toe_or_foot) and np.any(offset):
+            tip = positions[:, parent] + quaternion.rotate(rotations[:, parent], offset)
+            lowest = np.fmin(lowest, tip[:, 2])
+    return lowest
 
 
 def heel_rest_height(feet: np.ndarray, contacts: np.ndarray) -> float:

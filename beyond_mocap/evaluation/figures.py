@@ -95,6 +95,8 @@ def skate_and_ground(view: View) -> dict:
             "min": 1000.0 * float(played.positions[..., 2].min()),
             "support_max": 1000.0 * _max(support),
             "source_support_max": 1000.0 * _max(view.own("support")),
+            "tip_min": -1000.0 * _max(-feet.tip_height(played.motion.skeleton, played.positions, played.rotations)),
+            "source_tip_min": -1000.0 * _max(-view.own("tip")),
         },
     }
 

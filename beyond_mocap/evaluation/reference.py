@@ -27,7 +27,8 @@ class Recording:
 
     features (T, 6 J) float32 m, of `realism.pose_features`. sway, surge, speed (T,): m, m/s, m/s. contact_speed (T, 2)
     m/s, NaN without contact. skating (T,) bool. heel_rest: height of its heel joint on a flat foot, m. support (T, 2)
-    m. jerk (T-3,) m/s^3. smoothness (T,) m from each frame to the next, NaN at the end. stances (S, 3) of its own frames and their travel (S,) m.
+    m. tip (T,) m. jerk (T-3,) m/s^3. smoothness (T,) m from each frame to the next, NaN at the end. stances (S, 3) of
+    its own frames and their travel (S,) m.
     """
 
     path: str
@@ -40,6 +41,7 @@ class Recording:
     skating: np.ndarray
     heel_rest: float
     support: np.ndarray
+    tip: np.ndarray
     jerk: np.ndarray
     smoothness: np.ndarray
     stances: np.ndarray
@@ -67,6 +69,7 @@ class LibraryReference:
     contact_speed: np.ndarray
     skating: np.ndarray
     support: np.ndarray
+    tip: np.ndarray
     jerk_above_real: np.ndarray
     smoothness: np.ndarray
     stances: np.ndarray
@@ -137,7 +140,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     )
 
 
-_PER_FRAME = ("sway", "surge", "speed", "contact_speed", "skating", "support", "smoothness")
+_PER_FRAME = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness")
 
 
 def _joined(measured: list[Recording], name: str) -> np.ndarray:
@@ -158,7 +161,7 @@ def measure(clip: Clip, fps: float) -> Recording:
     """One clip at `fps`, uncut, measured frame by frame; its floor is at height 0."""
     motion = resample(clip.motion, fps)
     skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
-    positions = forward_kinematics(motion)[0]
+    positions, rotations = forward_kinematics(motion)
     pelvis, planted = positions[:, hips, :2], positions[:, feet.foot_joints(skeleton)]
     at = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
     contacts = clip.contacts[at]
@@ -175,6 +178,7 @@ def measure(clip: Clip, fps: float) -> Recording:
         skating=np.append(feet.skating_steps(planted[:, :, 1], 0.0, fps), False),
         heel_rest=heel_rest,
         support=feet.support_height(planted, contacts, heel_rest),
+        tip=feet.tip_height(skeleton, positions, rotations),
         jerk=jerk.jerk(positions, fps),
         smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
         stances=spans,

@@ -1,10 +1,13 @@
 """Feet that slide by a known amount, and feet that stand still."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from beyond_mocap.evaluation import feet
 from beyond_mocap.motion.adult import adult_skeleton
+from beyond_mocap.motion.humanoid import identify
 
 FPS = 30.0
 STANCE, SWING = 12, 8
@@ -100,3 +103,15 @@ def test_foot_joints_are_ankle_and_toe():
     skeleton = adult_skeleton()
     names = [[skeleton.names[joint] for joint in side] for side in feet.foot_joints(skeleton)]
     assert names == [["LeftFoot", "LeftToeBase"], ["RightFoot", "RightToeBase"]]
+
+
+def test_the_boots_tip_is_seen_where_there_is_no_toe_joint():
+    skeleton = adult_skeleton()
+    body = identify(skeleton)
+    foot = body.left.toe_or_foot
+    skeleton = replace(skeleton, end_parents=(foot,), end_offsets=np.array([[0.2, 0.0, -0.1]]))
+    positions, rotations = np.zeros((2, len(skeleton), 3)), np.tile([1.0, 0, 0, 0], (2, len(skeleton), 1))
+    positions[1, foot, 2] = 0.25
+    np.testing.assert_allclose(feet.tip_height(skeleton, positions, rotations), [-0.1, 0.15])
+    bare = replace(skeleton, end_parents=(), end_offsets=np.zeros((0, 3)))
+    assert np.isnan(feet.tip_height(bare, positions, rotations)).all()
