@@ -37,7 +37,7 @@ from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.edit_list import EditList
-from .synthesis.footage import Footage, fetch
+from .synthesis.footage import Footage, Shown, fetch
 from .synthesis.locomotion import match_distance, travelled_distance
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, needed, wanted
@@ -48,10 +48,12 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends in: the edit list at the library's rate, and (T,) metres travelled where the method decides it."""
+    """What a search ends in: the edit list at the library's rate, (T,) metres travelled where the method decides it, and the
+    frame from which on it was searched in a hurry, if it was."""
 
     edit: EditList
     travelled: np.ndarray | None = None
+    hurried: int | None = None
 
 
 def synthesize(
@@ -59,55 +61,66 @@ def synthesize(
     plan: Plan,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
+    hurry: Callable[[], bool] | None = None,
 ) -> Take:
     """A player's motion for `plan` out of `library`.
 
     progress(fraction, text) is called now and then. Raises NotInLibrary for a key moment that no clip can serve (unless
-    plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. The same library, plan and numpy
-    give the same bits: linear algebra is held to one thread, since more add up in another order.
+    plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so, method
+    "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on; before
+    anything is found, and by the other methods, that is Cancelled too. The same library, plan and numpy give the same bits:
+    linear algebra is held to one thread, since more add up in another order.
     """
     if plan.method not in METHODS:
         raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        take = _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled)
-        return replace(take, warnings=(*take.warnings, *_gave_way(library, plan, take)))
+        return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled, hurry)
 
 
-def _synthesize(library: Library, plan: Plan, report: Progress, cancelled) -> Take:
-    if plan.method == "path" and plan.made and sample(plan.track, library.fps, plan.track_window).speed.max() > library.fastest:
-        report(0.0, "Making faster gaits")
-        library = library.extended
-    library = with_chosen_gaits(library, dict(plan.gaits))
+def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry) -> Take:
+    recordings, library = library, with_made_gaits(library, plan, report)
     clock = [time.perf_counter()]
     order = wanted(library, plan)
-    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled)
+    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry)
     clock.append(time.perf_counter())
     report(0.8, "Constructing")
     track = order.track if plan.fps == library.fps else sample(plan.track, plan.fps, plan.track_window)
     edit = exact_keys(library, found.edit, order)
     index = np.minimum(np.arange(len(track.times)) * (library.fps / plan.fps), len(edit) - 1)
     footage = fetch(library, edit, index, plan.fps)
-    keys = tuple(_key_result(library, plan, order, edit, footage, number) for number in range(len(order.keys)))
+    keys = tuple(key_result(library, plan, order, edit, footage, number) for number in range(len(order.keys)))
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
     planted = _polished(library, plan, track, footage, found, index)
     if plan.method == "path":
-        struck = _met(library, plan, track, edit, footage, planted, keys)
+        struck = met(library, plan, track, footage.standing, planted, touches(library, plan, edit, keys))
         planted, track = replace(planted, root=struck.root, rotations=struck.rotations), replace(track, ball=struck.ball)
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     clock.append(time.perf_counter())
     seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
     report(1.0, "Done")
     take = _take(library, plan, order, track, edit, footage, motion, keys, seconds)
-    return replace(take, correction=planted.correction, ik_miss=planted.miss)
+    take = replace(take, correction=planted.correction, ik_miss=planted.miss)
+    return with_warnings(take, recordings, order, found.hurried)
 
 
-def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cancelled) -> Found:
+def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
+    """The library that a plan is made from: with made running, where its track is faster than any recording, and with the
+    chosen gaits."""
+    if plan.method == "path" and plan.made and sample(plan.track, library.fps, plan.track_window).speed.max() > library.fastest:
+        report(0.0, "Making faster gaits")
+        library = library.extended
+    return with_chosen_gaits(library, dict(plan.gaits))
+
+
+def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cancelled, hurry) -> Found:
     if plan.method == "path":
-        return Found(PathSearch(library, order, balanced(plan.alpha), report, cancelled).run())
-    search = BlockSearch(library, order, plan.alpha, report, cancelled)
+        search = PathSearch(library, order, balanced(plan.alpha), report, cancelled, hurry)
+        return Found(search.run(), hurried=search.hurried)
+    stops = [stop for stop in (cancelled, hurry) if stop]
+    search = BlockSearch(library, order, plan.alpha, report, lambda: any(stop() for stop in stops))
     blocks = search.run()
     if plan.method == "blocks":
         return Found(straight_edit(search, blocks))
@@ -116,21 +129,32 @@ def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cance
 
 def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index) -> Planted:
     """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand."""
-    reach = 0.5 * plan.seam_window * plan.fps
-    pose = spread_rotations(footage.pose, footage.seams, footage.ahead_pose, reach)
-    height = spread_values(footage.height, footage.seams, footage.ahead_height, reach)
-    sway = spread_values(footage.sway, footage.seams, footage.ahead_sway, reach)
-    smooth = replace(footage, pose=pose, height=height, sway=sway)
+    smooth = smoothed(plan, footage)
     if plan.method == "blocks":
         angle, ground = _chained(library, footage, smooth, track, plan.fps)
     else:
         angle, ground = _on_track(plan, track, smooth, found, index)
-    pose[:, 0] = quaternion.multiply(quaternion.about_up(angle), pose[:, 0])
-    root = np.concatenate([ground, height[:, None]], axis=1)
+    pose = faced(smooth.pose, angle)
+    root = np.concatenate([ground, smooth.height[:, None]], axis=1)
     if plan.method == "path":
         return plant(library.skeleton, root, pose, footage.standing, plan.fps)
     none = np.zeros((len(root), 2))
     return Planted(root, pose, none, none)
+
+
+def smoothed(plan: Plan, footage: Footage) -> Footage:
+    """The footage with its jumps at seams spread over the frames around them."""
+    reach = 0.5 * plan.seam_window * plan.fps
+    pose = spread_rotations(footage.pose, footage.seams, footage.ahead_pose, reach)
+    height = spread_values(footage.height, footage.seams, footage.ahead_height, reach)
+    return replace(footage, pose=pose, height=height, sway=spread_values(footage.sway, footage.seams, footage.ahead_sway, reach))
+
+
+def faced(pose: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Poses (T, J, 4) in the facing frame as local rotations in the world, facing `angle` (T,) radians."""
+    out = pose.copy()
+    out[:, 0] = quaternion.multiply(quaternion.about_up(angle), pose[:, 0])
+    return out
 
 
 def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, index):
@@ -146,17 +170,23 @@ def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, i
     return angle, root_with_sway(place, footage.sway, angle)
 
 
-def _met(library, plan: Plan, track: SampledTrack, edit: EditList, footage: Footage, planted, keys) -> Struck:
-    """The motion and the ball with the striking part of the body on the ball at every key moment that is played."""
-    touches = []
+def touches(library: Library, plan: Plan, edit: EditList, keys: tuple[KeyResult, ...]) -> list[Touch]:
+    """Where the body may meet the ball: every key moment that is played."""
+    found = []
     for placed in edit.keys:
         result = keys[placed.wanted]
         entry, leave = np.multiply(needed(library, placed.key), plan.fps / library.fps)
-        touches.append(Touch(result.frame, result.words, float(entry), float(leave)))
+        found.append(Touch(result.frame, result.words, float(entry), float(leave)))
+    return found
+
+
+def met(library, plan: Plan, track: SampledTrack, standing: np.ndarray, planted: Planted, found: list[Touch]) -> Struck:
+    """The motion and the ball with the striking part of the body on the ball at every touch that was found; standing
+    (T, 2, 2) bool."""
     known = plan.track.ball_height_known
     height = np.interp(track.times, plan.track.times, known.astype(float)) > 0.5
     return strike(
-        library.skeleton, planted.root, planted.rotations, footage.standing.any(axis=2), track.ball, touches, plan.fps,
+        library.skeleton, planted.root, planted.rotations, standing.any(axis=2), track.ball, found, plan.fps,
         measured=track.ball_measured, height_known=height,
     )
 
@@ -197,9 +227,6 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
     clips = library.clips
     names = tuple(dict.fromkeys(clips[clip].path for clip in footage.clip))
     number = {name: i for i, name in enumerate(names)}
-    words = tuple(
-        spoken(clips[clip].words_at(frame)) for clip, frame in zip(footage.clip, np.round(footage.clip_frame, 6))
-    )
     ball = None
     if np.any(np.isfinite(track.ball[:, :2])):
         ball = BallPath(track.times, track.ball, track.ball_measured)
@@ -210,7 +237,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         clip=np.array([number[clips[clip].path] for clip in footage.clip]),
         clip_frame=footage.clip_frame,
         mirrored=np.array([clips[clip].mirrored for clip in footage.clip]),
-        words=words,
+        words=words_shown(library, footage),
         contacts=footage.standing.all(axis=2),
         seams=footage.seams,
         timeline=order.timeline,
@@ -219,8 +246,24 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         method=plan.method,
         seed=plan.seed,
         seconds=seconds,
-        warnings=(*library.notes, *order.warnings, *_crowded_out(order, edit)),
+        plan=plan,
+        edit=edit,
     )
+
+
+def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
+    """The words that every shown frame's clip carries there."""
+    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
+    return tuple(spoken(library.clips[clip].words_at(frame)) for clip, frame in frames)
+
+
+def with_warnings(take: Take, recordings: Library, order: Wanted, hurried: int | None) -> Take:
+    """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
+    library's rate from which on the search was cut short, or None."""
+    told = [*recordings.notes, *order.warnings, *_crowded_out(order, take.edit)]
+    if hurried is not None:
+        told.append(f"{take.start_time + hurried / recordings.fps:.1f} s: from here on the search was cut short")
+    return replace(take, warnings=(*told, *_gave_way(recordings, take.plan, take)))
 
 
 def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
@@ -233,18 +276,18 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
     ]
 
 
-def _key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, footage: Footage, number: int) -> KeyResult:
+def key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
     """How key moment `number` came out: where its clip's key frame is played, or what stands in for it."""
     key = order.keys[number]
     at = key.frame * plan.fps / library.fps
-    near = int(np.clip(round(at), 0, len(footage.clip) - 1))
-    clip, shown = int(footage.clip[near]), float(footage.clip_frame[near])
+    near = int(np.clip(round(at), 0, len(played.clip) - 1))
+    clip, shown = int(played.clip[near]), float(played.clip_frame[near])
     placed = next((p for p in edit.keys if p.wanted == number and p.key.clip == clip), None)
     words = spoken(placed.key.words if placed else library.clips[clip].words_at(shown))
     if placed is not None:
-        inside = np.flatnonzero(footage.piece == footage.piece[near])
-        if len(inside) > 1 and np.all(np.diff(footage.clip_frame[inside]) > 0):
-            at = float(np.interp(placed.key.frame, footage.clip_frame[inside], inside))
+        inside = np.flatnonzero(played.piece == played.piece[near])
+        if len(inside) > 1 and np.all(np.diff(played.clip_frame[inside]) > 0):
+            at = float(np.interp(placed.key.frame, played.clip_frame[inside], inside))
         shown = placed.key.frame
     source = library.clips[clip]
     instead = words if key.used_instead and not key.choices else key.used_instead

@@ -8,6 +8,8 @@ import numpy as np
 
 from .annotation import KeyMoment, Timeline
 from .motion.motion import Motion
+from .plan import Plan
+from .synthesis.edit_list import EditList
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,8 @@ class Take:
     clip's own rate, mirrored (T,) bool. words: per frame the source frame's words, sides after mirroring. contacts (T, 2)
     bool, left and right, carried from the source. seams: output frames that start a new piece of clip.
     correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it. ik_miss:
-    (T, 2) metres that each leg was short of where its foot should stand.
+    (T, 2) metres that each leg was short of where its foot should stand. plan, edit: what was asked and what the search chose
+    at the library's rate, for `resynthesize`.
     """
 
     motion: Motion
@@ -67,3 +70,5 @@ class Take:
     warnings: tuple[str, ...] = ()
     correction: np.ndarray | None = None
     ik_miss: np.ndarray | None = None
+    plan: Plan | None = None
+    edit: EditList | None = None

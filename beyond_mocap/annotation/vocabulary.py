@@ -84,6 +84,7 @@ def swap_sides(words: Iterable[str]) -> tuple[str, ...]:
     return tuple("_".join(_SIDES.get(part, part) for part in word.split("_")) for word in words)
 
 
+@lru_cache(maxsize=1024)
 def relatives(word: str) -> frozenset[str]:
     """The words that stand above or below `word` somewhere in the tree, itself left out."""
     found: set[str] = set()
@@ -158,8 +159,13 @@ def _spoken(words: frozenset[str]) -> tuple[str, ...]:
 
 
 def _in_tree_order(words: frozenset[str]) -> list[tuple[int, str]]:
-    order = {word: place for place, word in enumerate(dict.fromkeys(path[-1] for path in _paths(VOCABULARY)))}
+    order = _tree_order()
     return sorted((order.get(word, len(order)), word) for word in words)
+
+
+@lru_cache(maxsize=1)
+def _tree_order() -> dict[str, int]:
+    return {word: place for place, word in enumerate(dict.fromkeys(path[-1] for path in _paths(VOCABULARY)))}
 
 
 def _paths(tree: Mapping[str, dict], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:

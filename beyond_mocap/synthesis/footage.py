@@ -17,37 +17,53 @@ from .edit_list import EditList, at_times
 
 
 @dataclass(frozen=True, eq=False)
-class Footage:
-    """T output frames.
+class Shown:
+    """What T output frames show: clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's own
+    rate, piece (T,) of the edit list."""
 
-    clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's own rate, piece (T,).
+    clip: np.ndarray
+    frame: np.ndarray
+    clip_frame: np.ndarray
+    piece: np.ndarray
+
+    @property
+    def seams(self) -> np.ndarray:
+        """Output frames (S,) that begin another piece."""
+        return np.flatnonzero(np.diff(self.piece)) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Footage(Shown):
+    """T output frames with what they show.
+
     pose (T, J, 4) local rotations, the root's relative to its facing; height (T,) m of the root; sway (T, 2) m from the
     clip's path to the root, in the facing frame; velocity (T, 2) m/s of the path as played, in the facing frame; turn (T,)
     radians of facing since the frame before, 0 at a seam; standing (T, 2, 2) bool of heels and toes. ahead_*: the same for the frame that the
     piece before would have shown at each seam, (S, ...).
     """
 
-    clip: np.ndarray
-    frame: np.ndarray
-    clip_frame: np.ndarray
-    piece: np.ndarray
     pose: np.ndarray
     height: np.ndarray
     sway: np.ndarray
     velocity: np.ndarray
     turn: np.ndarray
     standing: np.ndarray
-    seams: np.ndarray
     ahead_pose: np.ndarray
     ahead_height: np.ndarray
     ahead_sway: np.ndarray
 
 
+def shown(library: Library, edit: EditList, index: np.ndarray) -> Shown:
+    """What fractional output frames `index` (T,) of the library's rate show."""
+    clip, frame, piece = at_times(edit, index)
+    return Shown(clip, frame, _clip_frames(library, clip, frame), piece)
+
+
 def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> Footage:
     """Footage at fractional output frames `index` (T,) of the library's rate; `rate`: output frames per second."""
-    clip, frame, piece = at_times(edit, index)
+    what = shown(library, edit, index)
+    clip, frame, seams = what.clip, what.frame, what.seams
     pose, height, sway, heading = _poses(library, clip, frame)
-    seams = np.flatnonzero(np.diff(piece)) + 1
     played = np.gradient(frame) if len(frame) > 1 else np.ones(len(frame))
     for edge in seams:  # the difference across a seam says nothing about speed
         played[edge - 1] = frame[edge - 1] - frame[edge - 2] if edge > 1 and edge - 1 not in seams else 1.0
@@ -59,8 +75,8 @@ def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> F
     ahead_frame = frame[before] + played[before]
     ahead = _poses(library, clip[before], ahead_frame)
     return Footage(
-        clip, frame, _clip_frames(library, clip, frame), piece, pose, height, sway, velocity, turn,
-        _standing(library, clip, frame), seams, *ahead[:3],
+        clip, frame, what.clip_frame, what.piece, pose, height, sway, velocity, turn, _standing(library, clip, frame),
+        *ahead[:3],
     )
 
 

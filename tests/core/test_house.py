@@ -27,7 +27,7 @@ ROOMS = {
     "motion": [],
     "annotation": ["motion"],
     "plan": ["motion", "annotation"],
-    "take": ["motion", "annotation"],
+    "take": ["motion", "annotation", "plan", "synthesis.edit_list"],
     "files": ["motion", "take"],
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -100,3 +100,8 @@ class SampledTrack:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def frames(self, start: int, stop: int) -> "SampledTrack":
+        """Frames start .. stop-1."""
+        arrays = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "fps"}
+        return SampledTrack(**{name: values[start:stop] for name, values in arrays.items()}, fps=self.fps)

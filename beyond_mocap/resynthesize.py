@@ -1,0 +1,301 @@
+"""The recipe for edits: a take after a change of its plan, made anew only where the change touches it.
+
+    take = synthesize(library, plan)
+    plan = replace(plan, timeline=with_the_kick_a_little_later)
+    take = resynthesize(library, plan, take)
+
+What counts as touched is said in `synthesis.touched`. Touched stretches are searched between frames that stay
+(`synthesis.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed over to the
+old motion on both sides (`polish.hand_over`). All other frames come back bit for bit; only where the body turns a full turn
+more or less than before, the quaternions behind may have the other sign, since a motion's signs are continuous.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .library.library import Library
+from .motion import quaternion
+from .motion.motion import Motion
+from .motion.track import SampledTrack, sample
+from .motion.track.sampling import MOVING_SPEED
+from .plan import Plan
+from .polish.hand_over import handed_over, old_share
+from .polish.meeting import eased
+from .polish.on_track import facing, pulled_to_track, root_with_sway
+from .polish.foot_plant import Planted, plant
+from .polish.smoothing import reaches
+from .synthesis.balance import balanced
+from .synthesis.edit_list import EditList
+from .synthesis.footage import Footage, Shown, fetch, shown
+from .synthesis.path_search import SLOT, Between, PathSearch
+from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
+from .synthesis.wanted import Wanted, wanted
+from .synthesize import (
+    Progress, faced, key_result, met, smoothed, synthesize, touches, with_made_gaits, with_warnings, words_shown,
+)
+from .take import BallPath, KeyResult, Take
+
+HAND_OVER = 0.5
+"""Seconds before and behind a touched stretch in which its motion goes over into the old one."""
+
+CONTEXT = 1.2
+"""Seconds further out that are laid out too, so that the ends of windows and solves lie outside what is used."""
+
+MOST_TURN = 1.5 * np.pi
+"""Radians that a body may turn on the spot so as to turn the way it did before."""
+
+OFFSET_SECONDS = 1.0
+"""Seconds within a stretch over which the root forgets how far off the laid-out place the old one was at its end."""
+
+
+def resynthesize(
+    library: Library,
+    plan: Plan,
+    before: Take,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    hurry: Callable[[], bool] | None = None,
+) -> Take:
+    """The take `before` after its plan has become `plan`: searched and built anew only where the change touches it.
+
+    A whole synthesis where the change is not one of words, track or ball (another method, rate, length or choice), where
+    `before` was made from another library or by another method than "path", or where all of it is touched. The same library,
+    plan and take give the same bits. progress, cancelled, hurry and what is raised: as for `synthesize`.
+    """
+    from threadpoolctl import threadpool_limits
+
+    report = progress or (lambda fraction, text: None)
+    with threadpool_limits(limits=1):
+        taken = _updated(library, plan, before, report, cancelled, hurry) if _comparable(plan, before) else None
+    return synthesize(library, plan, progress, cancelled, hurry) if taken is None else taken
+
+
+def _comparable(plan: Plan, before: Take) -> bool:
+    old = before.plan
+    if old is None or plan.method != "path":
+        return False
+    same_choices = replace(plan, track=old.track, timeline=old.timeline, library=old.library) == old
+    return same_choices and np.array_equal(plan.track.times[[0, -1]], old.track.times[[0, -1]])
+
+
+def _updated(library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry) -> Take | None:
+    """The take, or None where it has to be made as a whole."""
+    clock = [time.perf_counter()]
+    recordings, library = library, _library_of_both(library, plan, before, report)
+    old, new = wanted(library, before.plan), wanted(library, plan)
+    if not _made_from(library, before, len(old)):
+        return None
+    again = to_search(library, before.edit, old, new, SLOT)
+    if again == [(0, len(new))]:
+        return None
+    edit = replace(before.edit, keys=_outside(kept_keys(before.edit, old, new), new, again))
+    hurried = []
+    for number, (first, end) in enumerate(again):
+        def tell(fraction, text, number=number):
+            report(0.8 * (number + fraction) / len(again), text)
+
+        search = PathSearch(library, new, balanced(plan.alpha), tell, cancelled, hurry, Between(edit, first, end))
+        edit = search.run()
+        hurried += [search.hurried] if search.hurried is not None else []
+    clock.append(time.perf_counter())
+    report(0.8, "Constructing")
+    track = new.track if plan.fps == library.fps else sample(plan.track, plan.fps, plan.track_window)
+    update = _Update(library, plan, before, track, edit, new)
+    moved = np.interp(update.index, np.arange(len(new)), lies_elsewhere(old, new).astype(float)) > 0.0
+    for stretch in update.stretches(again, moved):
+        update.make(stretch)
+    clock.append(time.perf_counter())
+    report(1.0, "Done")
+    seconds = dict(zip(("search", "polish"), np.diff(clock).tolist()))
+    return with_warnings(replace(update.take(), seconds=seconds), recordings, new, min(hurried, default=None))
+
+
+def _library_of_both(library: Library, plan: Plan, before: Take, report: Progress) -> Library:
+    """The library with made running where the new plan or the old take needs it."""
+    for which in (plan, before.plan):
+        suited = with_made_gaits(library, which, report)
+        if len(suited.clips) > len(library.clips):
+            break
+    return suited
+
+
+def _made_from(library: Library, before: Take, count: int) -> bool:
+    """Whether the take's edit list, read in this library, shows what the take shows."""
+    edit, fps = before.edit, before.plan.fps
+    if edit is None or len(edit) != count or edit.clip.max() >= len(library.clips):
+        return False
+    what = shown(library, edit, _index(len(before.motion), library, fps, count))
+    table = [clip.path for clip in library.clips]
+    paths = np.array([table[clip] for clip in what.clip]) == np.array(before.clips)[before.clip]
+    return bool(np.all(paths) and np.allclose(what.clip_frame, before.clip_frame, rtol=0.0, atol=1e-6))
+
+
+def _index(frames: int, library: Library, fps: float, count: int) -> np.ndarray:
+    """(frames,) output frames at the library's rate."""
+    return np.minimum(np.arange(frames) * (library.fps / fps), count - 1)
+
+
+def _outside(keys, order: Wanted, again: list[Stretch]):
+    """The placed keys that no stretch searches anew."""
+    frames = {key.wanted: order.keys[key.wanted].frame for key in keys}
+    return tuple(key for key in keys if not any(first <= round(frames[key.wanted]) < end for first, end in again))
+
+
+class _Update:
+    """A take in the making: the old one's arrays, with one stretch after the other made anew."""
+
+    def __init__(self, library: Library, plan: Plan, before: Take, track: SampledTrack, edit: EditList, order: Wanted):
+        self.library, self.plan, self.before = library, plan, before
+        self.track, self.edit, self.order = track, edit, order
+        self.index = _index(len(track), library, plan.fps, len(edit))
+        self.shown = shown(library, edit, self.index)
+        self.root, self.rotations = before.motion.root_positions.copy(), before.motion.rotations.copy()
+        self.contacts, self.correction, self.miss = (a.copy() for a in (before.contacts, before.correction, before.ik_miss))
+        self.ball = track.ball.copy() if before.ball is None else before.ball.positions.copy()
+        self.anew = np.zeros(len(track), bool)
+        self.keys = self._keys()
+
+    def _keys(self) -> tuple[KeyResult, ...]:
+        count = range(len(self.order.keys))
+        return tuple(key_result(self.library, self.plan, self.order, self.edit, self.shown, number) for number in count)
+
+    def stretches(self, again: list[Stretch], moved: np.ndarray) -> list[Stretch]:
+        """Output frames (first, end) that are laid out anew: what was searched, where the track moved (T,), and the frames
+        over which seams are spread otherwise than before."""
+        touched = moved.copy()
+        for first, end in again:
+            touched |= (self.index > first - 1) & (self.index < end)
+        old, new = (self._spread(seams) for seams in (self.before.seams, self.shown.seams))
+        for seam, reach in old ^ new:
+            touched[max(0, int(np.ceil(seam - reach))) : int(np.floor(seam + reach)) + 1] = True
+        return stretches(touched, int(round((2 * HAND_OVER + 0.3) * self.plan.fps)))
+
+    def _spread(self, seams: np.ndarray) -> set[tuple[int, float]]:
+        longest = 0.5 * self.plan.seam_window * self.plan.fps
+        return set(zip(seams.tolist(), reaches(seams, len(self.index), longest).tolist()))
+
+    def make(self, stretch: Stretch) -> None:
+        """Makes output frames first .. end anew and hands over to the old ones around them."""
+        hand, context = (int(round(seconds * self.plan.fps)) for seconds in (HAND_OVER, HAND_OVER + CONTEXT))
+        low, high = max(0, stretch[0] - context), min(len(self.index), stretch[1] + context)
+        window = _Window(self, low, high, (stretch[0] - low, stretch[1] - low), hand)
+        planted, ball = window.met(window.planted())
+        made = slice(max(0, stretch[0] - hand - low), min(high, stretch[1] + hand) - low)
+        at, share = slice(made.start + low, made.stop + low), window.share[made]
+        standing = window.footage.standing[made]
+        new, old = (planted.root[made], planted.rotations[made]), (self.root[at], self.rotations[at])
+        self.root[at], self.rotations[at] = handed_over(
+            self.library.skeleton, new, old, share, standing, self.plan.fps
+        )
+        self.ball[at] = _ball_between(ball[made], self.ball[at], share)
+        self.contacts[at] = standing.all(axis=2)
+        inside = np.arange(*stretch)
+        self.correction[inside], self.miss[inside] = planted.correction[inside - low], planted.miss[inside - low]
+        self.anew[at] = True
+
+    def take(self) -> Take:
+        """The take as it now is."""
+        clips, made = self.library.clips, self.anew
+        names = tuple(dict.fromkeys((*self.before.clips, *(clips[clip].path for clip in self.shown.clip[made]))))
+        number = np.array([names.index(clip.path) if clip.path in names else -1 for clip in clips])
+        mirrored = np.array([clip.mirrored for clip in clips])
+        part = Shown(*(values[made] for values in (self.shown.clip, self.shown.frame, self.shown.clip_frame, self.shown.piece)))
+        new = iter(words_shown(self.library, part))
+        return replace(
+            self.before,
+            motion=Motion(self.library.skeleton, self.root, self.rotations, self.plan.fps),
+            clips=names,
+            clip=np.where(made, number[self.shown.clip], self.before.clip),
+            clip_frame=np.where(made, self.shown.clip_frame, self.before.clip_frame),
+            mirrored=np.where(made, mirrored[self.shown.clip], self.before.mirrored),
+            words=tuple(next(new) if fresh else old for fresh, old in zip(made, self.before.words)),
+            contacts=self.contacts,
+            seams=self.shown.seams,
+            timeline=self.order.timeline,
+            keys=tuple(self._as_before(key) for key in self.keys),
+            ball=BallPath(self.track.times, self.ball, self.track.ball_measured) if np.isfinite(self.ball[:, :2]).any() else None,
+            correction=self.correction,
+            ik_miss=self.miss,
+            plan=self.plan,
+            edit=self.edit,
+        )
+
+    def _as_before(self, key: KeyResult) -> KeyResult:
+        """The old result of a key moment whose frame has not been touched, under the line in which it is asked now."""
+        near = int(np.clip(round(key.frame), 0, len(self.anew) - 1))
+        old = [result for result in self.before.keys if result.asked == key.asked]
+        return replace(old[0], asked=key.asked) if old and not self.anew[near] else key
+
+
+class _Window:
+    """Frames low .. high of an update, of which those within `stretch` (counted from low) are free and the others are
+    given by the old motion; share (W,) of the old motion in what comes out."""
+
+    def __init__(self, update: _Update, low: int, high: int, stretch: Stretch, hand: int):
+        self.update, self.low, self.high, self.stretch = update, low, high, stretch
+        self.track = update.track.frames(low, high)
+        self.footage: Footage = fetch(update.library, update.edit, update.index[low:high], update.plan.fps)
+        self.share = old_share(high - low, stretch, hand)
+
+    def planted(self) -> Planted:
+        """The motion laid on the ground between what stays, feet planted."""
+        update, plan, track = self.update, self.update.plan, self.track
+        smooth, given = smoothed(plan, self.footage), self.share > 0.0
+        rotation = update.rotations[self.low : self.high, 0]
+        kept = quaternion.yaw(quaternion.multiply(rotation, quaternion.inverse(smooth.pose[:, 0])))
+        kept[~given] = np.nan
+        angle = facing(track.direction, track.speed, smooth.velocity, smooth.turn, kept)
+        direction = self._same_way_round(angle, np.unwrap(quaternion.yaw(rotation)))
+        if direction is not None:
+            angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept)
+        ground = self._pulled(root_with_sway(track.positions, smooth.sway, angle))
+        root = np.concatenate([ground, smooth.height[:, None]], axis=1)
+        return plant(update.library.skeleton, root, faced(smooth.pose, angle), smooth.standing, plan.fps)
+
+    def _same_way_round(self, angle: np.ndarray, old: np.ndarray) -> np.ndarray | None:
+        """The track's direction (W,) with which a body that now turns the other way round than it did, where it is so slow
+        that both ways will do, turns as it did; None where that is not so. angle, old: (W,) facing now and then, unwrapped.
+        """
+        first, end = max(self.stretch[0] - 1, 0), min(self.stretch[1], len(angle) - 1)
+        turns = np.round((angle[end] - angle[first] - old[end] + old[first]) / (2.0 * np.pi))
+        slow = self.track.speed < MOVING_SPEED
+        middle = first + int(np.argmin(self.track.speed[first : end + 1]))
+        if turns == 0 or not slow[middle]:
+            return None
+        fast = np.flatnonzero(~slow[first : end + 1]) + first
+        low, high = max(fast[fast < middle], default=first), min(fast[fast > middle], default=end)
+        if abs(angle[high] - angle[low] - 2.0 * np.pi * turns) > MOST_TURN:
+            return None
+        ramp = eased((np.arange(len(angle)) - low) / max(high - low, 1), np.ones(len(angle)))
+        return self.track.direction - 2.0 * np.pi * turns * ramp
+
+    def _pulled(self, laid: np.ndarray) -> np.ndarray:
+        """(W, 2) the laid-out root on the track; near the given frames it sets out from where the old one is."""
+        plan, old, given = self.update.plan, self.update.root[self.low : self.high, :2], self.share > 0.0
+        first, end = self.stretch
+        at, fade = np.arange(len(laid)), max(1.0, min(OFFSET_SECONDS * plan.fps, end - first))
+        root = laid.copy()
+        for edge in [edge for edge in (first - 1, end) if 0 <= edge < len(laid)]:
+            near = eased(1.0 - np.abs(at - edge) / fade, np.ones(len(at)))[:, None]
+            root += np.where(given[:, None], 0.0, near * (old - laid)[edge])
+        root = np.where(given[:, None], old, root)
+        pulled = pulled_to_track(root, self.track.raw, plan.fps, plan.root_window)
+        return pulled + self.share[:, None] * (old - pulled)
+
+    def met(self, planted: Planted) -> tuple[Planted, np.ndarray]:
+        """The same with the ball met at the key moments in the window, and the ball's path (W, 3) m."""
+        update = self.update
+        played = touches(update.library, update.plan, update.edit, update.keys)
+        here = [replace(t, frame=t.frame - self.low) for t in played if self.low <= round(t.frame) < self.high]
+        struck = met(update.library, update.plan, self.track, self.footage.standing, planted, here)
+        return replace(planted, root=struck.root, rotations=struck.rotations), struck.ball
+
+
+def _ball_between(new: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """(W, 3) m from the new path of the ball to the old one."""
+    return np.where(np.isfinite(old) & (share > 0.0)[:, None], new + share[:, None] * (old - new), new)
