@@ -225,7 +225,9 @@ def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
 
 def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage, motion, keys, seconds) -> Take:
     clips = library.clips
-    names = tuple(dict.fromkeys(clips[clip].path for clip in footage.clip))
+    shown = np.round(footage.clip_frame, 6)
+    sources = [clips[clip].source_at(frame) for clip, frame in zip(footage.clip, shown)]
+    names = tuple(dict.fromkeys(sources))
     number = {name: i for i, name in enumerate(names)}
     ball = None
     if np.any(np.isfinite(track.ball[:, :2])):
@@ -234,7 +236,7 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         motion=motion,
         start_time=float(track.times[0]),
         clips=names,
-        clip=np.array([number[clips[clip].path] for clip in footage.clip]),
+        clip=np.array([number[source] for source in sources]),
         clip_frame=footage.clip_frame,
         mirrored=np.array([clips[clip].mirrored for clip in footage.clip]),
         words=words_shown(library, footage),

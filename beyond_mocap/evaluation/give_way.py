@@ -11,6 +11,7 @@ import numpy as np
 
 from ..annotation import Timeline
 from ..library.library import Library
+from ..library.landings import LANDING_FOLDER
 from ..library.made import MADE_FOLDER
 from ..motion.track import Track
 from . import feet, jerk, root
@@ -49,6 +50,7 @@ def give_way(
     asked = moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
         _made_running(played),
+        _made_landing(played),
         _too_fast(played, track, library),
         _warped(played, source, starts),
         _sliding(played),
@@ -93,9 +95,9 @@ def _span(first: float, last: float) -> str:
     return low if low == high else f"{low}-{high}"
 
 
-def _made(played: Played) -> np.ndarray:
-    """(T,) bool: frames of made running."""
-    table = np.array([path.startswith(MADE_FOLDER) for path in played.clips] + [False])
+def _made(played: Played, folder: str = MADE_FOLDER) -> np.ndarray:
+    """(T,) bool: frames of made running, or of what else is kept in `folder`."""
+    table = np.array([path.startswith(folder) for path in played.clips] + [False])
     return table[played.clip]
 
 
@@ -107,6 +109,14 @@ def _made_running(played: Played) -> str | None:
         f"{stretches(played.times, made)} ({np.sum(made) / played.motion.fps:.1f} s in all): made running, styled after the "
         "fastest recording, since none has the speed that the track asks for"
     )
+
+
+def _made_landing(played: Played) -> str | None:
+    made = _made(played, LANDING_FOLDER)
+    if not np.any(made):
+        return None
+    seconds = np.sum(made) / played.motion.fps
+    return f"{stretches(played.times, made)} ({seconds:.1f} s in all): made landing and getting up, since the recording ends in flight"
 
 
 def _too_fast(played: Played, track: Track | None, library: Library | None) -> str | None:

@@ -159,7 +159,7 @@ def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
 
 def measure(clip: Clip, fps: float) -> Recording:
     """One clip at `fps`, uncut, measured frame by frame; its floor is at height 0."""
-    motion = resample(clip.motion, fps)
+    motion = resample(clip.recording, fps)
     skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
     positions, rotations = forward_kinematics(motion)
     pelvis, planted = positions[:, hips, :2], positions[:, feet.foot_joints(skeleton)]

@@ -24,7 +24,7 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 5
+VERSION = 6
 _FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "features", "mean", "basis", "words")
 
 
@@ -93,7 +93,10 @@ def _header(key: str, library) -> dict:
         "notes": library.notes,
         "lengths": list(library.clusters),
         "clips": [
-            [clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations]]
+            [
+                clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
+                clip.recorded,
+            ]
             for clip in library.clips
         ],
     }
@@ -118,11 +121,11 @@ def _restore(header: dict, arrays: dict):
         header["names"], header["parents"], arrays["offsets"], header["end_parents"], arrays["end_offsets"]
     )
     clips, start = [], 0
-    for path, mirrored, fps, count, rows in header["clips"]:
+    for path, mirrored, fps, count, rows, recorded in header["clips"]:
         part = slice(start, start + count)
         motion = Motion(skeleton, arrays["root"][part], arrays["rotations"][part], fps)
         rows = tuple(ClipAnnotation(row["start"], row["end"], row["key"], tuple(row["words"])) for row in rows)
-        clips.append(Clip(path, mirrored, motion, rows, arrays["standing"][part]))
+        clips.append(Clip(path, mirrored, motion, rows, arrays["standing"][part], recorded))
         start += count
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Callable
+from typing import Callable, Iterable
 
 import numpy as np
 
@@ -18,15 +18,17 @@ from ..annotation import LOCOMOTION, ClipAnnotation, swap_sides
 from ..errors import Cancelled, InputError
 from ..files import bvh
 from ..motion import contacts as foot_contacts
+from ..motion.landing import ends_in_flight
 from ..motion.mirror import mirror
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
-from . import cache, one_skeleton, repair
+from . import cache, landings, one_skeleton, repair
 from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
 from .features import Frames, describe, joined
 from .keys import Key, keys_of
+from .landings import LANDING_FOLDER
 from .made import MADE_FOLDER, made_clips
-from .scan import Annotations, find_clips
+from .scan import CACHE_FOLDER, Annotations, find_clips
 
 FPS = 30.0
 Progress = Callable[[float, str], None]
@@ -38,7 +40,8 @@ class Clip:
 
     path: below the library's folder, with slashes. motion: at its own rate, metres, the floor (2nd percentile of its toe
     heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
-    standing: (T, 2, 2) bool, left and right foot, whether heel and toe stand on the ground.
+    standing: (T, 2, 2) bool, left and right foot, whether heel and toe stand on the ground. recorded: number of frames
+    that are recorded, where landing and getting up were made behind them (`library.landings`); None: all.
     """
 
     path: str
@@ -46,11 +49,23 @@ class Clip:
     motion: Motion
     annotations: tuple[ClipAnnotation, ...]
     standing: np.ndarray
+    recorded: int | None = None
 
     @property
     def made(self) -> bool:
         """Whether it is made running (`library.made`) and no recording."""
         return self.path.startswith(MADE_FOLDER)
+
+    @property
+    def recording(self) -> Motion:
+        """What of it was recorded."""
+        return self.motion if self.recorded is None else self.motion.frames(0, self.recorded)
+
+    def source_at(self, frame: float) -> str:
+        """The file that shows `frame` (the clip's own rate), as a path below the library: the recording, or behind its
+        end the file of the same frames that was made."""
+        made = self.recorded is not None and frame > self.recorded - 1
+        return LANDING_FOLDER + self.path if made else self.path
 
     @property
     def contacts(self) -> np.ndarray:
@@ -64,7 +79,7 @@ class Clip:
     def twin(self) -> "Clip":
         """The same clip with left and right exchanged (Faustino §3.1.2), words too."""
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
-        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, self.standing[:, ::-1])
+        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, self.standing[:, ::-1], self.recorded)
 
 
 @dataclass(frozen=True)
@@ -116,7 +131,7 @@ class Library:
         if made is None:
             made = _made(self)
             if self.kept:
-                _keep_made(self.kept[0], made)
+                _keep_made(self.kept[0], made.clips)
                 cache.save(*self.kept, made, "made")
         if not made.clips:
             return self
@@ -168,6 +183,7 @@ def build(
     notes: list[str] = [where] if where else []
     clips = _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled)
     built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
+    _keep_made(place, [clip for clip in built.clips if clip.recorded is not None])
     if not cache.save(place, key, built):
         told = f"{place} cannot be written: the library is worked out anew each time; give --cache a folder of yours"
         built = replace(built, notes=(*built.notes, told))
@@ -188,14 +204,15 @@ def _made(library: Library) -> Library:
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
 
 
-def _keep_made(place: Path, made: Library) -> None:
-    """Writes the made clips as BVH beside the cache, so that whoever follows a take's provenance finds them; a place that
-    cannot be written is left alone."""
+def _keep_made(place: Path, made: Iterable[Clip]) -> None:
+    """Writes clips that are made, or end so, as BVH beside the cache, so that whoever follows a take's provenance finds
+    them; a place that cannot be written is left alone."""
     try:
-        (place / Path(MADE_FOLDER).name).mkdir(parents=True, exist_ok=True)
-        for clip in made.clips:
+        for clip in made:
             if not clip.mirrored:
-                bvh.write(place / Path(MADE_FOLDER).name / Path(clip.path).name, clip.motion)
+                file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)
+                file.parent.mkdir(parents=True, exist_ok=True)
+                bvh.write(file, clip.motion)
     except OSError:
         return
 
@@ -219,22 +236,36 @@ def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancell
     notes += _unit_notes(read)
     unpopped = [repair.without_pops(source.motion) for source in read]
     carried = one_skeleton.bring(paths, [motion for motion, _ in unpopped], _chosen(chosen, unit), notes)
-    clips, mended = [], []
+    mended, rows = [], []
     for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
         _check(cancelled)
         report(0.4 + 0.3 * number / len(paths), f"Mending and mirroring {path.name}")
         mended.append(repair.grounded(motion, standing, moved))
-        rows = _rows(path, annotations.of(path, motion.fps), len(motion))
-        name = path.relative_to(folder).as_posix()
-        clip = Clip(name, False, mended[-1].motion, rows, mended[-1].standing)
-        clips += [clip, clip.twin()]
+        rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
     notes += repair.told([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
+    originals = _landed([path.relative_to(folder).as_posix() for path in paths], mended, rows, notes)
+    clips = [clip for original in originals for clip in (original, original.twin())]
     if not any(clip.annotations for clip in clips):
         raise InputError(
             folder, "no annotation for any clip", "NAME.txt beside NAME.bvh or an annotations.csv",
             "write which frames are standing, walking, jogging, running, kick ...",
         )
     return tuple(clips)
+
+
+def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[str]) -> list[Clip]:
+    """The clips, those that end in flight with landing and getting up behind them."""
+    flying = [ends_in_flight(one.motion) for one in mended]
+    ways = landings.ways_up([(one.motion, own, one.standing) for one, own in zip(mended, rows)]) if any(flying) else []
+    clips, ends = [], []
+    for name, one, own, flies in zip(names, mended, rows, flying):
+        if flies:
+            ends.append(landings.completed(one.motion, own, one.standing, ways))
+            clips.append(Clip(name, False, ends[-1].motion, ends[-1].rows, ends[-1].standing, ends[-1].recorded))
+        else:
+            clips.append(Clip(name, False, one.motion, own, one.standing))
+    notes += landings.told(ends, ways)
+    return clips
 
 
 def _chosen(path: Path | None, unit: float | None) -> Motion | None:

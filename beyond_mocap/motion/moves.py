@@ -274,13 +274,15 @@ _UP = {
 _UP_TIME = 3.9
 
 
-def getting_up(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, rest: float = 0.8) -> Gesture:
+def getting_up(
+    skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, rest: float = 0.8, example: Motion | None = None
+) -> Gesture:
     """From lying on the back, face up, to standing: sitting up on the hands, feet drawn in, over the crouch; key:
     halfway.
 
-    rest: seconds of lying before.
+    rest: seconds of lying before. example: a recording of the skeleton, for its neutral stance.
     """
-    neutral = neutral_stance(skeleton or adult_skeleton())
+    neutral = neutral_stance(skeleton or adult_skeleton(), example)
     scale = neutral.leg / tables.LEG
     duration = rest + _UP_TIME + 0.9
     course, _, posture = _standing(neutral, duration, fps, seed)

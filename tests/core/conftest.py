@@ -1,6 +1,7 @@
 """A small made library with planted truths (speeds, a kick's moment), and made tracks, for the core's tests."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -8,9 +9,15 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.files import bvh
 from beyond_mocap.library.library import Library, build
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.gestures import strike
-from beyond_mocap.motion.motion import Motion
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.motion import Motion, pose_kinematics
+from beyond_mocap.motion.moves import getting_up
+from beyond_mocap.motion.neutral import neutral_stance
+from beyond_mocap.motion.resting import on_the_side
 from beyond_mocap.motion.track import Track
 
 # clip -> metres per second, words
@@ -60,6 +67,59 @@ def library(clips_folder) -> Library:
 def kick_seconds() -> float:
     """When the ball is kicked in the made clip."""
     return strike("kick low inside", fps=60.0).key
+
+
+class Flight(NamedTuple):
+    """A planted flight: its motion, and place (3,) m and speed (3,) m/s of the body's middle at its end."""
+
+    motion: Motion
+    place: np.ndarray
+    speed: np.ndarray
+
+    def middle(self, seconds: np.ndarray) -> np.ndarray:
+        """(T, 3) m, seconds (T,) from the end."""
+        return self.place + seconds[:, None] * self.speed + [0.0, 0.0, -0.5 * 9.81] * seconds[:, None] ** 2
+
+
+@pytest.fixture(scope="session")
+def flight() -> Flight:
+    """0.3 s at 100 fps of a dive to the left, arms stretched, leaning 50 degrees at its end and more by 1.5 rad/s."""
+    skeleton = adult_skeleton()
+    body = identify(skeleton)
+    seconds = np.arange(-30, 1) / 100.0
+    local = np.tile(on_the_side(neutral_stance(skeleton), True, settled=False), (len(seconds), 1, 1))
+    upright = getting_up(skeleton, 100.0).motion.rotations[-1, 0]
+    lean = quaternion.from_rotation_vector((-np.radians(50.0) - 1.5 * seconds)[:, None] * [1.0, 0.0, 0.0])
+    local[:, 0] = quaternion.multiply(lean, upright)
+    places, _ = pose_kinematics(skeleton, np.zeros((len(seconds), 3)), local)
+    away = places[:, body.hips] + 0.25 * (places[:, body.neck] - places[:, body.hips])
+    found = Flight(None, np.array([0.0, 0.0, 1.1]), np.array([0.6, 2.5, -0.8]))
+    return found._replace(motion=Motion(skeleton, found.middle(seconds) - away, local, 100.0))
+
+
+@pytest.fixture(scope="session")
+def dive_file(flight):
+    """dive_file(path): half a second of standing, a take-off to the left, and the planted flight; its words name the
+    dive, its key is where the flight begins."""
+
+    def make(path) -> Path:
+        standing = getting_up(flight.motion.skeleton, 100.0).motion
+        away = flight.motion.root_positions[0] - [0.0, 0.4, 0.0]
+        count, take_off = 50, np.linspace(0.0, 1.0, 22)[1:-1, None]
+        root = np.tile([*away[:2], standing.root_positions[-1, 2]], (count, 1))
+        lifted = root[-1] + take_off * (flight.motion.root_positions[0] - root[-1])
+        still = np.tile(standing.rotations[-1], (count, 1, 1))
+        turned = quaternion.slerp(still[:1], flight.motion.rotations[:1], take_off)
+        whole = Motion(
+            flight.motion.skeleton,
+            np.concatenate([root, lifted, flight.motion.root_positions]),
+            np.concatenate([still, turned, flight.motion.rotations]),
+            100.0,
+        )
+        text = f"20f {len(whole) - 1}f dive left high\n{count + 20}f dive left high\n0 0.4 standing\n"
+        return write_clip(Path(path), whole, text)
+
+    return make
 
 
 @pytest.fixture(scope="session")

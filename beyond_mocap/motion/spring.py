@@ -1,0 +1,34 @@
+"""A critically damped follower of third order: what is off its goal fades, from any place, speed and acceleration, smoothly.
+
+Offsets are vectors (rotation vectors, metres). All three poles lie at -rate, so that nothing overshoots from rest and the
+acceleration is continuous wherever the goal changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """Off the goal: place, speed (per second) and acceleration (per second squared), (..., K) each."""
+
+    place: np.ndarray
+    speed: np.ndarray
+    acceleration: np.ndarray
+
+    def faded(self, seconds: np.ndarray, rate: float) -> "Offset":
+        """The offset after `seconds` (T,), each (T, ..., K); `rate` per second: after 6 / rate about 6 % are left."""
+        t = np.asarray(seconds, dtype=float).reshape(-1, *[1] * np.ndim(self.place))
+        a = self.place
+        b = self.speed + rate * a
+        c = 0.5 * (self.acceleration + 2.0 * rate * self.speed + rate**2 * a)
+        left = np.exp(-rate * t)
+        value, slope, bend = a + b * t + c * t**2, b + 2.0 * c * t, 2.0 * c
+        return Offset(
+            left * value,
+            left * (slope - rate * value),
+            left * (bend - 2.0 * rate * slope + rate**2 * value),
+        )
