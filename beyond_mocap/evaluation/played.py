@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..library.library import Library
+from ..library.landings import LANDING_FOLDER
 from ..library.made import FPS as MADE_FPS
 from ..library.made import MADE_FOLDER
 from ..motion import contacts as foot_contacts
@@ -81,7 +82,7 @@ class Played:
         known = {} if library is None else {clip.path: clip.motion.fps for clip in library.clips}
         rates = np.ones(len(self.clips) + 1)
         for index, path in enumerate(self.clips):
-            fps = MADE_FPS if path.startswith(MADE_FOLDER) else known.get(path)
+            fps = MADE_FPS if path.startswith(MADE_FOLDER) else known.get(path.removeprefix(LANDING_FOLDER))
             rates[index] = fps / self.motion.fps if fps else _usual_step(self.clip_frame, self.clip == index)
         return rates[self.clip]
 
