@@ -36,7 +36,8 @@ from .synthesis.path_search import SLOT, Between, PathSearch
 from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
-    Progress, faced, key_result, met, smoothed, synthesize, touches, with_made_gaits, with_warnings, words_shown,
+    Progress, faced, key_result, met, smoothed, sources_shown, synthesize, touches, with_made_gaits, with_warnings,
+    words_shown,
 )
 from .take import BallPath, KeyResult, Take
 
@@ -130,8 +131,7 @@ def _made_from(library: Library, before: Take, count: int) -> bool:
     if edit is None or len(edit) != count or edit.clip.max() >= len(library.clips):
         return False
     what = shown(library, edit, _index(len(before.motion), library, fps, count))
-    table = [clip.path for clip in library.clips]
-    paths = np.array([table[clip] for clip in what.clip]) == np.array(before.clips)[before.clip]
+    paths = np.array(sources_shown(library, what)) == np.array(before.clips)[before.clip]
     return bool(np.all(paths) and np.allclose(what.clip_frame, before.clip_frame, rtol=0.0, atol=1e-6))
 
 
@@ -200,17 +200,18 @@ class _Update:
 
     def take(self) -> Take:
         """The take as it now is."""
-        clips, made = self.library.clips, self.anew
-        names = tuple(dict.fromkeys((*self.before.clips, *(clips[clip].path for clip in self.shown.clip[made]))))
-        number = np.array([names.index(clip.path) if clip.path in names else -1 for clip in clips])
-        mirrored = np.array([clip.mirrored for clip in clips])
+        made = self.anew
+        mirrored = np.array([clip.mirrored for clip in self.library.clips])
         part = Shown(*(values[made] for values in (self.shown.clip, self.shown.frame, self.shown.clip_frame, self.shown.piece)))
-        new = iter(words_shown(self.library, part))
+        new, sources = iter(words_shown(self.library, part)), sources_shown(self.library, part)
+        names = tuple(dict.fromkeys((*self.before.clips, *sources)))
+        clip = np.array(self.before.clip)
+        clip[made] = [names.index(source) for source in sources]
         return replace(
             self.before,
             motion=Motion(self.library.skeleton, self.root, self.rotations, self.plan.fps),
             clips=names,
-            clip=np.where(made, number[self.shown.clip], self.before.clip),
+            clip=clip,
             clip_frame=np.where(made, self.shown.clip_frame, self.before.clip_frame),
             mirrored=np.where(made, mirrored[self.shown.clip], self.before.mirrored),
             words=tuple(next(new) if fresh else old for fresh, old in zip(made, self.before.words)),

@@ -225,8 +225,7 @@ def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
 
 def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage, motion, keys, seconds) -> Take:
     clips = library.clips
-    shown = np.round(footage.clip_frame, 6)
-    sources = [clips[clip].source_at(frame) for clip, frame in zip(footage.clip, shown)]
+    sources = sources_shown(library, footage)
     names = tuple(dict.fromkeys(sources))
     number = {name: i for i, name in enumerate(names)}
     ball = None
@@ -251,6 +250,12 @@ def _take(library, plan, order: Wanted, track, edit: EditList, footage: Footage,
         plan=plan,
         edit=edit,
     )
+
+
+def sources_shown(library: Library, shown: Shown) -> tuple[str, ...]:
+    """The files, below the library, that hold every shown frame: recordings, or what was made behind their end."""
+    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
+    return tuple(library.clips[clip].source_at(frame) for clip, frame in frames)
 
 
 def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:

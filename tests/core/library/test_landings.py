@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from beyond_mocap.library.landings import LANDING_FOLDER
 from beyond_mocap.library.library import build
 from beyond_mocap.motion.moves import getting_up
 from beyond_mocap.plan import Plan
+from beyond_mocap.resynthesize import resynthesize
 from beyond_mocap.synthesize import synthesize
 
 
@@ -104,3 +107,15 @@ def test_a_dive_is_played_to_its_feet_on_the_track(keeper, track_of, timeline_of
     heights = take.motion.root_positions[played, 2]
     assert heights.min() < 0.3 and heights[-1] > 0.8
     assert take.keys[0].clip == "saves/dive.bvh" and take.keys[0].frame == pytest.approx(150.0, abs=0.5)
+
+
+def test_an_edit_far_from_a_dive_leaves_what_is_made_as_it_was(keeper, track_of, timeline_of):
+    track = track_of(speed=lambda t: 2.2 * np.exp(-(((t - 5.0) / 0.4) ** 2)), seconds=24.0, turn=lambda t: 0.0 * t + 1.0)
+    plan = Plan(track=track, timeline=timeline_of((5.0, "dive left")))
+    before = synthesize(keeper, plan)
+    after = resynthesize(keeper, replace(plan, timeline=timeline_of((5.0, "dive left"), (18.0, "dive right"))), before)
+    sources = np.array(after.clips)[after.clip]
+    at = sources == LANDING_FOLDER + "saves/dive.bvh"
+    assert at[:300].sum() > 60 and at[500:].sum() > 60
+    assert np.array_equal(before.motion.rotations[:400], after.motion.rotations[:400])
+    assert np.array_equal(np.array(before.clips)[before.clip][:400], sources[:400])
