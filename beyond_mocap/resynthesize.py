@@ -36,8 +36,8 @@ from .synthesis.path_search import SLOT, Between, PathSearch
 from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
-    Progress, faced, key_result, met, smoothed, sources_shown, synthesize, touches, with_made_gaits, with_warnings,
-    words_shown,
+    Progress, faced, given, key_result, met, smoothed, sources_shown, synthesize, touches, with_made_gaits,
+    with_warnings, words_shown,
 )
 from .take import BallPath, KeyResult, Take
 
@@ -246,17 +246,20 @@ class _Window:
     def planted(self) -> Planted:
         """The motion laid on the ground between what stays, feet planted."""
         update, plan, track = self.update, self.update.plan, self.track
-        smooth, given = smoothed(plan, self.footage), self.share > 0.0
+        smooth, stays = smoothed(update.library, plan, self.footage), self.share > 0.0
         rotation = update.rotations[self.low : self.high, 0]
         kept = quaternion.yaw(quaternion.multiply(rotation, quaternion.inverse(smooth.pose[:, 0])))
-        kept[~given] = np.nan
+        kept[~stays] = np.nan
         angle = facing(track.direction, track.speed, smooth.velocity, smooth.turn, kept)
         direction = self._same_way_round(angle, np.unwrap(quaternion.yaw(rotation)))
         if direction is not None:
             angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept)
         ground = self._pulled(root_with_sway(track.positions, smooth.sway, angle))
         root = np.concatenate([ground, smooth.height[:, None]], axis=1)
-        return plant(update.library.skeleton, root, faced(smooth.pose, angle), smooth.standing, plan.fps)
+        root, pose = given(
+            update.library, plan, track, root, faced(smooth.pose, angle), smooth.standing, 1.0 - self.share
+        )
+        return plant(update.library.skeleton, root, pose, smooth.standing, plan.fps)
 
     def _same_way_round(self, angle: np.ndarray, old: np.ndarray) -> np.ndarray | None:
         """The track's direction (W,) with which a body that now turns the other way round than it did, where it is so slow
@@ -277,14 +280,14 @@ class _Window:
 
     def _pulled(self, laid: np.ndarray) -> np.ndarray:
         """(W, 2) the laid-out root on the track; near the given frames it sets out from where the old one is."""
-        plan, old, given = self.update.plan, self.update.root[self.low : self.high, :2], self.share > 0.0
+        plan, old, stays = self.update.plan, self.update.root[self.low : self.high, :2], self.share > 0.0
         first, end = self.stretch
         at, fade = np.arange(len(laid)), max(1.0, min(OFFSET_SECONDS * plan.fps, end - first))
         root = laid.copy()
         for edge in [edge for edge in (first - 1, end) if 0 <= edge < len(laid)]:
             near = eased(1.0 - np.abs(at - edge) / fade, np.ones(len(at)))[:, None]
-            root += np.where(given[:, None], 0.0, near * (old - laid)[edge])
-        root = np.where(given[:, None], old, root)
+            root += np.where(stays[:, None], 0.0, near * (old - laid)[edge])
+        root = np.where(stays[:, None], old, root)
         pulled = pulled_to_track(root, self.track.raw, plan.fps, plan.root_window)
         return pulled + self.share[:, None] * (old - pulled)
 

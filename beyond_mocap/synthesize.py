@@ -6,7 +6,8 @@
 
 The plan is put into frames (`synthesis.wanted`), a search picks what is shown (`synthesis.path_search`, or
 `synthesis.blocks` with `synthesis.locomotion`), the frames are fetched (`synthesis.footage`), seams are smoothed
-(`polish.smoothing`) and the motion is laid on the ground (`polish.on_track`, or `polish.joining` without a track).
+(`polish.cross_fade`, or `polish.smoothing` by Faustino's methods) and the motion is laid on the ground (`polish.on_track`,
+or `polish.joining` without a track).
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ from .motion.humanoid import identify
 from .motion.motion import Motion, pose_kinematics
 from .motion.track import SampledTrack, sample
 from .plan import METHODS, Plan
+from .polish.cross_fade import faded_rotations, faded_values, share
 from .polish.foot_plant import Planted, plant
+from .polish.give import give
 from .polish.joining import chained_facing, chained_root, torso_corrections
 from .polish.on_track import facing, pulled_to_track, root_with_sway
 from .polish.smoothing import spread_rotations, spread_values
@@ -37,7 +40,7 @@ from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.edit_list import EditList
-from .synthesis.footage import Footage, Shown, fetch
+from .synthesis.footage import Footage, Shown, fetch, overlap
 from .synthesis.locomotion import match_distance, travelled_distance
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, needed, wanted
@@ -129,7 +132,7 @@ def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cance
 
 def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index) -> Planted:
     """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand."""
-    smooth = smoothed(plan, footage)
+    smooth = smoothed(library, plan, footage)
     if plan.method == "blocks":
         angle, ground = _chained(library, footage, smooth, track, plan.fps)
     else:
@@ -137,21 +140,49 @@ def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footag
     pose = faced(smooth.pose, angle)
     root = np.concatenate([ground, smooth.height[:, None]], axis=1)
     if plan.method == "path":
+        root, pose = given(library, plan, track, root, pose, footage.standing)
         return plant(library.skeleton, root, pose, footage.standing, plan.fps)
     none = np.zeros((len(root), 2))
     return Planted(root, pose, none, none)
 
 
-def smoothed(plan: Plan, footage: Footage) -> Footage:
-    """The footage with its jumps at seams spread over the frames around them."""
+def smoothed(library: Library, plan: Plan, footage: Footage) -> Footage:
+    """The footage without jumps at its seams: faded over by what both recordings show or, by Faustino's methods, spread as
+    he does. A fade is half as long as his window."""
     reach = 0.5 * plan.seam_window * plan.fps
-    pose = spread_rotations(footage.pose, footage.seams, footage.ahead_pose, reach)
-    height = spread_values(footage.height, footage.seams, footage.ahead_height, reach)
-    return replace(footage, pose=pose, height=height, sway=spread_values(footage.sway, footage.seams, footage.ahead_sway, reach))
+    if plan.method != "path":
+        return _spread(footage, reach)
+    over = overlap(library, footage, 0.5 * reach)
+    weight = share(over.through, over.after)
+    return replace(
+        footage,
+        pose=faded_rotations(footage.pose, over.at, over.pose, weight),
+        height=faded_values(footage.height, over.at, over.height, weight),
+        sway=faded_values(footage.sway, over.at, over.sway, weight),
+    )
+
+
+def _spread(footage: Footage, reach: float) -> Footage:
+    return replace(
+        footage,
+        pose=spread_rotations(footage.pose, footage.seams, footage.ahead_pose, reach),
+        height=spread_values(footage.height, footage.seams, footage.ahead_height, reach),
+        sway=spread_values(footage.sway, footage.seams, footage.ahead_sway, reach),
+    )
+
+
+def given(library: Library, plan: Plan, track: SampledTrack, root, pose, standing: np.ndarray, free=1.0):
+    """Root (T, 3) m and local rotations (T, J, 4) of a body laid on its track that gives where its feet would slide, where
+    it is `free` (T,) to: 1, or nothing at 0."""
+    move, turn = give(library.skeleton, root, pose, standing, plan.fps)
+    pulled = pulled_to_track(root[:, :2] + move, track.raw, plan.fps, plan.root_window)
+    free = np.broadcast_to(free, len(root))
+    ground = root[:, :2] + free[:, None] * (pulled - root[:, :2])
+    return np.concatenate([ground, root[:, 2:]], axis=1), faced(pose, free * turn)
 
 
 def faced(pose: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Poses (T, J, 4) in the facing frame as local rotations in the world, facing `angle` (T,) radians."""
+    """Poses (T, J, 4) turned about the vertical by `angle` (T,) radians; from the facing frame: facing there."""
     out = pose.copy()
     out[:, 0] = quaternion.multiply(quaternion.about_up(angle), pose[:, 0])
     return out

@@ -33,6 +33,7 @@ _SLIDES = 0.13
 _FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2
 _FLOOR_MOST = 0.02  # metres of drift that are left alone: no floor is that even, and soles lie a little differently
 _KEEP_SPEED = 0.005
+_SINKS = 0.10  # metres that a suit's pelvis may be too high above its feet
 _BALL = 0.7  # of the way from ankle to the foot's tip
 
 
@@ -113,7 +114,7 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 def held(motion: Motion, standing: np.ndarray) -> Motion:
     """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, on the floor it has."""
     floor = np.array([0.0, 0.0, contacts.floor_height(motion)])
-    planted = plant(motion.skeleton, motion.root_positions - floor, motion.rotations, standing, motion.fps)
+    planted = plant(motion.skeleton, motion.root_positions - floor, motion.rotations, standing, motion.fps, _SINKS)
     return replace(motion, root_positions=planted.root + floor, rotations=planted.rotations)
 
 

@@ -4,11 +4,14 @@ Which frames are stance is known from the recording and carried along (../shared
 the motion itself. A stance is not pinned to one point and blended in and out; instead each foot's shift over the ground is
 one smooth curve D(t) that cancels the velocity of the point that carries the foot while it stands and may do anything
 gentle in between: the least squares problem of `shift`, one banded system for the whole motion.
+
+A foot rolls: first the heel carries it, then the toe, on which the heel rises while it is still low and slow. Where a leg
+does not reach, people rise on their toes; so does the foot here, then the pelvis sinks, and then the foot slides.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -20,13 +23,24 @@ from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from .reach import two_bone
 
-SMOOTH = 0.02
-PULL = 2e-4
-MOST_DROP = 0.10
-MOST_SHIFT = 0.25
-EASE = 0.012
+SMOOTH, PULL = 0.005, 3e-4
+"""Weights of `shift`."""
+
+HEEL_SHARE = 0.2
+"""How firmly a heel is held while its toe stands too, against the toe's 1."""
+
+MOST_DROP, MOST_RISE = 0.04, 0.35
+"""Metres that the pelvis is lowered, and radians that a heel is raised about its toe, at most."""
+
 HOLD = 1e6
 """Weight of a shift that is given: so much more than all else that it stays."""
+
+MOST_SHIFT = 0.25
+EASE, SPARE = 0.012, 0.004
+"""Metres below full length from which a leg eases, and which are left of it where it stands (`limb.soft_distance`)."""
+
+_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004
+_BEHIND = 3  # frames at 30 per second by which a rise or drop is spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,66 +54,141 @@ class Planted:
     miss: np.ndarray
 
 
-def plant(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float) -> Planted:
+@dataclass(frozen=True, eq=False)
+class _Foot:
+    """One foot laid out: hip, heel (the ankle joint) and toe (T, 3) m, rotation (T, 4) in the world, left (T, 3) level
+    across it, weight (T, 2) of heel and toe, length (T,) m of its leg; `moves` (T - 1, 2, 2) m of heel and toe over the
+    ground."""
+
+    limb: Limb
+    hip: np.ndarray
+    heel: np.ndarray
+    toe: np.ndarray
+    rotation: np.ndarray
+    left: np.ndarray
+    weight: np.ndarray
+    length: np.ndarray
+
+    @property
+    def moves(self) -> np.ndarray:
+        return np.stack([np.diff(self.heel[:, :2], axis=0), np.diff(self.toe[:, :2], axis=0)], axis=1)
+
+    @property
+    def carries(self) -> np.ndarray:
+        """(T,) how firmly the foot stands at all."""
+        return self.weight.max(axis=1)
+
+
+def plant(
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float, sinks: float = MOST_DROP
+) -> Planted:
     """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn about
-    the vertical that holds a flat foot's direction; the pelvis is lowered where a leg could not reach.
+    the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the pelvis is
+    lowered where that is not enough, by at most `sinks` metres.
     """
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
-    scale = 30.0 / fps
-    goals = [_goal(places, world, limb, standing[:, side], scale) for side, limb in enumerate((body.left, body.right))]
-    root = root.copy()
-    root[:, 2] -= _drop(places, (body.left, body.right), [goal for goal, _ in goals], int(round(4 * fps / 30.0)))
+    scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
+    feet = [_turned(_laid(places, world, limb, standing[:, side]), scale) for side, limb in enumerate((body.left, body.right))]
+    lifts = [_lift(foot, scale) for foot in feet]
+    firm = [foot.weight for foot in feet]
+    for turn in range(_EASED_ROUNDS + 1):
+        goals = [_goal(foot, weight, lift, scale, spread) for foot, weight, lift in zip(feet, firm, lifts)]
+        drop = _drop(feet, [goal for goal, _ in goals], spread, sinks)
+        short = [_short(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
+        if turn == _EASED_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
+            break
+        firm = [_eased(weight, s) for weight, s in zip(firm, short)]
+    root = root - drop[:, None] * [0.0, 0.0, 1.0]
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     out = rotations
-    for side, limb in enumerate((body.left, body.right)):
-        target, foot = goals[side]
-        chain = (limb.upper_leg, limb.lower_leg, limb.foot)
-        reached = two_bone(skeleton, root, out, chain, target, end_rotation=foot, soft=EASE)
+    for side, (foot, (target, turned)) in enumerate(zip(feet, goals)):
+        target = _within_reach(foot, target, drop)
+        chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
+        reached = two_bone(skeleton, root, out, chain, target, end_rotation=turned, soft=EASE)
         out, miss[:, side] = reached.rotations, reached.miss
-        correction[:, side] = np.linalg.norm(target - places[:, limb.foot], axis=1)
+        correction[:, side] = np.linalg.norm(target - places[:, foot.limb.foot], axis=1)
     return Planted(root, out, correction, miss)
 
 
-def _goal(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray, scale: float):
-    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4)."""
-    heel, toe = places[:, limb.foot], places[:, limb.toe_or_foot]
-    weight = _firmness(stands)
+def _laid(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray) -> _Foot:
+    hip, knee, heel, toe = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
+    weight = firmness(stands)
+    length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
-    yaw = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
-    flat = np.min(weight, axis=1)
-    turn = shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0]
-    spin = quaternion.about_up(turn)
-    toe = heel + quaternion.rotate(spin, toe - heel)
-    ground, weight = _held(np.stack([np.diff(heel[:, :2], axis=0), np.diff(toe[:, :2], axis=0)], axis=1), weight, scale)
-    lift = _lift(heel[:, 2], toe[:, 2], weight, scale)
-    return heel + np.column_stack([ground, lift]), quaternion.multiply(spin, world[:, limb.foot])
+    yaw = np.arctan2(along[:, 1], along[:, 0])
+    left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
+    return _Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length)
 
 
-def _firmness(stands: np.ndarray) -> np.ndarray:
-    """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, when it is still arriving, else 0."""
+def firmness(stands: np.ndarray) -> np.ndarray:
+    """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, when it is still arriving, else 0.
+    The heel gives way to a toe that stands."""
     padded = np.pad(stands, ((1, 1), (0, 0)), mode="edge")
     inner = stands & padded[:-2] & padded[2:]
-    return np.where(inner, 1.0, np.where(stands, 0.5, 0.0))
+    weight = np.where(inner, 1.0, np.where(stands, 0.5, 0.0))
+    weight[:, 0] *= 1.0 - (1.0 - HEEL_SHARE) * weight[:, 1]
+    return weight
+
+
+def _turned(foot: _Foot, scale: float) -> _Foot:
+    """The foot turned about its heel and the vertical so that it keeps its direction while it lies flat."""
+    yaw = np.unwrap(np.arctan2(-foot.left[:, 0], foot.left[:, 1]))
+    flat = np.minimum(foot.weight[:, 0] / HEEL_SHARE, foot.weight[:, 1]).clip(0.0, 1.0)
+    spin = quaternion.about_up(shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0])
+    toe = foot.heel + quaternion.rotate(spin, foot.toe - foot.heel)
+    left = quaternion.rotate(spin, foot.left)
+    return replace(foot, toe=toe, rotation=quaternion.multiply(spin, foot.rotation), left=left)
+
+
+def _goal(foot: _Foot, weight: np.ndarray, lift: np.ndarray, scale: float, spread: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4)."""
+    ground, weight = _held(foot.moves, weight, scale)
+    moved = np.column_stack([ground, lift])
+    rise = _spread(_rise(foot, moved) * foot.weight[:, 1], spread)
+    roll = quaternion.about_axis(foot.left, rise)
+    ankle = foot.toe + moved + quaternion.rotate(roll, foot.heel - foot.toe)
+    return ankle, quaternion.multiply(roll, foot.rotation)
+
+
+def _rise(foot: _Foot, moved: np.ndarray) -> np.ndarray:
+    """(T,) least radians, at most MOST_RISE, by which the heel turns up about the toe so that the leg reaches its ankle.
+
+    With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K.
+    """
+    u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
+    across = np.sum(a * n, axis=1, keepdims=True)
+    level = a - across * n
+    even, odd = np.sum(u * level, axis=1), np.sum(u * quaternion.cross(n, level), axis=1)
+    length = foot.length - SPARE
+    asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
+    most = np.hypot(even, odd)
+    rise = np.arctan2(odd, even) - np.arccos(np.clip(asked / np.maximum(most, 1e-9), -1.0, 1.0))
+    return np.where((asked > even) & (odd > 0.0), np.clip(rise, 0.0, MOST_RISE), 0.0)
 
 
 def _held(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than MOST_SHIFT are
     held less firmly, since a foot that slides looks better than a leg torn after it (give-way order, ../shared/metrics.md)."""
-    stance = weight.max(axis=1) > 0
-    label = np.cumsum(np.diff(stance, prepend=False)) * stance
     ground = shift(velocity, weight, scale)
     for _ in range(4):
-        far = np.zeros(label.max() + 1)
-        np.maximum.at(far, label, np.where(stance, np.linalg.norm(ground, axis=1), 0.0))
-        if far.max() <= MOST_SHIFT:
+        far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
+        if far.max(initial=0.0) <= MOST_SHIFT:
             break
-        ease = np.minimum(1.0, (MOST_SHIFT / np.maximum(far, 1e-9)) ** 3)
-        weight = weight * ease[label][:, None]
+        weight = _eased(weight, far - MOST_SHIFT)
         ground = shift(velocity, weight, scale)
     return ground, weight
+
+
+def _eased(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
+    """Weights (T, 2) with those stances held less firmly in which `excess` (T,) m is above 0: a third at 10 cm."""
+    stance = weight.max(axis=1) > 0
+    label = np.cumsum(np.diff(stance, prepend=False)) * stance
+    worst = np.zeros(label.max(initial=0) + 1)
+    np.maximum.at(worst, label, np.where(stance, np.maximum(excess, 0.0), 0.0))
+    return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2
 
 
 def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np.ndarray | None = None) -> np.ndarray:
@@ -137,9 +226,10 @@ def _add_differences(band: np.ndarray, stencil: np.ndarray, weight: np.ndarray) 
             band[i - j, j : j + len(weight)] += weight * a * b
 
 
-def _lift(heel: np.ndarray, toe: np.ndarray, weight: np.ndarray, scale: float) -> np.ndarray:
+def _lift(foot: _Foot, scale: float) -> np.ndarray:
     """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes on the ground, and keeps
     both above it at all times."""
+    heel, toe, weight = foot.heel[:, 2], foot.toe[:, 2], np.ceil(foot.weight) * [HEEL_SHARE, 1.0]
     flat = weight.min(axis=1) > 0
     rest = float(np.median((heel - toe)[flat])) if np.any(flat) else float(np.percentile(heel, 5))
     low = np.stack([heel - max(rest, 0.0), toe], axis=1)
@@ -161,17 +251,36 @@ def _settle(right: np.ndarray, weight: np.ndarray, scale: float) -> np.ndarray:
     return solveh_banded(band, right, lower=True)
 
 
-def _drop(places: np.ndarray, limbs: tuple[Limb, Limb], goals: list[np.ndarray], reach: int) -> np.ndarray:
-    """(T,) metres to lower the pelvis so that both ankles can be reached, at most MOST_DROP, without a jerk."""
-    need = np.zeros(len(places))
-    for limb, goal in zip(limbs, goals):
-        hip, knee, ankle = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot))
-        length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(ankle - knee, axis=1) - EASE
-        level = np.linalg.norm(goal[:, :2] - hip[:, :2], axis=1)
+def _drop(feet: list[_Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:
+    """(T,) metres to lower the pelvis so that standing ankles can be reached, at most `most`, without a jerk."""
+    need = np.zeros(len(goals[0]))
+    for foot, goal in zip(feet, goals):
+        length = foot.length - SPARE
+        level = np.linalg.norm(goal[:, :2] - foot.hip[:, :2], axis=1)
         highest = goal[:, 2] + np.sqrt(np.maximum(length**2 - level**2, 0.0))
-        need = np.maximum(need, np.where(level < length, hip[:, 2] - highest, MOST_DROP))
-    need = np.clip(need, 0.0, MOST_DROP)
+        lacks = np.where(level < length, foot.hip[:, 2] - highest, most)
+        need = np.maximum(need, np.where(foot.carries > 0, lacks, 0.0))
+    return _spread(np.clip(need, 0.0, most), spread)
+
+
+def _spread(need: np.ndarray, reach: int) -> np.ndarray:
+    """A smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
     window = np.hanning(2 * reach + 3)[1:-1]
     widened = maximum_filter1d(need, 2 * reach + 1, mode="nearest")
     padded = np.pad(widened, reach, mode="edge")
     return np.convolve(padded, window / window.sum(), mode="valid")
+
+
+def _short(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
+    """(T,) metres that a standing foot's leg lacks."""
+    reach = goal - foot.hip + drop[:, None] * [0.0, 0.0, 1.0]
+    return np.where(foot.carries > 0, np.linalg.norm(reach, axis=1) - foot.length + SPARE, 0.0)
+
+
+def _within_reach(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
+    """Goals (T, 3) with those of feet in the air brought as near as the leg is long."""
+    hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
+    reach = goal - hip
+    far = np.linalg.norm(reach, axis=1)
+    over = np.maximum(far - foot.length + SPARE, 0.0) * (1.0 - np.minimum(foot.carries, 1.0))
+    return goal - reach * (over / far)[:, None]

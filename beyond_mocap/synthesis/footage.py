@@ -16,6 +16,9 @@ from ..motion.motion import at_frames
 from .edit_list import EditList, at_times
 
 
+_HELD = 2  # frames for which a clip's end may be held in a fade
+
+
 @dataclass(frozen=True, eq=False)
 class Shown:
     """What T output frames show: clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's own
@@ -78,6 +81,55 @@ def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> F
         clip, frame, what.clip_frame, what.piece, pose, height, sway, velocity, turn, _standing(library, clip, frame),
         *ahead[:3],
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """What the pieces on both sides of a seam show beyond it, R frames in all.
+
+    at (R,) output frame, no frame twice; through (R,) how far the window around the seam has come there, between 0 and 1;
+    after (R,) bool: behind the seam, where the other piece is the one that ends. pose (R, J, 4), height (R,) m, sway (R, 2)
+    m of the other piece.
+    """
+
+    at: np.ndarray
+    through: np.ndarray
+    after: np.ndarray
+    pose: np.ndarray
+    height: np.ndarray
+    sway: np.ndarray
+
+
+def overlap(library: Library, footage: Footage, reach: float) -> Overlap:
+    """At most `reach` frames on either side of each seam, and half of the shorter neighbouring piece.
+
+    A clip that ends sooner shortens its side, but for a frame or two in which its end is held.
+    """
+    edges = np.concatenate([[0], footage.seams, [len(footage.clip)]])
+    none = np.zeros(0)
+    rows = [_around(library, footage, edges[n : n + 3], reach) for n in range(len(footage.seams))]
+    at, through, after, clip, frame = (np.concatenate(column) for column in zip((none, none, none, none, none), *rows))
+    shown = _poses(library, clip.astype(int), frame)[:3]
+    return Overlap(at.astype(int), through, after.astype(bool), *shown)
+
+
+def _around(library: Library, footage: Footage, edges: np.ndarray, reach: float):
+    """Output frames around the seam between two pieces, edges (3,), how far through, whether behind it, and clip and frame
+    that the other piece shows there."""
+    low, seam, high = (int(edge) for edge in edges)
+    clip, frame, frames = footage.clip, footage.frame, library.frames
+    ends, begins = clip[seam - 1], clip[seam]
+    out = frame[seam - 1] - frame[seam - 2] if seam - low > 1 else 1.0
+    into = frame[seam + 1] - frame[seam] if high - seam > 1 else 1.0
+    left = (frames.first[ends] + frames.count[ends] - 1 - frame[seam - 1]) / max(out, 1e-3)
+    room = (frame[seam] - frames.first[begins]) / max(into, 1e-3)
+    before = int(min(reach, (seam - low) // 2, max(room, _HELD)))
+    behind = int(min(reach, (high - seam) // 2, max(left, _HELD)))
+    at = np.arange(seam - before, seam + behind)
+    after = at >= seam
+    other = np.where(after, frame[seam - 1] + out * (at - seam + 1), frame[seam] + into * (at - seam))
+    through = np.arange(1, len(at) + 1) / (len(at) + 1.0)
+    return at, through, after, np.where(after, ends, begins), other
 
 
 def _clip_frames(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:

@@ -31,9 +31,9 @@ def feet_of(motion, root, rotations):
 
 
 def slide(motion, root, rotations, stands):
-    """Mean speed over ground in m/s of heels and toes where both of a foot stand, now and in the next frame."""
-    feet = feet_of(motion, root, rotations)
-    speed = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1).mean(axis=2) * motion.fps
+    """Mean speed over ground in m/s of toes where both points of a foot stand, now and in the next frame."""
+    toes = feet_of(motion, root, rotations)[:, :, 1, :2]
+    speed = np.linalg.norm(np.diff(toes, axis=0), axis=-1) * motion.fps
     flat = stands.all(axis=2)
     return speed[flat[1:] & flat[:-1]].mean()
 
@@ -54,8 +54,8 @@ def test_a_planted_slide_is_removed(walk, velocity):
         slide(motion, motion.root_positions, motion.rotations, stands),
     )
     after = slide(motion, out.root, out.rotations, stands)
-    assert before > 0.8 * np.hypot(*velocity) and own < 0.06
-    assert after < own + 0.01
+    assert before > 0.8 * np.hypot(*velocity) and own < 0.03
+    assert after < 0.016
     assert np.array_equal(out.root[:, :2], root[:, :2])
 
 
@@ -82,6 +82,24 @@ def test_feet_that_sank_stand_on_the_ground(walk, height):
     toes = feet_of(motion, out.root, out.rotations)[:, :, 1, 2]
     assert toes.min() > -0.012 and np.percentile(toes, 2) > -0.006
     assert np.median(np.abs(toes[stands.all(axis=2)])) < 0.006
+
+
+def test_a_heel_rises_before_the_pelvis_sinks(walk):
+    """A body that floats 4 cm too high: it stands on its toes, and hardly sinks."""
+    motion, stands = walk
+    _, still = planted(motion, stands)
+    root, out = planted(motion, stands, np.array([0.0, 0.0, 0.04]))
+    (low, up), behind = ((feet_of(motion, p.root, p.rotations)[..., 2] for p in (still, out)), stands[..., 1])
+    assert np.median(np.abs(up[..., 1][behind])) < 0.006 and out.miss.max() < 0.005
+    assert np.percentile((up[..., 0] - low[..., 0])[behind], 90) > 0.02
+    assert (root[:, 2] - out.root[:, 2]).max() <= MOST_DROP + 1e-9
+
+
+def test_a_foot_in_the_air_need_not_be_reached(walk):
+    """Strides twice as long as the legs: no leg is missed while its foot is in the air, and no bone is asked to stretch."""
+    motion, stands = walk
+    _, out = planted(motion, stands, np.outer(np.arange(len(motion)) / 30.0, (2.5, 0.0, 0.0)))
+    assert out.miss[~stands.any(axis=2)].max() < 0.005
 
 
 def test_bones_keep_their_length_and_rotations_are_unit(walk):
@@ -140,7 +158,7 @@ def test_at_any_rate(fps):
     moved = np.outer(np.arange(len(motion)) / fps, (0.3, 0.0, 0.0))
     root, out = planted(motion, stands, moved)
     assert (
-        slide(motion, out.root, out.rotations, stands) < 0.07 and slide(motion, root, motion.rotations, stands) > 0.25
+        slide(motion, out.root, out.rotations, stands) < 0.02 and slide(motion, root, motion.rotations, stands) > 0.25
     )
 
 
@@ -157,7 +175,7 @@ def test_the_shift_cancels_velocity_where_it_has_weight_and_is_gentle_elsewhere(
     weight[20:40] = weight[60:80] = 1.0
     found = shift(velocity, weight)[:, 0]
     assert np.allclose(np.diff(found)[22:37], -0.01, atol=1e-3) and np.allclose(np.diff(found)[62:77], -0.01, atol=1e-3)
-    assert np.abs(np.diff(found, 3)).max() < 0.01 and np.abs(found).max() < 0.25
+    assert np.abs(np.diff(found, 3)).max() < 0.02 and np.abs(found).max() < 0.25
     assert np.allclose(shift(velocity, weight * 0.0), 0.0)
 
 

@@ -1,0 +1,59 @@
+"""Seams faded over: both sides of a seam agree at its ends, and nothing but the fade is touched."""
+
+import numpy as np
+
+from beyond_mocap.motion import quaternion
+from beyond_mocap.polish.cross_fade import faded_rotations, faded_values, share
+
+SEAM, REACH, COUNT = 30, 6, 60
+AT = np.arange(SEAM - REACH, SEAM + REACH)
+WEIGHT = share(np.arange(1, 2 * REACH + 1) / (2.0 * REACH + 1.0), AT >= SEAM)
+
+
+def two_pieces():
+    """Two curves (T,) that go on beyond the seam, far apart in place and speed."""
+    time = np.arange(COUNT) / 30.0
+    return np.sin(2.0 * time), 0.3 + 1.5 * time
+
+
+def test_the_share_grows_to_half_at_the_seam_and_falls_again():
+    assert np.all(WEIGHT >= 0.0) and np.all(WEIGHT <= 0.55) and WEIGHT[0] < 0.01 and WEIGHT[-1] < 0.01
+    assert np.all(np.diff(WEIGHT[:REACH]) > 0) and np.all(np.diff(WEIGHT[REACH:]) < 0)
+    through = np.linspace(0.0, 1.0, 1001)
+    rising = share(through, np.zeros(1001, bool))
+    assert np.allclose(rising + share(through, np.ones(1001, bool)), 1.0)
+    for times in (1, 2):  # slope and curvature start and end at 0
+        bent = np.diff(rising, times) * 1000.0**times
+        assert np.allclose(bent[[0, -1]], 0.0, atol=0.1)
+
+
+def test_a_fade_of_two_curves_has_neither_jump_nor_kink():
+    before, after = two_pieces()
+    cut = np.where(np.arange(COUNT) < SEAM, before, after)
+    out = faded_values(cut, AT, np.where(AT < SEAM, after[AT], before[AT]), WEIGHT)
+    begun = np.zeros(COUNT)
+    begun[AT], begun[AT[-1] + 1 :] = np.where(AT < SEAM, WEIGHT, 1.0 - WEIGHT), 1.0
+    assert np.allclose(out, (1.0 - begun) * before + begun * after, atol=1e-12)
+    assert np.abs(np.diff(out, 3)).max() < 0.1 * np.abs(np.diff(cut, 3)).max()
+    untouched = np.setdiff1d(np.arange(COUNT), AT)
+    assert np.array_equal(out[untouched], cut[untouched])
+
+
+def test_rotations_take_the_short_way_whatever_their_signs():
+    angles = 0.8 * np.stack(two_pieces(), axis=1)
+    axis = np.tile([0.0, 0.6, 0.8], (COUNT, 1))
+    before, after = (quaternion.about_axis(axis, a)[:, None] for a in angles.T)
+    cut = np.where(np.arange(COUNT)[:, None, None] < SEAM, before, after)
+    other = np.where(AT[:, None, None] < SEAM, after[AT], before[AT])
+    for sign in (1.0, -1.0):
+        out = faded_rotations(cut, AT, sign * other, WEIGHT)
+        turned = np.linalg.norm(quaternion.to_rotation_vector(out[:, 0]), axis=1)
+        wanted = faded_values(np.where(np.arange(COUNT) < SEAM, *angles.T), AT, np.where(AT < SEAM, *angles[AT, ::-1].T), WEIGHT)
+        assert np.allclose(turned, np.abs(wanted), atol=1e-9)
+
+
+def test_no_seam_nothing_happens():
+    values, nothing = np.arange(5.0), np.zeros(0)
+    assert np.array_equal(faded_values(values, nothing.astype(int), nothing, nothing), values)
+    still = quaternion.identity(5, 2)
+    assert np.array_equal(faded_rotations(still, nothing.astype(int), np.zeros((0, 2, 4)), nothing), still)
