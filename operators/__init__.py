@@ -17,6 +17,7 @@ from . import (
     mirror,
     remove_player,
     synthesize,
+    update,
 )
 
 CLASSES = (
@@ -29,6 +30,7 @@ CLASSES = (
     remove_player.BEYOND_MOCAP_OT_remove_player,
     build_library.BEYOND_MOCAP_OT_build_library,
     synthesize.BEYOND_MOCAP_OT_synthesize,
+    update.BEYOND_MOCAP_OT_update,
     cancel.BEYOND_MOCAP_OT_cancel,
     bake.BEYOND_MOCAP_OT_bake,
     add_stage.BEYOND_MOCAP_OT_add_stage,

@@ -53,7 +53,7 @@ The result is kept in a cache, so that the next time takes a moment"""
         return Order(absolute(settings.library_folder), settings.library_unit or None, self.rebuild)
 
     @staticmethod
-    def work(order, progress, cancelled):
+    def work(order, progress, cancelled, _hurry):
         """Build it."""
         from ..beyond_mocap.library.library import build
 

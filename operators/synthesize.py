@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ..beyond_mocap.annotation import validate
+from ..beyond_mocap.errors import Cancelled
 from ..beyond_mocap.plan import Plan
 from ..beyond_mocap.take import Take
 from ..scene import plans, session
@@ -36,10 +37,10 @@ FIGURES = (  # what the panel's table shows: name, path in the report, factor (a
 class Order:
     """What a run needs: one plan per player, the library or how to build it.
 
-    plans: (player's name, plan, where its words are written, warnings about its track).
+    plans: (player's name, plan, where its words are written, warnings about its track, the take to start from or None).
     """
 
-    plans: tuple[tuple[str, Plan, str, tuple[str, ...]], ...]
+    plans: tuple[tuple[str, Plan, str, tuple[str, ...], Take | None], ...]
     folder: str
     unit: float | None
     library: "Library | None"
@@ -49,21 +50,20 @@ class Order:
 class Result:
     """What a run brings: the library it used and the unit of its clips.
 
-    made: (player's name, plan, take, report, warnings about the track).
+    made: (player's name, plan, take, report, warnings about the track); asked: how many players there were to make.
     """
 
     library: "Library"
     unit: float | None
     made: tuple[tuple[str, Plan, Take, dict, tuple[str, ...]], ...]
+    asked: int
 
 
-class BEYOND_MOCAP_OT_synthesize(BackgroundVerb, bpy.types.Operator):
-    """Find clips for every ticked player's track and words, and join them into one motion.
-The scene changes with Bake only"""
+class SynthesisVerb(BackgroundVerb):
+    """A verb that makes takes. `starts_from(player)`: the take that is brought up to date, or None for a new one."""
 
-    bl_idname = "beyond_mocap.synthesize"
-    bl_label = "Synthesize"
     kind = "synthesis"
+    keeps = True
 
     @classmethod
     def poll(cls, context):
@@ -82,31 +82,46 @@ The scene changes with Bake only"""
         asked = []
         for player in plans.chosen(settings):
             plan, warnings = plans.plan_of(settings, player)
-            asked.append((player.name, plan, plans.words_from(player), warnings))
+            asked.append((player.name, plan, plans.words_from(player), warnings, self.starts_from(player)))
         unit = settings.library_unit or None
         return Order(tuple(asked), folder, unit, session.library(folder, unit))
 
     @staticmethod
-    def work(order, progress, cancelled):
-        """The library, where this session has none yet, then one player after the other."""
+    def work(order, progress, cancelled, hurry):
+        """The library, where this session has none yet, then one player after the other. In a hurry the player whose turn
+        it is comes to an early end, and those that follow are left as they are."""
         from ..beyond_mocap.evaluation.report import evaluate
         from ..beyond_mocap.library.library import build
+        from ..beyond_mocap.resynthesize import resynthesize
         from ..beyond_mocap.synthesize import synthesize
 
-        clips = order.library or build(order.folder, unit=order.unit, progress=progress, cancelled=cancelled)
+        clips = order.library or build(
+            order.folder, unit=order.unit, progress=progress, cancelled=lambda: cancelled() or hurry()
+        )
         made = []
-        for number, (name, plan, where, warnings) in enumerate(order.plans):
+        for number, (name, plan, where, warnings, before) in enumerate(order.plans):
+            if made and hurry():
+                break
+
             def report(fraction, text, number=number, name=name):
                 progress((number + fraction) / len(order.plans), f"{name}: {text}")
 
             validate(plan.timeline, clips.words, float(plan.track.times[0]), float(plan.track.times[-1]), where)
             begun = perf_counter()
-            take = synthesize(clips, plan, progress=report, cancelled=cancelled)
+            try:
+                if before is None:
+                    take = synthesize(clips, plan, report, cancelled, hurry)
+                else:
+                    take = resynthesize(clips, plan, before, report, cancelled, hurry)
+            except Cancelled:
+                if not made or cancelled():
+                    raise
+                break
             seconds = perf_counter() - begun
             figures = evaluate(take, plan.track, clips)
             figures["seconds"]["total"] = seconds
             made.append((name, plan, take, figures, warnings))
-        return Result(clips, order.unit, tuple(made))
+        return Result(clips, order.unit, tuple(made), len(order.plans))
 
     def apply(self, scene, result):
         """Keep the takes and show their quality."""
@@ -124,7 +139,21 @@ The scene changes with Bake only"""
             player.warnings = "\n".join(line for line in told if line not in result.library.notes)
         if lost:
             self.report({"WARNING"}, f"not in the list any more, so their takes are dropped: {', '.join(lost)}")
+        if len(result.made) < result.asked:
+            self.report({"WARNING"}, f"ended early: {len(result.made)} of {result.asked} players, the others are as before")
         self.report({"INFO"}, f"players synthesized: {len(result.made) - len(lost)}; press Bake to see them")
+
+
+class BEYOND_MOCAP_OT_synthesize(SynthesisVerb, bpy.types.Operator):
+    """Find clips for every ticked player's track and words, and join them into one motion.
+The scene changes with Bake only"""
+
+    bl_idname = "beyond_mocap.synthesize"
+    bl_label = "Synthesize"
+
+    def starts_from(self, _player):
+        """From nothing."""
+        return None
 
 
 def quality(report: dict) -> str:

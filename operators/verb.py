@@ -66,13 +66,14 @@ class ImportVerb(Verb, ImportHelper):
 class BackgroundVerb(Verb):
     """A verb in three parts, so that the middle one can run in a thread while the window stays alive.
 
-    `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled)`,
-    a static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called from a
-    script (`execute`) all three run at once; pressed as a button (`invoke`) the work goes to a thread, and ESC cancels
-    it.
+    `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled,
+    hurry)`, a static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called from
+    a script (`execute`) all three run at once; pressed as a button (`invoke`) the work goes to a thread. ESC cancels it;
+    where the work `keeps` what it has found, the first ESC lets it come to an early end, and the second cancels.
     """
 
     kind = ""
+    keeps = False
 
     def do(self, context):
         """Order, work and apply in one go."""
@@ -80,7 +81,8 @@ class BackgroundVerb(Verb):
         window.progress_begin(0, 100)
         try:
             order = self.order(context)
-            result = self.work(order, lambda done, text: window.progress_update(int(100 * done)), lambda: False)
+            asking = (lambda done, text: window.progress_update(int(100 * done)), lambda: False, lambda: False)
+            result = self.work(order, *asking)
         finally:
             window.progress_end()
         self.apply(context.scene, result)
@@ -95,7 +97,7 @@ class BackgroundVerb(Verb):
         """Collect the order and hand it to a thread."""
         order, work = self.order(context), self.work
         self.scene = context.scene.session_uid
-        self.job = background.Job(self.kind, lambda progress, cancelled: work(order, progress, cancelled))
+        self.job = background.Job(self.kind, lambda *asking: work(order, *asking), self.keeps)
 
     def started(self, context):
         """Begin to poll."""
@@ -109,7 +111,7 @@ class BackgroundVerb(Verb):
     def modal(self, context, event):
         """Poll, pass on all other events, and write the result once it is there."""
         if event.type == "ESC" and event.value == "PRESS":
-            self.job.cancel()
+            self.job.end()
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
         ended = self.job.poll()
@@ -140,7 +142,8 @@ class BackgroundVerb(Verb):
         text = self.job.text or f"{self.bl_label} ..."
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
-        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
+        keys = "ESC: end here" if self.keeps and not self.job.ending else "ESC: cancel"
+        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   {keys}")
         self.redraw(context)
 
     def ended(self, context):

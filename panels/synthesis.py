@@ -16,9 +16,10 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
     def draw(self, context):
         """Button, progress, choices."""
         layout, settings = self.layout, context.scene.beyond_mocap
-        row = layout.row()
+        row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
+        row.operator("beyond_mocap.update", icon="FILE_REFRESH")
         self.progress(context, "synthesis")
         header, body = layout.panel("beyond_mocap_synthesis_more", default_closed=True)
         header.label(text="Choices")

@@ -12,7 +12,7 @@ from typing import Any, Callable
 
 from ..beyond_mocap.errors import Cancelled
 
-Work = Callable[[Callable[[float, str], None], Callable[[], bool]], Any]
+Work = Callable[[Callable[[float, str], None], Callable[[], bool], Callable[[], bool]], Any]
 
 _newest: dict[str, "Job"] = {}
 
@@ -20,17 +20,18 @@ _newest: dict[str, "Job"] = {}
 class Job:
     """Work of one kind ("library", "synthesis") in a thread of its own.
 
-    `work(progress, cancelled)` is called there. `fraction` and `text` say how far it is; after `poll()` has returned
-    True either `result` or `error` is set.
+    `work(progress, cancelled, hurry)` is called there; `hurry()` turns true when the user wants an end and what is there
+    by then. `fraction` and `text` say how far it is; after `poll()` has returned True either `result` or `error` is set.
     """
 
-    def __init__(self, kind: str, work: Work):
-        """Starts at once and takes the place of an older job of the same kind, which is cancelled."""
+    def __init__(self, kind: str, work: Work, keeps: bool = False):
+        """Starts at once and takes the place of an older job of the same kind, which is cancelled. keeps: whether the work
+        can come to an early end with what it has."""
         stop(kind)
-        self.kind = kind
+        self.kind, self.keeps = kind, keeps
         self.fraction, self.text = 0.0, ""
         self.result, self.error = None, None
-        self._stop, self._news = threading.Event(), queue.SimpleQueue()
+        self._stop, self._soon, self._news = threading.Event(), threading.Event(), queue.SimpleQueue()
         _newest[kind] = self
         threading.Thread(target=self._run, args=(work,), name=f"beyond-mocap {kind}", daemon=True).start()
 
@@ -49,14 +50,29 @@ class Job:
         """Ask the thread to stop; its result will be dropped."""
         self._stop.set()
 
+    def end(self) -> None:
+        """Ask the thread to come to an end with what it has; asked again, or where it keeps nothing, cancel it."""
+        if self.keeps and not self.ending:
+            self._soon.set()
+        else:
+            self.cancel()
+
+    @property
+    def ending(self) -> bool:
+        """Whether it has been asked to come to an end with what it has."""
+        return self._soon.is_set()
+
     @property
     def stale(self) -> bool:
         """Whether nobody waits for this job's result any more."""
         return self._stop.is_set() or _newest.get(self.kind) is not self
 
+    def _tell(self, fraction: float, text: str) -> None:
+        self._news.put(("progress", (fraction, text)))
+
     def _run(self, work: Work) -> None:
         try:
-            result = work(lambda fraction, text: self._news.put(("progress", (fraction, text))), self._stop.is_set)
+            result = work(self._tell, self._stop.is_set, self._soon.is_set)
         except BaseException as error:  # carried to the main thread, which reports or raises it
             self._news.put(("error", error))
         else:
@@ -68,6 +84,12 @@ def stop(kind: str | None = None) -> None:
     for name, job in list(_newest.items()):
         if kind in (None, name):
             job.cancel()
+
+
+def end() -> None:
+    """What ESC does, to all running jobs: see `Job.end`."""
+    for job in list(_newest.values()):
+        job.end()
 
 
 def cancelled(job: Job) -> bool:

@@ -155,6 +155,48 @@ def test_the_whole_road(extension, ready, core, session):
     assert state() == baked
 
 
+def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, core, session):
+    bpy.ops.beyond_mocap.build_library()
+    refused(bpy.ops.beyond_mocap.update, "Synthesize first")
+    bpy.ops.beyond_mocap.synthesize()
+    before = [session.made(player.take) for player in ready.players]
+    (match / "player1.txt").write_text(WORDS.replace("6.0", "6.2"))
+    assert_one_step(bpy.ops.beyond_mocap.update)
+    settings = bpy.context.scene.beyond_mocap
+    after = [session.made(player.take) for player in settings.players]
+    assert after[0].plan.timeline.keys[0].time == 6.2
+    built = session.library(settings.library_folder, None)
+    for old, new in zip(before, after):
+        again = core("resynthesize").resynthesize(built, new.plan, old.take)
+        assert np.array_equal(new.take.motion.rotations, again.motion.rotations)
+        assert np.array_equal(new.take.motion.root_positions, again.motion.root_positions)
+    same = np.all(before[0].take.motion.rotations == after[0].take.motion.rotations, axis=(1, 2))
+    assert same[: 2 * 30].all() and same[10 * 30 :].all() and not same.all()
+    assert np.array_equal(before[1].take.motion.rotations, after[1].take.motion.rotations)
+
+
+def test_in_a_hurry_players_that_are_not_begun_stay_as_they_are(extension, ready, core, session):
+    module = importlib.import_module(f"{extension.__name__}.operators.synthesize")
+    plans = importlib.import_module(f"{extension.__name__}.scene.plans")
+    bpy.ops.beyond_mocap.build_library()
+    built = session.library(ready.library_folder, None)
+    asked = tuple((player.name, plans.plan_of(ready, player)[0], "", (), None) for player in ready.players)
+    told = []
+
+    def work(fraction_of_hurry):
+        told.clear()
+        order = module.Order(asked, ready.library_folder, None, built)
+        in_a_hurry = lambda: max(told, default=0.0) >= fraction_of_hurry  # noqa: E731
+        return module.SynthesisVerb.work(order, lambda fraction, text: told.append(fraction), lambda: False, in_a_hurry)
+
+    result = work(0.2)
+    assert (len(result.made), result.asked) == (1, 2)
+    assert "cut short" in "".join(result.made[0][2].warnings)
+    assert len(work(2.0).made) == 2
+    with pytest.raises(core("errors").Cancelled):
+        work(0.0)
+
+
 def test_baking_again_replaces_the_take_only(extension, ready, session):
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.bake()

@@ -25,9 +25,9 @@ TOP = Path(__file__).resolve().parents[2]
 def take_of(library, track_of, timeline_of):
     """take_of(*lines, track=None, library=..., **plan) -> Take."""
 
-    def make(*lines, track=None, library=library, progress=None, cancelled=None, **plan):
+    def make(*lines, track=None, library=library, progress=None, cancelled=None, hurry=None, **plan):
         plan = Plan(track=track or track_of(), timeline=timeline_of(*lines), **plan)
-        return synthesize(library, plan, progress, cancelled)
+        return synthesize(library, plan, progress, cancelled, hurry)
 
     return make
 
@@ -391,3 +391,21 @@ def test_inputs_are_left_alone(take_of, library):
     assert np.array_equal(before[0], library.frames.features) and np.array_equal(
         before[1], library.clips[0].motion.rotations
     )
+
+
+def test_in_a_hurry_a_whole_take_comes_out_and_says_from_when_on(take_of):
+    told = []
+    hurry = lambda: max(told, default=0.0) > 0.3  # noqa: E731
+    whole = take_of((6.0, "kick right"))
+    take = take_of((6.0, "kick right"), progress=lambda fraction, text: told.append(fraction), hurry=hurry)
+    assert_whole(take, 241)
+    line, = [line for line in take.warnings if "cut short" in line]
+    since = float(line.split(" s:")[0])
+    assert 2.0 < since < 6.0 and not any("cut short" in line for line in whole.warnings)
+    assert take.keys[0].frame == pytest.approx(6.0 * 30.0, abs=0.5)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_in_a_hurry_before_anything_is_found_there_is_no_take(take_of, method):
+    with pytest.raises(Cancelled):
+        take_of((6.0, "kick right"), method=method, hurry=lambda: True)
