@@ -1,7 +1,8 @@
-"""`make bench`: library time, BVH speed, and every figure of scenarios with each method side by side.
+"""`make bench`: the five scenarios with two libraries and each method side by side, every figure beside its target.
 
-Everything of one table is measured in one process; seconds are the best of three, cold (library built from text) and warm
-(from its cache). Written to benchmarks/results.md with the command that made it.
+Everything of one run is measured in one process on one core; seconds are the best of three. Written to
+benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
+`--compare` measures instead what is decided once and writes that section anew.
 """
 
 from __future__ import annotations
@@ -10,151 +11,153 @@ import argparse
 import platform
 import sys
 import tempfile
-import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from beyond_mocap.annotation import read_timeline  # noqa: E402
-from beyond_mocap.evaluation.report import evaluate, table  # noqa: E402
-from beyond_mocap.files import bvh  # noqa: E402
-from beyond_mocap.files.tracking import read_track_csv  # noqa: E402
-from beyond_mocap.library.library import build  # noqa: E402
-from beyond_mocap.motion.track import clean  # noqa: E402
+from beyond_mocap.evaluation import played_from_take  # noqa: E402
+from beyond_mocap.evaluation.judged import judged  # noqa: E402
+from beyond_mocap.evaluation.report import cell, evaluate, flat  # noqa: E402
+from beyond_mocap.evaluation.view import View  # noqa: E402
+from beyond_mocap.library.library import Library, build  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesize import synthesize  # noqa: E402
 
-DATA = ROOT.parent / "shared" / "data"
-CMU_UNIT = 0.05644
-RUNS = 3
+from benchmarks import compare, effort, misses, paper  # noqa: E402
+from benchmarks.places import DATA, LIBRARIES, ROOT, library_folder, scenario  # noqa: E402
+
 METHODS = {
     "blocks": {"method": "blocks"},
-    "distance": {"method": "distance"},
     "distance, no catch-up": {"method": "distance", "catch_up": False},
+    "distance": {"method": "distance"},
     "path": {"method": "path"},
 }
-FAUSTINO = {  # his Tables 1, 2 and 4, whole animation and at frame constraints; other data, for orientation only
-    1: "4.52 m (keys 1.20 m), similarity -0.05 (keys -1), 65 s / 148 s",
-    2: "3.42 m (keys 2.14 m), similarity -0.54 (keys -0.24), 95 s / 215 s",
-    3: "3.24 m (keys 3.50 m), similarity -0.09 (keys -0.75), 34 s / 353 s",
-    4: "1.21 m (keys 3.19 m), similarity -0.34 (keys -0.44), 199 s / 477 s",
-    5: "1.86 m (keys 1.20 m), similarity -0.25 (keys -0.8), 94 s / 614 s",
-}
-MIXED = ("cmu10", "lmd/Player1", "lafan1", "runs15", "sprinter")
+COMPARED = "## Compared once"
+_QUIET = ("version", "seed", "fps", "method", "warnings")
 
 
-def seconds(work, runs: int = RUNS) -> tuple[float, object]:
-    """The best of several runs, and what the last one returned."""
-    best, result = np.inf, None
-    for _ in range(runs):
-        begun = time.perf_counter()
-        result = work()
-        best = min(best, time.perf_counter() - begun)
-    return best, result
+@dataclass
+class Results:
+    """All reports of one library. missed: what `path` misses in each scenario."""
+
+    library: Library
+    effort: list[str]
+    reports: dict[str, dict[int, dict]] = field(default_factory=lambda: {name: {} for name in METHODS})
+    missed: list[misses.Misses] = field(default_factory=list)
 
 
-def bvh_speed() -> list[str]:
-    """How fast a long clip is read, in MB per second of the whole file."""
-    source = DATA / "mocap" / "lafan1" / "walk1_subject1_walk2_filtered.bvh"
-    head, _, motion = source.read_text().partition("MOTION")
-    rows = motion.strip().splitlines()
-    with tempfile.TemporaryDirectory() as folder:
-        long = Path(folder) / "long.bvh"
-        many = rows[2:] * (24_000_000 // max(1, sum(map(len, rows[2:]))))
-        long.write_text("\n".join([head + "MOTION", f"Frames: {len(many)}", rows[1], *many]) + "\n")
-        size = long.stat().st_size / 1e6
-        best, _ = seconds(lambda: bvh.read(long))
-    return [f"- a clip of {size:.0f} MB: {size / best:.0f} MB/s from text to quaternions"]
-
-
-def library_speed() -> list[str]:
-    """150 clips of about 120 frames at 30 fps, the mirrored counted, from text to clusters and from the cache.
-
-    Made of the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 twins.
-    """
-    sources = sorted((DATA / "mocap" / "bandai").glob("*.bvh"))
-    with tempfile.TemporaryDirectory() as folder:
-        rows = ["file,start_frame,end_frame,key_frame,labels"]
-        for number in range(75):
-            text = sources[number % len(sources)].read_text()
-            head, _, motion = text.partition("MOTION")
-            lines = motion.strip().splitlines()
-            frames = (lines[2:] * 120)[:120]
-            name = f"clip{number:03d}.bvh"
-            Path(folder, name).write_text("\n".join([head + "MOTION", "Frames: 120", lines[1], *frames]) + "\n")
-            rows.append(f"{name},0,119,,walking front" if number % 2 else f"{name},0,119,,running front")
-        Path(folder, "annotations.csv").write_text("\n".join(rows) + "\n")
-        cold, _ = seconds(lambda: build(folder, rebuild=True))
-        warm, _ = seconds(lambda: build(folder))
-    return [f"- library of 75 clips and their twins, 120 frames each: {cold:.2f} s from text to clusters, {warm:.2f} s cached"]
-
-
-def mixed_folder(folder: Path) -> Path:
-    """A library of five kinds of recordings: links to their folders, and one table of words for all of them."""
-    rows = (DATA / "mocap" / "annotations.csv").read_text().splitlines()
-    kept = [row for row in rows[1:] if row.split(",")[0].startswith(tuple(f"{name}/" for name in MIXED))]
-    for name in MIXED:
-        link = folder / name
-        link.parent.mkdir(parents=True, exist_ok=True)
-        link.symlink_to(DATA / "mocap" / name, target_is_directory=True)
-    (folder / "annotations.csv").write_text("\n".join([rows[0], *kept]) + "\n")
-    return folder
-
-
-def scenario(number: int, library) -> dict[str, dict]:
-    """Reports of one scenario by all methods, seconds best of three."""
-    place = DATA / "tracking" / "scenarios" / f"scenario{number}_"
-    track, _ = clean(read_track_csv(f"{place}track.csv"))
-    timeline = read_timeline(f"{place}annotations.txt", 30.0, float(track.times[0]))
-    reports = {}
-    for name, options in METHODS.items():
-        plan = Plan(track=track, timeline=timeline, library=library.folder, nearest=True, **options)
-        best, take = seconds(lambda: synthesize(library, plan))
-        take.seconds["total"] = best
-        reports[name] = evaluate(take, track, library)
-    return reports
-
-
-def library_results(name: str, place: Path, scenarios: list[int]) -> list[str]:
-    """The tables of one library, its cache kept in `place`."""
-    folder = mixed_folder(place / "mixed") if name == "mixed" else DATA / "mocap" / "cmu10"
-    unit = CMU_UNIT if name == "cmu10" else None
-    cold, _ = seconds(lambda: build(folder, unit=unit, cache_dir=place / "cache", rebuild=True))
-    warm, library = seconds(lambda: build(folder, unit=unit, cache_dir=place / "cache"))
-    lines = [f"# Library {name}", "", f"{cold:.2f} s from text, {warm:.2f} s from its cache.", ""]
-    lines += [f"- {note}" for note in library.notes] + [""]
+def measured(name: str, scenarios: list[int], place: Path) -> Results:
+    """Builds a library, its cache kept in `place`, and runs all scenarios by all methods."""
+    folder, unit, cache = library_folder(name, place), LIBRARIES[name], place / "cache"
+    cold, _ = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache, rebuild=True), 1)
+    warm, library = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache))
+    results = Results(library, [f"library: {cold:.2f} s from text, {warm:.2f} s from its cache"])
     for number in scenarios:
-        lines += [f"## Scenario {number}", ""]
-        if number in FAUSTINO:
-            lines += [f"Faustino's scenario {number} (other data): {FAUSTINO[number]}", ""]
-        lines += [table(scenario(number, library)), ""]
+        track, timeline = scenario(number)
+        for method, options in METHODS.items():
+            plan = Plan(track=track, timeline=timeline, library=library.folder, nearest=True, **options)
+            best, take = effort.seconds(lambda plan=plan: synthesize(library, plan))
+            take.seconds["total"] = best
+            results.reports[method][number] = evaluate(take, track, library)
+        view = View(played_from_take(take), track, take.timeline, library)
+        results.missed.append(misses.counted(view, take.ik_miss))
+    results.effort.append(effort.peak_memory(name, folder, cache))
+    return results
+
+
+def summary(results: dict[str, Results], scenarios: list[int]) -> list[str]:
+    """What came out, before all figures."""
+    by_row = {(name, method): of for name, found in results.items() for method, of in found.reports.items()}
+    lines = ["## Summary", ""]
+    for name, found in results.items():
+        took = [report["seconds"]["total"] for report in found.reports["path"].values()]
+        per20 = [20.0 * r["seconds"]["total"] / r["duration_s"] for r in found.reports["path"].values()]
+        lines += [
+            f"### Library {name}, method path", "",
+            f"{min(took):.2f} to {max(took):.2f} s a scenario, {np.mean(per20):.2f} s for 20 s of motion (target 0.5); fastest "
+            f"recording {found.library.fastest:.1f} m/s.", "",
+            *misses.summary(found.reports["path"], found.missed),
+        ]
+    return [*lines, "## Faustino's tables", "", *paper.tables(by_row, scenarios)]
+
+
+def all_figures(name: str, found: Results, scenarios: list[int]) -> list[str]:
+    """Every figure of every scenario with one library."""
+    lines = [f"## All figures, library {name}", "", *(f"- {note}" for note in found.library.notes), ""]
+    for number in scenarios:
+        of = {method: reports[number] for method, reports in found.reports.items()}
+        lines += [f"### Scenario {number}, {name}", "", *figure_table(of), "", *key_table(of["path"]), ""]
+        lines += [*(f"- {line}" for line in of["path"]["warnings"] if line not in found.library.notes), ""]
     return lines
+
+
+def figure_table(reports: dict[str, dict]) -> list[str]:
+    """One row per figure: each method, the recordings' own and the target of `path`, and whether `path` meets it."""
+    columns = {method: flat(report) for method, report in reports.items()}
+    lines = ["| figure | " + " | ".join(columns) + " | recordings | target | path |", "|---|" + "---|" * (len(columns) + 3)]
+    for row in judged(reports["path"]):
+        stage = row.name.startswith("seconds.") and row.name != "seconds.total"  # by the clock, which others share
+        if not row.name.startswith("keys ") and row.name not in _QUIET and not stage:
+            values = " | ".join(cell(column.get(row.name)) for column in columns.values())
+            lines.append(f"| {row.name} | {values} | {row.own} | {row.target} | {row.status} |")
+    return lines
+
+
+def key_table(report: dict) -> list[str]:
+    """One row per key moment of `path`."""
+    leaves = ("time_s", "labels", "clip", "time_error_s", "position_error_m", "contact_gap_m", "ball_shift_m", "used_instead")
+    lines = ["| " + " | ".join(leaves) + " |", "|---" * len(leaves) + "|"]
+    return lines + ["| " + " | ".join(cell(key[leaf]) for leaf in leaves) + " |" for key in report["keys"]]
+
+
+def bench(scenarios: list[int], libraries: list[str], command: str) -> list[str]:
+    """The lines of the results, but for what is compared once."""
+    lines = [
+        "# Results", "", f"`{command}`; Python {platform.python_version()}, numpy {np.__version__}, one core, one thread.",
+        "Seconds are the processor's, the best of three in one process with the library loaded; `--nearest` everywhere.", "",
+        f"- {effort.bvh_speed()}", f"- {effort.library_speed()}",
+    ]
+    with tempfile.TemporaryDirectory() as place:
+        results = {name: measured(name, scenarios, Path(place) / name) for name in libraries}
+    lines += [f"- {name}: {line}" for name, found in results.items() for line in found.effort] + [""]
+    lines += summary(results, scenarios)
+    for name, found in results.items():
+        lines += all_figures(name, found, scenarios)
+    return lines
+
+
+def sections(path: Path) -> tuple[list[str], list[str]]:
+    """The lines of results written before: what bench writes, and what was compared once."""
+    lines = path.read_text().splitlines() if path.is_file() else []
+    cut = lines.index(COMPARED) if COMPARED in lines else len(lines)
+    return lines[:cut], lines[cut:]
 
 
 def main() -> int:
     """Runs everything and writes the results."""
     options = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    options.add_argument("--scenarios", type=int, nargs="+", default=[3, 4])
-    options.add_argument("--library", choices=("cmu10", "mixed"), nargs="+", default=["cmu10"])
+    options.add_argument("--scenarios", type=int, nargs="+", default=[1, 2, 3, 4, 5])
+    options.add_argument("--library", choices=tuple(LIBRARIES), nargs="+", default=list(LIBRARIES))
+    options.add_argument("--compare", action="store_true", help="what is decided once, instead of the methods")
     options.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
     chosen = options.parse_args()
     if not (DATA / "mocap").is_dir():
         print(f"bench: {DATA} is missing; the benchmarks need its recordings and were skipped")
         return 0
-    command = "python -m benchmarks " + " ".join(sys.argv[1:])
-    lines = [
-        "# Results", "", f"`{command.strip()}`; Python {platform.python_version()}, numpy {np.__version__}, one thread.", "",
-        "Seconds are the best of three runs in one process; `--nearest` everywhere.", "",
-        *bvh_speed(), *library_speed(), "",
-    ]
-    for name in chosen.library:
-        with tempfile.TemporaryDirectory() as place:
-            lines += library_results(name, Path(place), chosen.scenarios)
-    chosen.out.write_text("\n".join(lines))
-    print("\n".join(lines))
+    effort.on_one_core()
+    command = " ".join(["python -m benchmarks", *sys.argv[1:]])
+    before, compared = sections(chosen.out)
+    if chosen.compare:
+        told = [COMPARED, "", f"`{command}`", "", *compare.all_of(chosen.scenarios, chosen.library)]
+        lines = [*before, *told]
+    else:
+        told = bench(chosen.scenarios, chosen.library, command)
+        lines = [*told, *compared]
+    chosen.out.write_text("\n".join(lines).rstrip() + "\n")
+    print("\n".join(told))
     return 0
 
 

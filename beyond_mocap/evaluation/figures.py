@@ -9,6 +9,7 @@ import numpy as np
 
 from ..annotation import Timeline, automatic_gaits, fill, words_per_frame
 from ..errors import InputError
+from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample
 from . import feet, jerk, pieces, realism, root, words
@@ -205,12 +206,15 @@ def filled_timeline(view: View) -> Timeline:
 
 
 def annotation_similarity(view: View) -> dict:
-    """Similarity over all frames and at the key moments, over asked words and as printed (Faustino eq. 18)."""
+    """Similarity over all frames, at the key moments, and at those that the library has, over asked words; the first two
+    as printed too (Faustino eq. 18)."""
     played = view.played
     if view.timeline is None or played.words is None:
-        return dict.fromkeys(("all", "keys", "eq18_all", "eq18_keys"))
+        return dict.fromkeys(("all", "keys", "had_keys", "eq18_all", "eq18_keys"))
     asked = asked_words(filled_timeline(view), played.times, view.moments)
     want, have = [m.asked.words for m in view.moments], [m.words for m in view.moments]
+    offered = [] if view.library is None else view.library.keys
+    had = [m for m in view.moments if serving(offered, m.asked.words)]
 
     def mean(want, have, measure):
         return words.mean_similarity(words.similarity(want, have, measure))
@@ -218,6 +222,7 @@ def annotation_similarity(view: View) -> dict:
     return {
         "all": mean(asked, played.words, words.asked_similarity),
         "keys": mean(want, have, words.asked_similarity),
+        "had_keys": mean([m.asked.words for m in had], [m.words for m in had], words.asked_similarity),
         "eq18_all": mean(asked, played.words, words.eq18),
         "eq18_keys": mean(want, have, words.eq18),
     }

@@ -152,7 +152,14 @@ def test_a_key_whose_words_are_lacking_says_what_was_used(cut, track_of, library
     take = replace(cut(("jog.bvh", 150, 200), asked=(KeyMoment(12.5, ("header",)),)), keys=())
     report = evaluate(take, track_of(take), library)
     assert report["keys"][0]["used_instead"] == ["front", "jogging", "kick", "right"]
-    assert report["annotation_similarity"]["keys"] == 1.0
+    assert report["annotation_similarity"]["keys"] == 1.0 and report["annotation_similarity"]["had_keys"] is None
+
+
+def test_only_key_moments_that_the_library_has_count_against_it(cut, track_of, library):
+    lacking, missed = KeyMoment(12.5, ("header",)), KeyMoment(15.0, ("kick", "right"))
+    take = replace(cut(("jog.bvh", 150, 200), timeline=Timeline(keys=(lacking, missed))), keys=())
+    similarity = evaluate(take, track_of(take), library)["annotation_similarity"]
+    assert similarity["keys"] == similarity["had_keys"] == 1.0
 
 
 def test_a_key_that_no_clip_plays_says_what_is_shown(cut, track_of, library):

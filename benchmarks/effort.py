@@ -1,0 +1,99 @@
+"""What it costs: seconds to read, to build and to load, and the memory of a run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from beyond_mocap.files import bvh
+from beyond_mocap.library.library import build
+
+from .places import DATA, LIBRARIES, ROOT, scenario_files
+
+RUNS = 3
+
+
+def seconds(work, runs: int = RUNS) -> tuple[float, object]:
+    """The best of several runs, and what the last one returned.
+
+    Seconds of the processor: with one thread on one core they are what a clock shows while nothing else runs, and they
+    stay so where something does.
+    """
+    best, result = np.inf, None
+    for _ in range(runs):
+        begun = time.process_time()
+        result = work()
+        best = min(best, time.process_time() - begun)
+    return best, result
+
+
+def on_one_core() -> None:
+    """Holds this process and those it starts to one core, where the system can."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+def bvh_speed() -> str:
+    """How fast a long clip is read, in MB per second of the whole file."""
+    source = DATA / "mocap" / "lafan1" / "walk1_subject1_walk2_filtered.bvh"
+    head, _, motion = source.read_text().partition("MOTION")
+    rows = motion.strip().splitlines()
+    with tempfile.TemporaryDirectory() as folder:
+        long = Path(folder) / "long.bvh"
+        many = rows[2:] * (24_000_000 // max(1, sum(map(len, rows[2:]))))
+        long.write_text("\n".join([head + "MOTION", f"Frames: {len(many)}", rows[1], *many]) + "\n")
+        size = long.stat().st_size / 1e6
+        best, _ = seconds(lambda: bvh.read(long))
+    return f"a clip of {size:.0f} MB: {size / best:.0f} MB/s from text to quaternions"
+
+
+def library_speed() -> str:
+    """150 clips of 120 frames at 30 fps, the mirrored counted, from text to clusters and from the cache.
+
+    Made of the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 twins.
+    """
+    sources = sorted((DATA / "mocap" / "bandai").glob("*.bvh"))
+    with tempfile.TemporaryDirectory() as folder:
+        rows = ["file,start_frame,end_frame,key_frame,labels"]
+        for number in range(75):
+            head, _, motion = sources[number % len(sources)].read_text().partition("MOTION")
+            lines = motion.strip().splitlines()
+            frames = (lines[2:] * 120)[:120]
+            name = f"clip{number:03d}.bvh"
+            Path(folder, name).write_text("\n".join([head + "MOTION", "Frames: 120", lines[1], *frames]) + "\n")
+            rows.append(f"{name},0,119,,{'walking' if number % 2 else 'running'} front")
+        Path(folder, "annotations.csv").write_text("\n".join(rows) + "\n")
+        cold, _ = seconds(lambda: build(folder, rebuild=True))
+        warm, _ = seconds(lambda: build(folder))
+    return (
+        f"75 clips of 120 frames and their twins: {cold:.2f} s from text to clusters (target 5), {warm:.2f} s cached "
+        "(target 0.3); Faustino 187 s and 12.9 s"
+    )
+
+
+def peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
+    """Peak resident memory and seconds of the whole command, in a process of its own, the library cached."""
+    if not hasattr(os, "wait4"):
+        return "peak memory: not known on this system"
+    track, words = scenario_files(number)
+    with tempfile.TemporaryDirectory() as out:
+        command = [
+            sys.executable, "-m", "beyond_mocap", "synthesize", "--library", folder, "--cache", cache, "--track", track,
+            "--annotations", words, "--out", Path(out) / "out.bvh", "--nearest",
+        ]
+        if LIBRARIES[name]:
+            command += ["--unit", str(LIBRARIES[name])]
+        quiet = subprocess.DEVNULL
+        run = subprocess.Popen(list(map(str, command)), cwd=ROOT, stdout=quiet, stderr=quiet)
+        _, status, used = os.wait4(run.pid, 0)
+    if status:
+        return f"peak memory: the command ended with {status}"
+    kilo = 1024 if sys.platform == "darwin" else 1
+    took, peak = used.ru_utime + used.ru_stime, used.ru_maxrss / 1024**2 / kilo
+    return f"scenario {number} by the command, imports and cached library counted: {took:.1f} s, {peak:.2f} GiB at most"

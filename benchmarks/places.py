@@ -1,0 +1,47 @@
+"""Where the recordings and scenarios are, and the libraries that are made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from beyond_mocap.annotation import Timeline, read_timeline
+from beyond_mocap.files.tracking import read_track_csv
+from beyond_mocap.motion.track import Track, clean
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA = ROOT.parent / "shared" / "data"
+CMU_UNIT = 0.05644
+MIXED = ("cmu10", "lmd/Player1", "lafan1", "runs15", "sprinter")
+LIBRARIES = {"cmu10": CMU_UNIT, "mixed": None}
+"""Name -> metres per unit of its clips, None where each is guessed."""
+
+
+def library_folder(name: str, place: Path) -> Path:
+    """The folder of a library; the mixed one is made below `place`."""
+    return linked(MIXED, place / name) if name == "mixed" else DATA / "mocap" / name
+
+
+def linked(kinds: Sequence[str], folder: Path) -> Path:
+    """`folder` with links to the folders of several kinds of recordings, and one table of words for all."""
+    rows = (DATA / "mocap" / "annotations.csv").read_text().splitlines()
+    kept = [row for row in rows[1:] if row.split(",")[0].startswith(tuple(f"{kind}/" for kind in kinds))]
+    for kind in kinds:
+        link = folder / kind
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(DATA / "mocap" / kind, target_is_directory=True)
+    (folder / "annotations.csv").write_text("\n".join([rows[0], *kept]) + "\n")
+    return folder
+
+
+def scenario_files(number: int) -> tuple[Path, Path]:
+    """Track and annotations of a scenario."""
+    place = DATA / "tracking" / "scenarios"
+    return place / f"scenario{number}_track.csv", place / f"scenario{number}_annotations.txt"
+
+
+def scenario(number: int) -> tuple[Track, Timeline]:
+    """What scenario `number` asks for."""
+    track_file, words_file = scenario_files(number)
+    track, _ = clean(read_track_csv(track_file))
+    return track, read_timeline(words_file, 30.0, float(track.times[0]))
