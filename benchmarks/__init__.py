@@ -1,1 +1,8 @@
-"""Time and quality on real recordings: `python -m benchmarks`, or `make bench`. Needs ../shared/data; says so where it is missing."""
+"""Time and quality on real recordings: `python -m benchmarks`, or `make bench`; without ../shared/data it says so.
+
+- `places`    the recordings, the scenarios, and the libraries that are made of them
+- `effort`    seconds and memory
+- `paper`     Faustino's printed tables and ours below them
+- `misses`    which targets are missed, where in the takes, and what lies behind it
+- `compare`   two ways of one thing, measured once
+"""

@@ -26,7 +26,7 @@ from beyond_mocap.library.library import Library, build  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesize import synthesize  # noqa: E402
 
-from benchmarks import compare, effort, misses, paper  # noqa: E402
+from benchmarks import compare, effort, markdown, misses, paper  # noqa: E402
 from benchmarks.places import DATA, LIBRARIES, ROOT, library_folder, scenario  # noqa: E402
 
 METHODS = {
@@ -36,6 +36,9 @@ METHODS = {
     "path": {"method": "path"},
 }
 COMPARED = "## Compared once"
+KEY_COLUMNS = (
+    "time_s", "labels", "clip", "time_error_s", "position_error_m", "contact_gap_m", "ball_shift_m", "used_instead",
+)
 _QUIET = ("version", "seed", "fps", "method", "warnings")
 
 
@@ -77,8 +80,8 @@ def summary(results: dict[str, Results], scenarios: list[int]) -> list[str]:
         per20 = [20.0 * r["seconds"]["total"] / r["duration_s"] for r in found.reports["path"].values()]
         lines += [
             f"### Library {name}, method path", "",
-            f"{min(took):.2f} to {max(took):.2f} s a scenario, {np.mean(per20):.2f} s for 20 s of motion (target 0.5); fastest "
-            f"recording {found.library.fastest:.1f} m/s.", "",
+            f"{min(took):.2f} to {max(took):.2f} s a scenario, {np.mean(per20):.2f} s for 20 s of motion (target 0.5); "
+            f"fastest recording {found.library.fastest:.1f} m/s.", "",
             *misses.summary(found.reports["path"], found.missed),
         ]
     return [*lines, "## Faustino's tables", "", *paper.tables(by_row, scenarios)]
@@ -97,20 +100,18 @@ def all_figures(name: str, found: Results, scenarios: list[int]) -> list[str]:
 def figure_table(reports: dict[str, dict]) -> list[str]:
     """One row per figure: each method, the recordings' own and the target of `path`, and whether `path` meets it."""
     columns = {method: flat(report) for method, report in reports.items()}
-    lines = ["| figure | " + " | ".join(columns) + " | recordings | target | path |", "|---|" + "---|" * (len(columns) + 3)]
-    for row in judged(reports["path"]):
-        stage = row.name.startswith("seconds.") and row.name != "seconds.total"  # by the clock, which others share
-        if not row.name.startswith("keys ") and row.name not in _QUIET and not stage:
-            values = " | ".join(cell(column.get(row.name)) for column in columns.values())
-            lines.append(f"| {row.name} | {values} | {row.own} | {row.target} | {row.status} |")
+    lines = markdown.head(["figure", *columns, "recordings", "target", "path"])
+    for of in judged(reports["path"]):
+        stage = of.name.startswith("seconds.") and of.name != "seconds.total"  # by the clock, which others share
+        if not of.name.startswith("keys ") and of.name not in _QUIET and not stage:
+            values = [cell(column.get(of.name)) for column in columns.values()]
+            lines.append(markdown.row([of.name, *values, of.own, of.target, of.status]))
     return lines
 
 
 def key_table(report: dict) -> list[str]:
     """One row per key moment of `path`."""
-    leaves = ("time_s", "labels", "clip", "time_error_s", "position_error_m", "contact_gap_m", "ball_shift_m", "used_instead")
-    lines = ["| " + " | ".join(leaves) + " |", "|---" * len(leaves) + "|"]
-    return lines + ["| " + " | ".join(cell(key[leaf]) for leaf in leaves) + " |" for key in report["keys"]]
+    return markdown.head(KEY_COLUMNS) + [markdown.row(cell(key[leaf]) for leaf in KEY_COLUMNS) for key in report["keys"]]
 
 
 def bench(scenarios: list[int], libraries: list[str], command: str) -> list[str]:

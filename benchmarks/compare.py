@@ -19,12 +19,24 @@ from beyond_mocap.synthesis.annotation_cost import AnnotationCost, _running_sum
 from beyond_mocap.synthesis.transition_cost import distances, windows
 from beyond_mocap.synthesize import synthesize
 
+from . import markdown
 from .effort import seconds
 from .places import DATA, LIBRARIES, library_folder, linked, scenario
 
 SPEEDS = (0.0, 3.0, 4.5, 6.0, np.inf)
 FAST_RECORDINGS = ("cmu10", "runs15", "sprinter")
 DOWN = 0.03
+WORDS_COLUMNS = (
+    "library, method", "cost", "similarity, all / keys", "eq. 18, all / keys", "seams", "seam jerk, median",
+    "off the track, m", "s",
+)
+TABLE_COLUMNS = (
+    "library", "blocks", "table, GiB", "build, s", "pairs needed a run (distance)", "worked out, s", "looked up, s",
+)
+RUNNING_COLUMNS = (
+    "library", "m/s", "s", "way", "cadence", "flight", "skate, cm/s", "stances over 21 mm", "foot correction p95, cm",
+    "legs short", "unreal", "off real running, cm",
+)
 
 
 def all_of(scenarios: list[int], names: list[str]) -> list[str]:
@@ -68,8 +80,7 @@ def annotation_costs(libraries: dict[str, Library], scenarios: list[int]) -> lis
     lines = [
         "### Words: eq. 18 or the squared difference (Faustino §3.2.2)", "",
         "Means over the scenarios; similarity over asked words and as printed, -1 is all.", "",
-        "| library, method | cost | similarity, all / keys | eq. 18, all / keys | seams | seam jerk, median | off the track, m | s |",
-        "|---|---|---|---|---|---|---|---|",
+        *markdown.head(WORDS_COLUMNS),
     ]
     for name, library in libraries.items():
         for method in ("blocks", "distance"):
@@ -79,9 +90,8 @@ def annotation_costs(libraries: dict[str, Library], scenarios: list[int]) -> lis
                 cells = np.nanmean(np.array(rows, dtype=float), axis=0)
                 similarity, printed = (" / ".join(f"{v:.2f}" for v in cells[i : i + 2]) for i in (0, 2))
                 seams, hard, off, took = cells[4:]
-                lines.append(
-                    f"| {name}, {method} | {told} | {similarity} | {printed} | {seams:.0f} | {hard:.2f} | {off:.2f} | {took:.2f} |"
-                )
+                rest = [f"{seams:.0f}", f"{hard:.2f}", f"{off:.2f}", f"{took:.2f}"]
+                lines.append(markdown.row([f"{name}, {method}", told, similarity, printed, *rest]))
     decision = (
         "Kept: eq. 18. The squared difference counts every further word of a clip against it, meets fewer of the asked words "
         "with both methods, and takes twice as long; it cuts more smoothly only where it gives the words up (`blocks`)."
@@ -120,8 +130,7 @@ def continuity(libraries: dict[str, Library], scenarios: list[int], rows: int = 
         "### Continuity between blocks: worked out when needed, or kept in a table (Faustino §4.3)", "",
         "The table holds the continuity cost of every 8-frame block before every other, float32. Building and looking up are",
         f"measured on {rows} of its rows and scaled.", "",
-        "| library | blocks | table, GiB | build, s | pairs needed a run (distance) | worked out, s | looked up, s |",
-        "|---|---|---|---|---|---|---|",
+        *markdown.head(TABLE_COLUMNS),
     ]
     for name, library in libraries.items():
         timed = _Timed()
@@ -130,13 +139,12 @@ def continuity(libraries: dict[str, Library], scenarios: list[int], rows: int = 
                 synthesize(library, _plan(library, number, method="distance"))
         pairs, took = timed.pairs / len(scenarios), timed.seconds / len(scenarios)
         count, build_seconds, per_pair = _table(library, rows)
-        lines.append(
-            f"| {name} | {count} | {4.0 * count**2 / 2**30:.1f} | {build_seconds:.1f} | {pairs / 1e6:.2f} million | {took:.3f} | "
-            f"{pairs * per_pair:.3f} |"
-        )
+        size, needed = f"{4.0 * count**2 / 2**30:.1f}", f"{pairs / 1e6:.1f} million"
+        cells = [name, str(count), size, f"{build_seconds:.1f}", needed, f"{took:.3f}", f"{pairs * per_pair:.3f}"]
+        lines.append(markdown.row(cells))
     decision = (
         "Kept: worked out when needed. A library that covers running needs a table larger than most machines' memory, and "
-        "looking distances up there is no faster than 26 to 52 multiplications each; a small library saves some hundredths of a second."
+        "looking distances up there is no faster than working them out; a small library saves some hundredths of a second."
     )
     return [*lines, "", decision, ""]
 
@@ -159,16 +167,17 @@ def made_running(libraries: dict[str, Library], scenarios: list[int], place: Pat
     """Made running against the fastest recording, played faster with longer strides (`Plan.made`)."""
     lines = [
         "### Faster than any recording: made running, or recordings stretched", "",
-        "`path` with and without `--no-made`, by the speed asked. Cadence: steps a second, flight: share of frames with neither",
-        "foot within 3 cm of where it stands; both beside published ones (Dorn 2012 and others, `motion/gait_tables`) at the",
-        "same speeds. Unreal: share of poses farther from the library's own than these are from each other. Off real running: the",
-        f"median distance from the nearest pose of {', '.join(FAST_RECORDINGS)} on the same skeleton, which reach 8.9 m/s.", "",
-        "| library | m/s | s | way | cadence | flight | skate, cm/s | stances over 21 mm | foot correction p95, cm | legs short | unreal | off real running, cm |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "`path` with and without `--no-made`, by the speed asked. Cadence: steps a second, flight: share of frames with",
+        "neither foot within 3 cm of where it stands; both beside published ones (Dorn 2012 and others,",
+        "`motion/gait_tables`) at the same speeds. Unreal: share of poses farther from the library's own than these are from",
+        f"each other. Off real running: the median distance from the nearest pose of {', '.join(FAST_RECORDINGS)}",
+        "on the same skeleton, which reach 8.9 m/s.", "",
+        *markdown.head(RUNNING_COLUMNS),
     ]
     for name, library in libraries.items():
         if library.extended is library or not any(_outrun(library, number) for number in scenarios):
-            lines.append(f"| {name} | - | 0 | never made: recordings reach {library.fastest:.1f} m/s | | | | | | | | |")
+            told = f"never made: recordings reach {library.fastest:.1f} m/s"
+            lines.append(markdown.row([name, "-", "0", told, *[""] * (len(RUNNING_COLUMNS) - 4)]))
             continue
         referee = _referee(library, place)
         samples = {
@@ -177,7 +186,8 @@ def made_running(libraries: dict[str, Library], scenarios: list[int], place: Pat
         }
         for low, high in zip(SPEEDS, SPEEDS[1:]):
             for told, of in samples.items():
-                lines.append(f"| {name} | {low:g}-{high:g} | {_class_row(of, low, high, told)} |")
+                speeds = f"{low:g}-{high:g}" if np.isfinite(high) else f"above {low:g}"
+                lines.append(markdown.row([name, speeds, *_class_row(of, low, high, told)]))
     decision = (
         "Kept: made running, for what is above any recording x 1.15: there stretched strides leave legs short and fly too "
         "little, and neither is nearer to real running. From the fastest recording up to x 1.15 of it stretched recordings "
@@ -236,17 +246,24 @@ def _mean_of(values: np.ndarray) -> np.ndarray:
     return np.where(known.any(axis=1), np.nansum(values, axis=1) / np.maximum(known.sum(axis=1), 1), np.nan)
 
 
-def _class_row(takes: list[dict[str, np.ndarray]], low: float, high: float, told: str) -> str:
+def _class_row(takes: list[dict[str, np.ndarray]], low: float, high: float, told: str) -> list[str]:
     of = {name: np.concatenate([take[name] for take in takes]) for name in takes[0]}
     mine = (of["speed"] >= low) & (of["speed"] < high)
     if not np.any(mine):
-        return f"0 | {told} | | | | | | | |"
+        return ["0", told, *[""] * (len(RUNNING_COLUMNS) - 4)]
     of = {name: values[mine] for name, values in of.items()}
     moved = of["moved"][of["moved"] >= 0.0]
-    steps, flight = 2.0 * at_speed("frequency", of["speed"]).mean(), np.maximum(0, 1 - 2 * at_speed("duty", of["speed"])).mean()
-    return (
-        f"{mine.sum() / 30.0:.0f} | {told} | {of['steps'].mean():.2f} (real {steps:.2f}) | {of['flight'].mean():.0%} (real "
-        f"{flight:.0%}) | {100 * np.nanmean(of['skate']):.1f} | {np.nanmean(of['slid']):.0%} | "
-        f"{100 * np.percentile(moved, 95) if len(moved) else np.nan:.0f} | {of['short'].mean():.1%} | {of['unreal'].mean():.0%} | "
-        f"{100 * np.median(of['off']):.1f}"
-    )
+    cadence = 2.0 * at_speed("frequency", of["speed"]).mean()
+    flight = np.maximum(0.0, 1.0 - 2.0 * at_speed("duty", of["speed"])).mean()
+    return [
+        f"{mine.sum() / 30.0:.0f}",
+        told,
+        f"{of['steps'].mean():.2f} (real {cadence:.2f})",
+        f"{of['flight'].mean():.0%} (real {flight:.0%})",
+        f"{100 * np.nanmean(of['skate']):.1f}",
+        f"{np.nanmean(of['slid']):.0%}",
+        f"{100 * np.percentile(moved, 95):.0f}" if len(moved) else "-",
+        f"{of['short'].mean():.1%}",
+        f"{of['unreal'].mean():.0%}",
+        f"{100 * np.median(of['off']):.1f}",
+    ]

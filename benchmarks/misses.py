@@ -14,6 +14,8 @@ from beyond_mocap.evaluation.targets import TARGETS
 from beyond_mocap.evaluation.view import View
 from beyond_mocap.library.made import MADE_FOLDER
 
+from . import markdown
+
 KINDS = ("key moments", "made running", "beyond the recordings", "below 1 m/s", "elsewhere")
 """What a frame is counted as, the first that holds: within a key moment's entry and exit or 0.5 s of it; made running; the
 track above the fastest recording x 1.15; the track below 1 m/s."""
@@ -118,7 +120,7 @@ def summary(reports: Mapping[int, Mapping], missed: Sequence[Misses]) -> list[st
     """One line per figure with a target: its mean over the scenarios, in how many it is met, and where it is missed."""
     rows = {number: {row.name: row for row in judged(report)} for number, report in reports.items()}
     total = {name: np.sum([of.frames[name] for of in missed], axis=0) for name in missed[0].frames}
-    lines = ["| figure | target | mean | recordings | met in | where the frames are that miss it |", "|---|---|---|---|---|---|"]
+    lines = markdown.head(["figure", "target", "mean", "recordings", "met in", "where the frames are that miss it"])
     for name in TARGETS:
         found = [of[name] for of in rows.values() if name in of and of[name].status]
         if not found:
@@ -126,7 +128,8 @@ def summary(reports: Mapping[int, Mapping], missed: Sequence[Misses]) -> list[st
         met = sum(row.status == "met" for row in found)
         where = shares(total[name]) if met < len(found) and name in total else ""
         verdict = f"{met} of {len(found)}" if met == len(found) else f"**{met} of {len(found)}**"
-        lines.append(f"| {name} | {_target(found)} | {_mean(found, 'value')} | {_mean(found, 'own')} | {verdict} | {where} |")
+        cells = [name, _target(found), _mean(found, "value"), _mean(found, "own"), verdict, where]
+        lines.append(markdown.row(cells))
     lines += [_keys(list(reports.values()), rows), ""]
     return [*lines, f"All frames: {shares(total[''], 0.0)}. What lies behind it:", "", *_behind(reports, missed), ""]
 
@@ -170,4 +173,4 @@ def _keys(reports: Sequence[Mapping], rows) -> str:
     missed = sorted({row.name.partition(".")[2] for row in judged_keys if row.status == "missed"})
     count = sum(len(report["keys"]) for report in reports)
     verdict = f"{met} of {len(judged_keys)}" if met == len(judged_keys) else f"**{met} of {len(judged_keys)}**"
-    return f"| figures of {count} key moments | | | | {verdict} | missed: {', '.join(missed) or 'none'} |"
+    return markdown.row([f"figures of {count} key moments", "", "", "", verdict, f"missed: {', '.join(missed) or 'none'}"])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from . import markdown
+
 PRINTED = {  # scenarios 1 to 5, "whole animation" and "at frame constraints"
     "distance": ((4.52, 3.42, 3.24, 1.21, 1.86), (1.20, 2.14, 3.50, 3.19, 1.20)),
     "similarity": ((-0.05, -0.54, -0.09, -0.34, -0.25), (-1.0, -0.24, -0.75, -0.44, -0.8)),
@@ -21,25 +23,25 @@ def tables(reports: Reports, scenarios: Sequence[int]) -> list[str]:
     """His Tables 1, 2 and 4 with our rows below his."""
     return [
         "### Table 1: distance from the track, metres", "",
-        "Mean over the whole animation / at the key moments, pelvis and track as they are, no window. His is without catch-up.",
+        "Mean over the whole animation / at the key moments, pelvis and track without any window. His is without catch-up.",
         "",
         *_table(scenarios, _pair("distance", "{:.2f}"), reports, _place),
         "### Table 2: annotation similarity", "",
-        "Eq. 18 as printed, over the whole animation / at the key moments; in brackets over the asked words alone (-1 is all).",
+        "Eq. 18 as printed, whole animation / key moments; in brackets over the asked words alone (-1 is all).",
         "",
         *_table(scenarios, _pair("similarity", "{:.2f}"), reports, _similarity),
         "### Table 4: seconds to synthesize", "",
-        "His: without / with foot-skate minimized, i7-5600U. Ours: `blocks` answers to the first, `distance` to the second.", "",
+        "His: without / with foot-skate minimized, i7-5600U. `blocks` answers to the first, `distance` to the second.", "",
         *_table(scenarios, _pair("seconds", "{:.0f}"), reports, _seconds),
         f"Seconds of motion, his: {', '.join(f'{d:g}' for d in DURATIONS)}; ours: {_durations(reports, scenarios)}.", "",
     ]
 
 
 def _table(scenarios: Sequence[int], his, reports: Reports, ours) -> list[str]:
-    lines = ["| | " + " | ".join(f"scenario {n}" for n in scenarios) + " |", "|---|" + "---|" * len(scenarios)]
-    lines.append("| **Faustino** | " + " | ".join(his(n) for n in scenarios) + " |")
+    lines = markdown.head(["", *(f"scenario {n}" for n in scenarios)])
+    lines.append(markdown.row(["**Faustino**", *(his(n) for n in scenarios)]))
     for (library, method), of in reports.items():
-        lines.append(f"| {library}, {method} | " + " | ".join(ours(of[n]) for n in scenarios) + " |")
+        lines.append(markdown.row([f"{library}, {method}", *(ours(of[n]) for n in scenarios)]))
     return [*lines, ""]
 
 

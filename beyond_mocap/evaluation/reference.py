@@ -54,8 +54,8 @@ class LibraryReference:
 
     index: path -> recording; first (C + 1,): each recording's first row; rate (C,): its own frames per second; the
     per-frame arrays are Recording's, joined; jerk_above_real (N,): 1 where the window around a frame is above jerk_p95,
-    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95 (5,) m. poses (M, 6 J):
-    some ten a second of all clips, twins included. heel_rest: height of the heel joint on a flat foot, m. fastest:
+    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95 (5,) m.
+    poses (M, 6 J): some ten a second of all clips, twins included. heel_rest: height of the heel joint on a flat foot, m. fastest:
     highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
     """
 

@@ -55,7 +55,8 @@ def test_a_foot_that_is_dragged_is_told(jog, told):
 def test_a_short_leg_is_told(jog, told):
     miss = np.zeros((241, 2))
     miss[30:45, 1] = 0.021
-    assert told(jog, ik_miss=miss) == ["11.0-11.5 s: a leg cannot reach where its foot should stand and ends up to 2.1 cm short"]
+    line = "11.0-11.5 s: a leg cannot reach where its foot should stand and ends up to 2.1 cm short"
+    assert told(jog, ik_miss=miss) == [line]
 
 
 def test_off_the_track_is_told(jog, told, track_of):
