@@ -32,7 +32,8 @@ from .polish.smoothing import reaches
 from .synthesis.balance import balanced
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch, shown
-from .synthesis.path_search import SLOT, Between, PathSearch
+from .synthesis.offer import SLOT
+from .synthesis.path_search import Between, PathSearch
 from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (

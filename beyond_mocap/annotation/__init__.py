@@ -13,7 +13,7 @@
 """
 
 from .clips import ClipAnnotation, clip_annotations, read_annotation_csv, read_clip_annotations
-from .gaits import LOCOMOTION, LOCOMOTION_WORDS, STANDING_SPEED, automatic_gaits, gait_thresholds
+from .gaits import LOCOMOTION, LOCOMOTION_WORDS, STANDING_SPEED, automatic_gaits, gait_thresholds, recorded_thresholds
 from .text import format_timeline, parse_timeline, read_text, read_timeline
 from .timeline import KeyMoment, Span, Timeline, fill, missing_keys, problems, validate, words_per_frame
 from .vocabulary import (
@@ -51,6 +51,7 @@ __all__ = [
     "nearest",
     "parse_timeline",
     "problems",
+    "recorded_thresholds",
     "read_annotation_csv",
     "read_clip_annotations",
     "read_text",

@@ -11,8 +11,9 @@ LOCOMOTION = ("standing", "walking", "jogging", "running", "sprinting")
 
 LOCOMOTION_WORDS = frozenset((*LOCOMOTION, "dribble"))
 
-STANDING_SPEED = 0.5
-"""m/s; what a tracked player does below it is standing (tracking noise alone looks like 0.3 m/s)."""
+STANDING_SPEED = 0.3
+"""m/s of a smoothed track; below it a player stands. (Raw tracking noise alone looks like that; a smoothed track that creeps
+faster is a player who shuffles: a standing body would have to glide.)"""
 
 
 def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
@@ -34,28 +35,48 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
     return np.where(from_standing, np.maximum(thresholds, STANDING_SPEED), thresholds)
 
 
+def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray) -> np.ndarray:
+    """(G-1,) m/s, where a library's own annotations change from each gait to the next: the speed with fewest frames of the
+    slower one above it and of the faster one below it.
+
+    speeds (G,) m/s, ascending, the gaits' averages; speed (N,) m/s and gait (N,) index of annotated frames. Between gaits
+    that do not overlap it is half way; the step up from standing is STANDING_SPEED, since a body that stands cannot travel. Faustino's omega asks
+    for the faster gait already a quarter of the way up, which no recording of that speed is then called.
+    """
+    found = []
+    for slow, (low, high) in enumerate(zip(speeds, speeds[1:])):
+        below, above = np.sort(speed[gait == slow]), np.sort(speed[gait == slow + 1])
+        tried = np.linspace(low, high, 101)
+        wrong = len(below) - np.searchsorted(below, tried) + np.searchsorted(above, tried)
+        best = float(np.mean(tried[wrong == wrong.min()]))
+        found.append(STANDING_SPEED if low < STANDING_SPEED < high else best)
+    return np.array(found)
+
+
 def automatic_gaits(
     speed: np.ndarray,
     fps: float,
     speeds: np.ndarray,
     omega: float = 4.0,
+    thresholds: np.ndarray | None = None,
     hysteresis: float = 0.2,
     minimum: float = 0.4,
 ) -> np.ndarray:
     """(T,) index into `speeds`: the gait of every frame (Faustino §3.1.1's pseudo-code, made steady).
 
     speed: (T,) m/s at `fps` frames per second. speeds: (G,) m/s, ascending, the average speed of each gait's clips.
+    thresholds: (G-1,) m/s (`recorded_thresholds`); where None, those that `omega` gives.
     hysteresis: how far beyond a threshold the speed must go to change gait, as a share of the distance between the two
     gaits, at most a quarter of the threshold (the paper has none: at a boundary speed its annotation flickers with the
     noise). minimum: seconds a gait lasts at least; shorter ones go to the neighbour that is nearer in gait, then to the
     longer one.
     """
     speed = np.asarray(speed, dtype=float)
-    thresholds = gait_thresholds(speeds, omega)
+    thresholds = gait_thresholds(speeds, omega) if thresholds is None else thresholds
     margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)
     steps = [_trigger(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
     gaits = np.sum(steps, axis=0, dtype=int) if steps else np.zeros(len(speed), dtype=int)
-    return _without_short_runs(gaits, int(np.ceil(minimum * fps - 1e-9)))
+    return without_short_runs(gaits, int(np.ceil(minimum * fps - 1e-9)))
 
 
 def _trigger(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
@@ -66,8 +87,8 @@ def _trigger(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
     return (speed >= threshold)[last]
 
 
-def _without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
-    """The gaits with every run shorter than `frames` given to a neighbour, shortest first."""
+def without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
+    """Kinds (T,) of gait or direction with every run shorter than `frames` given to a neighbour, shortest first."""
     if not len(gaits):
         return gaits
     edges = np.flatnonzero(np.diff(gaits)) + 1

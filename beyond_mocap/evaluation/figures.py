@@ -201,7 +201,8 @@ def filled_timeline(view: View) -> Timeline:
     except InputError:
         return view.timeline
     sampled = sample(view.track, view.library.fps)
-    chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits])
+    thresholds = view.library.gait_thresholds
+    chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds=thresholds)
     return fill(view.timeline, sampled.times, [gaits[index].words for index in chosen])
 
 

@@ -24,8 +24,8 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 7
-_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "features", "mean", "basis", "words")
+VERSION = 8
+_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "jerk", "features", "mean", "basis", "words")
 
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:

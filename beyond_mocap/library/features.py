@@ -30,7 +30,8 @@ class Frames:
 
     clip (N,) clip index; source (N,) fractional frame in the clip's own rate; first, count (C,) each clip's place.
     root (N, 3) metres; heading (N,) facing, radians, unwrapped within a clip; path (N, 2) the root on the ground without
-    its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame (x forward, y left).
+    its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame (x forward, y left). jerk (N,)
+    m/s^3 of the joint that has most, from the third difference around each frame.
     features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words (N, V) bool, one
     column per word of `vocabulary`.
     """
@@ -43,6 +44,7 @@ class Frames:
     heading: np.ndarray
     path: np.ndarray
     velocity: np.ndarray
+    jerk: np.ndarray
     features: np.ndarray
     mean: np.ndarray
     basis: np.ndarray
@@ -131,6 +133,7 @@ def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], f
             facing,
             path,
             quaternion.turned_level(_gradient(path, fps), -facing),
+            most_jerk(positions, fps),
             raw_features(positions[:, joints], facing, fps).astype(np.float32),
             words_of(clip, source),
         )
@@ -151,13 +154,22 @@ def joined(a: Frames, b: Frames) -> Frames:
         words[rows, [vocabulary.index(word) for word in frames.vocabulary]] = frames.words
     parts = {
         name: np.concatenate([getattr(a, name), getattr(b, name)])
-        for name in ("source", "count", "root", "heading", "path", "velocity", "features")
+        for name in ("source", "count", "root", "heading", "path", "velocity", "jerk", "features")
     }
     clip, first = np.append(a.clip, b.clip + len(a.first)), np.append(a.first, b.first + len(a))
     return Frames(clip=clip, first=first, mean=a.mean, basis=a.basis, words=words, vocabulary=vocabulary, **parts)
 
 
-_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "features", "words")
+_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "jerk", "features", "words")
+
+
+def most_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) m/s^3 of the joint that jerks most, positions (T, J, 3) m: the third difference from one frame before to two
+    after, held at the ends."""
+    if len(positions) < 4:
+        return np.zeros(len(positions))
+    third = np.diff(positions, 3, axis=0)
+    return np.pad(np.sqrt((third**2).sum(axis=-1).max(axis=-1)) * fps**3, (1, 2), mode="edge")
 
 
 def sampled_positions(motion, fps: float) -> tuple[np.ndarray, np.ndarray]:

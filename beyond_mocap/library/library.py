@@ -14,7 +14,7 @@ from typing import Callable, Iterable
 
 import numpy as np
 
-from ..annotation import LOCOMOTION, ClipAnnotation, swap_sides
+from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds, swap_sides
 from ..errors import Cancelled, InputError
 from ..files import bvh
 from ..motion import contacts as foot_contacts
@@ -121,6 +121,26 @@ class Library:
     def gaits(self) -> tuple[Gait, ...]:
         """The library's own locomotion from slow to fast; InputError where it has none."""
         return measure_gaits(self)
+
+    @cached_property
+    def gait_thresholds(self) -> np.ndarray:
+        """(G-1,) m/s: where the clips' own annotations change from each gait to the next faster one."""
+        frames, gaits = self.frames, self.gaits
+        column = {word: i for i, word in enumerate(frames.vocabulary)}
+        labelled = np.full(len(frames), -1)
+        for number, gait in enumerate(gaits):
+            labelled[frames.words[:, column[gait.word]]] = number
+        return recorded_thresholds(np.array([gait.speed for gait in gaits]), frames.speed, labelled)
+
+    @cached_property
+    def stance_seconds(self) -> np.ndarray:
+        """(N,) seconds that the foot which leaves the ground sooner stands there in all at each frame; 0 while one is in
+        the air. Whoever plays it faster or slower than the track drags that foot as long."""
+        return np.concatenate([_stance_seconds(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
+
+    def _own_frames(self, clip: int) -> np.ndarray:
+        first = self.frames.first[clip]
+        return self.frames.source[first : first + self.frames.count[clip]]
 
     @cached_property
     def extended(self) -> "Library":
@@ -313,6 +333,20 @@ def _described(clips, like: Frames | None = None) -> Frames:
     words_of = lambda clip, source: words_matrix(clip, source, vocabulary)  # noqa: E731
     with threadpool_limits(limits=1):  # with more, sums of products come out in another order
         return describe(clips[0].motion.skeleton, clips, words_of, vocabulary, FPS, like)
+
+
+def _stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
+    """(T,) of one clip at its frames `source` (T,)."""
+    stands = clip.standing.any(axis=2)
+    length = np.stack([_run_lengths(stands[:, side]) for side in (0, 1)], axis=1).min(axis=1) / clip.motion.fps
+    return length[np.clip(np.round(source).astype(int), 0, len(length) - 1)]
+
+
+def _run_lengths(flags: np.ndarray) -> np.ndarray:
+    """(T,) length of the run of True that each frame lies in, 0 for False."""
+    edges = np.flatnonzero(np.diff(flags, prepend=not flags[0], append=not flags[-1]))
+    lengths = np.diff(edges)
+    return np.repeat(lengths, lengths) * flags
 
 
 def words_matrix(clip: Clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..plan import Plan
-from .path_search import Weights
+from .path_costs import Weights
 
 _CONTINUITY = ("switch", "pose", "rate_change")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..library.keys import Key, nearest_serving, nearest_words, serving
 from ..library.library import Library
 from ..motion.track import SampledTrack, sample
 from ..plan import Plan
+from .gaze import direction_words, wanted_offset
 
 Words = frozenset[str] | None
 
@@ -19,12 +20,14 @@ Words = frozenset[str] | None
 @dataclass(frozen=True)
 class WantedKey:
     """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may serve
-    it (empty: locomotion stands in), and the words used where the asked ones are lacking."""
+    it (empty: locomotion stands in), the words used where the asked ones are lacking, and whether the feed measured the
+    ball's height then."""
 
     asked: KeyMoment
     frame: float
     choices: tuple[Key, ...]
     used_instead: tuple[str, ...] | None
+    ball_height_known: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +51,30 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless plan.nearest)."""
     track = sample(plan.track, library.fps, plan.track_window)
     gaits = library.gaits
-    gait = automatic_gaits(track.speed, library.fps, np.array([g.speed for g in gaits]), plan.omega)
-    timeline = fill(plan.timeline, track.times, [gaits[g].words for g in gait])
+    thresholds = library.gait_thresholds if plan.method == "path" else None
+    gait = automatic_gaits(track.speed, library.fps, np.array([g.speed for g in gaits]), plan.omega, thresholds)
+    timeline = fill(plan.timeline, track.times, _automatic_words(library, gait, track))
     allowed = np.array([plan.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
     keys = tuple(_key(library, moment, track, gait, allowed, plan.nearest, warnings) for moment in timeline.keys)
+    known = plan.track.ball_height_known
+    nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.asked.time))) for key in keys]
+    keys = tuple(replace(key, ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
     asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
     warnings += _lacking(library, plan.timeline)
     return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings))
+
+
+def _automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> list[tuple[str, ...]]:
+    """(T,) the words of each frame's gait; where the library also has it in the direction in which a body that faces the
+    ball would go (`gaze.wanted_offset`), in that direction."""
+    recorded = {row.words for clip in library.clips for row in clip.annotations}
+    words: list[tuple[str, ...]] = []
+    for number, direction in zip(gait, direction_words(wanted_offset(track), track.fps)):
+        own = library.gaits[number].words
+        turned = tuple(direction if word == "front" else word for word in own)
+        words.append(turned if turned in recorded else own)
+    return words
 
 
 def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:

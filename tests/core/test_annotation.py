@@ -26,6 +26,7 @@ from beyond_mocap.annotation import (
     read_annotation_csv,
     read_clip_annotations,
     read_timeline,
+    recorded_thresholds,
     relatives,
     similar_words,
     spoken,
@@ -256,13 +257,22 @@ def test_filling_leaves_no_frame_without_words(pieces, gaits):
 # --- gaits
 
 
-def test_thresholds_lie_a_quarter_up_and_standing_ends_at_half_a_metre_per_second():
+def test_thresholds_lie_a_quarter_up_and_standing_ends_where_a_body_would_glide():
     np.testing.assert_allclose(gait_thresholds([1.0, 3.0, 5.0]), [1.5, 3.5])
-    np.testing.assert_allclose(gait_thresholds([0.1, 1.3, 2.9]), [0.5, 1.7])
+    np.testing.assert_allclose(gait_thresholds([0.1, 0.5, 2.9]), [0.3, 1.1])
     assert len(gait_thresholds([1.0])) == 0
     for wrong in ([2.0, 1.0], [1.0, np.nan]):
         with pytest.raises(InputError):
             gait_thresholds(wrong)
+
+
+def test_recorded_thresholds_lie_where_the_labels_change():
+    rng = np.random.default_rng(1)
+    speed = np.concatenate([rng.uniform(0.0, 0.2, 300), rng.uniform(0.7, 2.0, 300), rng.uniform(2.0, 4.0, 300)])
+    found = recorded_thresholds(np.array([0.1, 1.3, 2.9]), speed, np.repeat([0, 1, 2], 300))
+    assert found[0] == 0.3 and abs(found[1] - 2.0) < 0.03
+    gaits = automatic_gaits(np.full(60, 1.9), 30, [0.1, 1.3, 2.9], thresholds=found)
+    assert set(gaits) == {1}
 
 
 def test_steady_speeds_get_their_own_gait():

@@ -7,7 +7,7 @@ from beyond_mocap.errors import InputError
 from beyond_mocap.motion.track import Track, sample
 from beyond_mocap.plan import LIMITS, Plan
 from beyond_mocap.synthesis.balance import balanced
-from beyond_mocap.synthesis.path_search import Weights
+from beyond_mocap.synthesis.path_costs import Weights
 from beyond_mocap.synthesize import synthesize
 
 

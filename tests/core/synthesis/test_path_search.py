@@ -53,6 +53,15 @@ def test_the_clip_of_the_asked_speed_is_played(library, order, track_of, speed):
     assert np.median(np.abs(shown - speed)) < 0.4
 
 
+def test_where_the_feed_creeps_no_standing_body_glides(library, order, track_of):
+    stands = library.stance_seconds
+    assert stands[np.isin(library.frames.clip, [i for i, c in enumerate(library.clips) if c.path == "stand.bvh"])].min() > 3
+    walks = [i for i, c in enumerate(library.clips) if c.path == "walk.bvh"]
+    assert stands[np.isin(library.frames.clip, walks)].max() < 1.0
+    edit = found(library, order(track=track_of(0.6)))
+    assert np.mean([library.clips[c].path == "stand.bvh" for c in edit.clip]) < 0.2
+
+
 def test_a_turning_track_is_played_by_clips_that_turn(library, order, track_of):
     edit = found(library, order(track=track_of(1.4, turn=0.9)))
     bows = [library.clips[c].path == "bows/turn.bvh" and not library.clips[c].mirrored for c in edit.clip]

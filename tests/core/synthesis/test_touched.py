@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.path_search import SLOT, PathSearch
+from beyond_mocap.synthesis.offer import SLOT
+from beyond_mocap.synthesis.path_search import PathSearch
 from beyond_mocap.synthesis.touched import RUN_UP, asked_otherwise, kept_keys, lies_elsewhere, stretches, to_search
 
 

@@ -1,0 +1,103 @@
+"""What a library offers to the path search, whatever is asked: worked out once, kept as long as the library."""
+
+from __future__ import annotations
+
+import weakref
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from ..annotation import DISCRETE
+from ..library.library import Library
+from .annotation_cost import AnnotationCost
+
+SLOT = 8
+RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
+BUCKET = 40
+REACH = 8
+_SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)
+_USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
+_LONGEST_STANCE = 2.0
+
+
+class Offer:
+    """N library frames at R rates. speed (R, N) m/s, turn (R, N) radians and valid (R, N) of a slot that begins there;
+    by_speed (K,) the valid pairs (rate, frame), flat, in the order of speeds (K,); offset (N,) radians from the direction
+    of travel to the body's; long_stance (N,) s that both feet stand longer than in a walk; wild_before, wild_after (N,)
+    see `wildness`; made (N,) bool; bucket (N,) int: frames of one bucket look alike to whoever sees them twice.
+    """
+
+    _kept: weakref.WeakKeyDictionary[Library, dict[bytes, "Offer"]] = weakref.WeakKeyDictionary()
+
+    @classmethod
+    def of(cls, library: Library, allowed: np.ndarray) -> "Offer":
+        """The library's offer with the clips of `allowed` (C,) bool."""
+        kept = cls._kept.setdefault(library, {})
+        if allowed.tobytes() not in kept:
+            kept[allowed.tobytes()] = cls(library, allowed)
+        return kept[allowed.tobytes()]
+
+    def __init__(self, library: Library, allowed: np.ndarray):
+        """Works it all out; `of` does so only once."""
+        self.frames = library.frames
+        self.annotation = AnnotationCost(library.frames)
+        self.made = np.array([clip.made for clip in library.clips])[library.frames.clip]
+        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
+        self.speed, self.turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
+        self.valid = lasts & allowed[library.frames.clip]
+        usable = np.flatnonzero(self.valid)
+        self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
+        self.speeds = self.speed.ravel()[self.by_speed]
+        self.offset = -np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0])
+        self.long_stance = np.clip(library.stance_seconds - _USUAL_STANCE, 0.0, _LONGEST_STANCE)
+        self.wild_before, self.wild_after = wildness(library)
+        self._missing: dict[frozenset[str], np.ndarray] = {}
+        self._other: dict[frozenset[str], np.ndarray] = {}
+
+    def missing_share(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) share of the words that each frame lacks."""
+        if words not in self._missing:
+            self._missing[words] = self.annotation.missing_share(words)
+        return self._missing[words]
+
+    def unasked(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) bool: frames that show an action (a kick, a jump) nobody asked for, or nothing that is annotated."""
+        if words not in self._other:
+            names = self.frames.vocabulary
+            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
+            self._other[words] = self.frames.words[:, actions].any(axis=1) | ~self.frames.words.any(axis=1)
+        return self._other[words]
+
+    def near_in_speed(self, speed: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) numbers of rates and (K,) frames of the `count` pairs nearest to a speed in m/s. The others' misfit in speed
+        alone would put them behind, and a large library is searched as fast as a small one."""
+        middle = int(np.searchsorted(self.speeds, speed))
+        low = int(np.clip(middle - count // 2, 0, max(0, len(self.by_speed) - count)))
+        return np.divmod(self.by_speed[low : low + count], len(self.frames))
+
+
+def wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) and (N,): by how much the largest jerk within REACH frames before and after each frame exceeds what is usual at
+    its speed, as a share; 0 where it does not. A seam's jerk is measured over such windows (../shared/metrics.md)."""
+    frames = library.frames
+    kind = np.digitize(frames.speed, _SPEED_CLASSES)
+    around = maximum_filter1d(frames.jerk, 2 * REACH + 1, mode="nearest")
+    usual = np.array([np.percentile(around[kind == k], 90) if np.any(kind == k) else np.inf for k in range(5)])
+    windows = (maximum_filter1d(frames.jerk, REACH + 1, mode="nearest", origin=o * (REACH // 2)) for o in (1, -1))
+    return tuple(np.maximum(window / usual[kind] - 1.0, 0.0).astype(np.float32) for window in windows)
+
+
+def played_speed_and_turn(library: Library, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Per library frame, if a slot starts there at `rate`: (N,) mean speed in m/s, (N,) turn of the body in radians, (N,)
+    whether the clip lasts that long."""
+    frames = library.frames
+    after = np.arange(len(frames)) + SLOT * rate
+    valid = frames.left_in_clip >= SLOT * rate
+    low = np.minimum(np.floor(after).astype(int), len(frames) - 2)
+    weight = after - low
+    weight[~valid] = 0.0
+    low[~valid] = np.minimum(np.arange(len(frames))[~valid], len(frames) - 2)
+    path = frames.path[low] * (1 - weight)[:, None] + frames.path[low + 1] * weight[:, None]
+    heading = frames.heading[low] * (1 - weight) + frames.heading[low + 1] * weight
+    speed = np.linalg.norm(path - frames.path, axis=1) * library.fps / SLOT
+    return speed, heading - frames.heading, valid

@@ -1,0 +1,116 @@
+"""What a stretch of a clip costs in a place of the track, and what a cut from one frame to another costs.
+
+All that `path_search` weighs stands here: how far speed, turn, facing and words are from what is asked, and how far two
+poses are apart. Costs are per slot, about a metre per second of missed speed each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..library.library import Library
+from .gaze import wanted_offset
+from .offer import RATES, SLOT, Offer
+from .wanted import Wanted
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a walk;
+    turn per radian and slot; facing per radian between the body and where it should face; words for lacking all of the asked
+    ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made gait, which steps in
+    only where recordings miss the speed by more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch
+    for any cut; pose per metre of joint distance; wild for cutting where the clips jerk by as much again as is usual;
+    rate_change per unit; replay for a stretch shown less than 4 s ago; held per frame beyond a clip's end.
+    """
+
+    speed: float = 1.0
+    drag: float = 1.0
+    turn: float = 0.5
+    facing: float = 0.15
+    words: float = 1.0
+    unasked: float = 0.5
+    made: float = 0.2
+    rate: float = 0.24
+    stretch: float = 4.0
+    switch: float = 0.1
+    pose: float = 2.0
+    wild: float = 0.3
+    rate_change: float = 0.16
+    replay: float = 1.5
+    held: float = 0.1
+
+
+class PathCosts:
+    """The costs of one order on one library of N frames."""
+
+    def __init__(self, library: Library, wanted: Wanted, weights: Weights = Weights()):
+        self.library, self.wanted, self.weights = library, wanted, weights
+        self.frames, self.offer = library.frames, Offer.of(library, wanted.allowed)
+        self.wanted_offset = wanted_offset(wanted.track)
+
+    def inside(self, frame: np.ndarray) -> np.ndarray:
+        """Nearest whole library frames."""
+        return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
+
+    def asked(self, first: int, end: int) -> tuple[float, float]:
+        """Mean speed in m/s and change of direction in radians that the track asks from frame first to end."""
+        track = self.wanted.track
+        last = min(end, len(track.times) - 1)
+        speed = float(track.speed[first : last + 1].mean())
+        return speed, float(track.direction[last] - track.direction[first]) * min(1.0, speed)
+
+    def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
+        """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end; inf
+        where the clip ends before or may not be used."""
+        w, offer = self.weights, self.offer
+        turn = offer.turn[number, frame] * ((end - first) / SLOT)
+        cost = self._motion_misfit(first, end, offer.speed[number, frame], turn, frame)
+        cost += w.rate * np.abs(RATES[number] - 1.0)
+        words = self.wanted.asked[(first + end) // 2]
+        if words:
+            cost += w.words * offer.missing_share(words)[frame]
+        cost += w.unasked * offer.unasked(words or frozenset())[frame] + w.made * offer.made[frame]
+        return np.where(offer.valid[number, frame], cost, np.inf)
+
+    def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held at
+        their ends. Words do not count here. A kick that was recorded slower than the player runs is played faster, within
+        the limits of what may give way (../shared/metrics.md)."""
+        low, high = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
+        length = end - first
+        a, b = (np.clip(at, low, high) for at in (start, start + rate * length))
+        path = [_between(self.frames.path, at, high) for at in (a, b)]
+        turn = _between(self.frames.heading, b, high) - _between(self.frames.heading, a, high)
+        speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
+        cost = self._motion_misfit(first, end, speed, turn, self.inside((a + b) / 2.0))
+        held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
+        off = np.abs(rate - 1.0)
+        cost += self.weights.rate * off + self.weights.stretch * np.maximum(off - 0.15, 0.0) + self.weights.held * held
+        return cost * (length / SLOT)
+
+    def _motion_misfit(self, first: int, end: int, speed, turn, frame) -> np.ndarray:
+        wanted_speed, wanted_turn = self.asked(first, end)
+        w, moving = self.weights, min(1.0, wanted_speed)
+        cost = np.abs(speed - wanted_speed) * (w.speed + w.drag * self.offer.long_stance[frame])
+        cost += w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
+        aside = self.offer.offset[frame] - self.wanted_offset[(first + end) // 2]
+        return cost + w.facing * moving * np.abs((aside + np.pi) % (2.0 * np.pi) - np.pi)
+
+    def cut(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """(B, K) cost of a cut from library frames ends (B,) to start (K,): how far their poses are apart, and how wild the
+        motion is that is left or entered (nobody can blend out of a kick half way)."""
+        ends, start = self.inside(ends), self.inside(start)
+        a, b = self.frames.features[ends], self.frames.features[start]
+        square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
+        wild = self.weights.wild * (self.offer.wild_before[ends][:, None] + self.offer.wild_after[start])
+        return self.weights.switch + self.weights.pose * np.sqrt(np.maximum(square, 0.0)) + wild
+
+
+def _between(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """`values` (N, ...) at fractional frames `at` (K,) that lie no later than `last` (K,)."""
+    low = np.floor(at).astype(int)
+    weight = (at - low).reshape(-1, *[1] * (values.ndim - 1))
+    return values[low] * (1.0 - weight) + values[np.minimum(low + 1, last)] * weight
