@@ -92,7 +92,7 @@ def _add_settings(verb) -> None:
     for name, unit, meaning in (
         ("alpha", "SHARE", "words against continuity"),
         ("delta", "METRES", "travelled distance that may stay wrong ('distance')"),
-        ("omega", "NUMBER", "between two gaits' speeds the faster gait begins at 1/omega of the way up"),
+        ("omega", "NUMBER", "between two gaits' speeds the faster gait begins at 1/omega of the way up; 0: as the recordings are labelled ('path'), else 4"),
         ("seam-window", "SECONDS", "over which the jump at a cut is spread"),
         ("track-window", "SECONDS", "of the window that takes the jitter out of the track"),
         ("root-window", "SECONDS", "of the window behind which the body is on the track ('path')"),

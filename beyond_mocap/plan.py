@@ -13,7 +13,7 @@ METHODS = ("path", "distance", "blocks")
 LIMITS = {
     "alpha": (0.0, 1.0),
     "delta": (0.0, 100.0),
-    "omega": (1.0, 100.0),
+    "omega": (0.0, 100.0),
     "seam_window": (0.0, 4.0),
     "track_window": (0.2, 5.0),
     "root_window": (0.2, 5.0),
@@ -31,7 +31,8 @@ class Plan:
     alpha: weight of annotation against continuity (Faustino eq. 13; for "path" `synthesis.balance`). mirror: whether
     mirrored clips may be used.
     nearest: go on with the nearest words where the library lacks a key moment. seed: of every random choice.
-    delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1).
+    delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1), 1 or more; 0:
+    by "path" where the recordings' own labels change, else the paper's 4.
     made: whether made running may stand in where the track is faster than any recording (method "path" only).
     seam_window: seconds over which a jump at a seam is spread (eq. 25, twice its s; "path" fades over half of it).
     track_window: seconds of the window that takes the feed's jitter out (`motion.track.smoothed`). root_window: seconds of
@@ -52,7 +53,7 @@ class Plan:
     nearest: bool = False
     seed: int = 0
     delta: float = 0.5
-    omega: float = 4.0
+    omega: float = 0.0
     made: bool = True
     seam_window: float = 0.8
     track_window: float = SMOOTHING_SECONDS
@@ -63,6 +64,8 @@ class Plan:
         for name, (least, most) in LIMITS.items():
             if not least <= getattr(self, name) <= most:
                 raise InputError(name, f"{getattr(self, name):g}", f"{least:g} to {most:g}")
+        if 0.0 < self.omega < 1.0:
+            raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the usual thresholds")
 
 
 def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:

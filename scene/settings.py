@@ -101,8 +101,9 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         description="Of Distance: travelled distance of a stretch that may stay wrong before steps are added or left out",
     )
     omega: FloatProperty(
-        name="Gait Threshold", default=4.0, min=1.0, max=100.0, precision=1,
-        description="Between the speeds of two gaits the faster one begins at one part in so many of the way up",
+        name="Gait Threshold", default=0.0, min=0.0, max=100.0, precision=1,
+        description="Between the speeds of two gaits the faster one begins at one part in so many of the way up. "
+        "0: where the recordings' own labels change (Path), else a quarter of the way",
     )
     seam_window: FloatProperty(
         name="Cut Smoothing", default=0.8, min=0.0, max=4.0, precision=2, unit="TIME_ABSOLUTE",

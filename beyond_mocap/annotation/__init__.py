@@ -8,7 +8,8 @@
 
     timeline = read_timeline("player.txt", fps=30)
     validate(timeline, known_words=library_words, start=track.times[0], end=track.times[-1], where="player.txt")
-    gaits = automatic_gaits(sampled.speed, sampled.fps, speeds=[0.1, 1.3, 2.9])
+    speeds = [0.1, 1.3, 2.9]
+    gaits = automatic_gaits(sampled.speed, sampled.fps, speeds, gait_thresholds(speeds))
     filled = fill(timeline, sampled.times, [(LOCOMOTION[g],) for g in gaits])
 """
 

@@ -57,22 +57,20 @@ def automatic_gaits(
     speed: np.ndarray,
     fps: float,
     speeds: np.ndarray,
-    omega: float = 4.0,
-    thresholds: np.ndarray | None = None,
+    thresholds: np.ndarray,
     hysteresis: float = 0.2,
     minimum: float = 0.4,
 ) -> np.ndarray:
     """(T,) index into `speeds`: the gait of every frame (Faustino §3.1.1's pseudo-code, made steady).
 
     speed: (T,) m/s at `fps` frames per second. speeds: (G,) m/s, ascending, the average speed of each gait's clips.
-    thresholds: (G-1,) m/s (`recorded_thresholds`); where None, those that `omega` gives.
+    thresholds: (G-1,) m/s (`gait_thresholds`, `recorded_thresholds`).
     hysteresis: how far beyond a threshold the speed must go to change gait, as a share of the distance between the two
     gaits, at most a quarter of the threshold (the paper has none: at a boundary speed its annotation flickers with the
     noise). minimum: seconds a gait lasts at least; shorter ones go to the neighbour that is nearer in gait, then to the
     longer one.
     """
     speed = np.asarray(speed, dtype=float)
-    thresholds = gait_thresholds(speeds, omega) if thresholds is None else thresholds
     margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)
     steps = [_trigger(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
     gaits = np.sum(steps, axis=0, dtype=int) if steps else np.zeros(len(speed), dtype=int)

@@ -202,7 +202,7 @@ def filled_timeline(view: View) -> Timeline:
         return view.timeline
     sampled = sample(view.track, view.library.fps)
     thresholds = view.library.gait_thresholds
-    chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds=thresholds)
+    chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
     return fill(view.timeline, sampled.times, [gaits[index].words for index in chosen])
 
 

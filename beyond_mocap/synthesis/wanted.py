@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, spoken, words_per_frame
+from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, gait_thresholds, spoken, words_per_frame
 from ..errors import NotInLibrary
 from ..library.keys import Key, nearest_serving, nearest_words, serving
 from ..library.library import Library
 from ..motion.track import SampledTrack, sample
 from ..plan import Plan
 from .gaze import direction_words, wanted_offset
+
+PAPERS_OMEGA = 4.0
 
 Words = frozenset[str] | None
 
@@ -51,8 +53,10 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless plan.nearest)."""
     track = sample(plan.track, library.fps, plan.track_window)
     gaits = library.gaits
-    thresholds = library.gait_thresholds if plan.method == "path" else None
-    gait = automatic_gaits(track.speed, library.fps, np.array([g.speed for g in gaits]), plan.omega, thresholds)
+    speeds = np.array([gait.speed for gait in gaits])
+    labelled = plan.method == "path" and not plan.omega
+    thresholds = library.gait_thresholds if labelled else gait_thresholds(speeds, plan.omega or PAPERS_OMEGA)
+    gait = automatic_gaits(track.speed, library.fps, speeds, thresholds)
     timeline = fill(plan.timeline, track.times, _automatic_words(library, gait, track))
     allowed = np.array([plan.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []

@@ -271,13 +271,13 @@ def test_recorded_thresholds_lie_where_the_labels_change():
     speed = np.concatenate([rng.uniform(0.0, 0.2, 300), rng.uniform(0.7, 2.0, 300), rng.uniform(2.0, 4.0, 300)])
     found = recorded_thresholds(np.array([0.1, 1.3, 2.9]), speed, np.repeat([0, 1, 2], 300))
     assert found[0] == 0.3 and abs(found[1] - 2.0) < 0.03
-    gaits = automatic_gaits(np.full(60, 1.9), 30, [0.1, 1.3, 2.9], thresholds=found)
+    gaits = automatic_gaits(np.full(60, 1.9), 30, [0.1, 1.3, 2.9], found)
     assert set(gaits) == {1}
 
 
 def test_steady_speeds_get_their_own_gait():
     speeds = np.array([0.1, 1.4, 2.8, 4.5, 6.5])
-    gaits = automatic_gaits(np.repeat(speeds, 60), 30, speeds)
+    gaits = automatic_gaits(np.repeat(speeds, 60), 30, speeds, gait_thresholds(speeds))
     assert gaits.tolist() == np.repeat(np.arange(5), 60).tolist()
     assert LOCOMOTION[gaits[0]] == "standing"
 
@@ -288,7 +288,7 @@ def test_a_speed_at_the_boundary_does_not_flicker():
     noise = np.convolve(rng.normal(size=1200), np.hanning(15), "same")
     speed = 1.7 + 0.15 * noise / noise.std()
     plain = np.count_nonzero(np.diff(np.searchsorted(gait_thresholds(speeds), speed)))
-    steady = np.count_nonzero(np.diff(automatic_gaits(speed, 30, speeds)))
+    steady = np.count_nonzero(np.diff(automatic_gaits(speed, 30, speeds, gait_thresholds(speeds))))
     assert plain > 60 and steady < plain / 8
 
 
@@ -296,7 +296,7 @@ def test_a_speed_at_the_boundary_does_not_flicker():
 @given(st.lists(st.floats(0, 12), max_size=80), st.integers(1, 5))
 def test_gaits_are_in_range_and_last(speed, count):
     speeds = np.linspace(0.2, 8.0, count)
-    gaits = automatic_gaits(np.array(speed), 10, speeds, minimum=0.4)
+    gaits = automatic_gaits(np.array(speed), 10, speeds, gait_thresholds(speeds), minimum=0.4)
     assert len(gaits) == len(speed) and np.all((gaits >= 0) & (gaits < count))
     edges = np.flatnonzero(np.diff(gaits)) + 1
     assert not len(edges) or np.diff([0, *edges, len(gaits)]).min() >= 4

@@ -36,7 +36,7 @@ def test_the_paper_s_alpha_changes_no_weight_and_more_of_it_favours_words():
     assert smooth.words == 0.0 and smooth.pose > Weights().pose and smooth.speed == words.speed == Weights().speed
 
 
-@pytest.mark.parametrize("word, speed, less, more", [("walking", 2.2, 0.0, 0.2), ("jogging", 1.6, 0.2, 0.5)])
+@pytest.mark.parametrize("word, speed, less, more", [("walking", 2.2, 0.0, 0.2), ("jogging", 1.6, 0.05, 0.5)])
 def test_by_path_more_alpha_plays_more_of_the_asked_words(take_of, track_of, word, speed, less, more):
     """At a speed between the two gaits."""
     takes = [take_of((1.0, 7.0, word), track=track_of(speed), alpha=alpha) for alpha in (less, more)]
