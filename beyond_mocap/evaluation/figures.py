@@ -14,7 +14,7 @@ from ..motion.contacts import floor_height
 from ..motion.track import sample
 from . import feet, jerk, pieces, realism, root, words
 from .give_way import give_way, jolts
-from .moments import Moment, ball_gap, ball_shift
+from .moments import Moment, ball_gap, ball_shift, met
 from .reference import source_poses
 from .view import View
 
@@ -54,11 +54,12 @@ def keys(view: View) -> list[dict]:
 def _key(view: View, moment: Moment) -> dict:
     played, time = view.played, moment.asked.time
     place = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
+    met_at, met_gap = met(played, moment)
     if view.wanted is not None:
         error = root.root_error(played.pelvis, view.wanted, view.fps)
         place["position_error_m"] = float(np.interp(time, played.times, error))
         place["pelvis_error_m"] = float(np.interp(time, played.times, root.pelvis_error(played.pelvis, view.wanted)))
-        place["ball_shift_m"] = ball_shift(played, moment.frame, view.track)
+        place["ball_shift_m"] = ball_shift(played, _met_frame(played, moment, met_at), view.track)
     return {
         "time_s": time,
         "solved_time_s": None,
@@ -68,8 +69,15 @@ def _key(view: View, moment: Moment) -> dict:
         "time_error_s": moment.played_at - time,
         **place,
         "contact_gap_m": ball_gap(played, moment),
+        "met_s": met_at,
+        "met_gap_m": met_gap,
         "used_instead": None if moment.used_instead is None else list(moment.used_instead),
     }
+
+
+def _met_frame(played, moment: Moment, met_at: float) -> int:
+    """The output frame at which the ball is met; the key moment's where it is not."""
+    return int(round((met_at - played.start_time) * played.motion.fps)) if np.isfinite(met_at) else moment.frame
 
 
 def skate_and_ground(view: View) -> dict:

@@ -15,7 +15,7 @@ from ..library.landings import LANDING_FOLDER
 from ..library.made import MADE_FOLDER
 from ..motion.track import Track
 from . import feet, jerk, root
-from .moments import Moment, ball_gap, moments
+from .moments import Moment, met, moments
 from .pieces import played_rate, seams
 from .played import Played
 from .targets import KEY_TARGETS, TARGETS
@@ -186,7 +186,7 @@ def _late(played: Played, asked: list[Moment]) -> str | None:
 
 
 def _out_of_reach(played: Played, asked: list[Moment]) -> str | None:
-    gaps = [(moment.asked.time, ball_gap(played, moment)) for moment in asked]
+    gaps = [(moment.asked.time, met(played, moment)[1]) for moment in asked]
     told = [f"{time:g} s by {gap:.2f} m" for time, gap in gaps if np.isfinite(gap) and gap > OUT_OF_REACH]
     return f"the ball is out of the body's reach at key moments: {', '.join(told)}" if told else None
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
 
 # a foot meets the ball in all of these: where one is lacking, another shows at least the same contact
-_FOOT_ON_BALL = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"}, {"stomp"})
+_FOOT_ON_BALL = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"})
 
-
+# words below several actions of App. A that name what the body does: a dive shows a dive, be it to catch or to punch
+_SAME_MOVE = frozenset({"dive"})
 _SIDES = frozenset({"left", "right"})
 
 
@@ -54,9 +55,10 @@ def serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
 def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
     """The keys whose words come nearest to `words`: most shared words, then fewest extra; none where the action itself is
     not shared (a kick is no answer to a slide, and a right kick none to a right header), except that a foot on the ball
-    stands for a foot on the ball."""
+    stands for a foot on the ball, and a dive for a dive."""
     wanted = frozenset(words)
-    near = [key for key in keys if _actions(wanted) & key.words or _same_contact(wanted, key.words)]
+    actions = _actions(wanted) | (wanted & _SAME_MOVE)
+    near = [key for key in keys if actions & key.words or _same_contact(wanted, key.words)]
     scores = [(len(wanted & key.words) + _same_contact(wanted, key.words), -len(key.words - wanted)) for key in near]
     return tuple(key for key, score in zip(near, scores) if score == max(scores))
 

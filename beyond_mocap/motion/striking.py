@@ -21,6 +21,8 @@ FOOT_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.10, 0.12, 0.05
 _FOOT_WORDS = {"kick", "foot", "volley", "bicycle", "slide", "pass", "dribble", "trap", "tackle", "receive"}
 # stomp is a keeper's punch
 _HAND_WORDS = {"throw", "throwb", "catch", "catchb", "stomp", "save", "dive"}
+_CATCHING = {"catch", "catchb", "throw", "throwb"}
+_FLIGHT_SECONDS = 0.6
 _HERE = np.zeros(3)
 _HERE.setflags(write=False)
 
@@ -38,6 +40,18 @@ def striking_part(words: Iterable[str]) -> str | None:
     if _HAND_WORDS & words:
         return "hand"
     return "foot" if _FOOT_WORDS & words else None
+
+
+def met_within(words: Iterable[str]) -> float:
+    """Seconds after a key moment in which the ball may be met: 0, but for dives by hand, whose key is where the ball is
+    met or, in recordings without a ball, where the body takes off."""
+    words = set(words)
+    return _FLIGHT_SECONDS if "dive" in words and striking_part(words) == "hand" else 0.0
+
+
+def by_both_hands(words: Iterable[str]) -> bool:
+    """Whether the words ask for a ball between both hands, where both come near enough."""
+    return bool(_CATCHING & set(words))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +77,12 @@ class Surface:
 
 
 def surfaces(skeleton: Skeleton, words: Iterable[str]) -> tuple[Surface, ...]:
-    """The surfaces that may meet the ball by these words: one per limb, of the side that is named or of both; none for
-    words that touch no ball or a part that the skeleton lacks."""
+    """The surfaces that may meet the ball by these words: one per limb, of the side that is named or of both (a dive's
+    side is where it goes: either hand serves); none for words that touch no ball or a part that the skeleton lacks."""
     words, body = set(words), identify(skeleton)
     part = striking_part(words)
-    sides = [side for side in ("left", "right") if side in words] or ["left", "right"]
+    named = set() if part == "hand" and "dive" in words else words
+    sides = [side for side in ("left", "right") if side in named] or ["left", "right"]
     limbs = [(side, getattr(body, side)) for side in sides]
     if part == "foot":
         return tuple(_foot(skeleton, side, limb) for side, limb in limbs)

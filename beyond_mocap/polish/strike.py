@@ -16,7 +16,7 @@ import numpy as np
 from ..motion.humanoid import Limb, heading_from_positions, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..motion.striking import Surface, ball_gap, contact_gap, surfaces
+from ..motion.striking import Surface, ball_gap, by_both_hands, contact_gap, met_within, surfaces
 from ..motion.track import BALL_RADIUS
 from .carry import Body, Resting, arm, leg, limb_carried, spine_bent
 from .meeting import Room, best_meeting, eased, held_meeting, lofted, meeting, shifted
@@ -40,6 +40,7 @@ _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the bal
 _FULL_REACH = 0.99
 _SOLE = 0.02  # metres of the lowest foot joint above the ground
 _IN_THE_AIR = 0.2
+_HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
 _STOPPING = {"receive", "trap", "catch", "catchb"}
 _HIGH = {"high", "volley", "bicycle"}
 _ROUNDS, _CLOSE = 4, 5e-4
@@ -102,6 +103,7 @@ def strike(
     height_known = everywhere if height_known is None else np.asarray(height_known, bool)
     root, rotations, feed = (np.array(values, dtype=float) for values in (root, rotations, ball))
     path, moved = feed.copy(), np.full(len(touches), np.nan)
+    touches = [_when_met(skeleton, root, rotations, feed, touch, fps) for touch in touches]
     for number, moment in _moments(skeleton, touches, count, fps):
         if not np.isfinite(feed[list(moment.held)]).all():
             continue
@@ -114,6 +116,20 @@ def strike(
         path = shifted(scene.ball, moment.held, np.array(places), moment.bounds, fps)
     gap, shift = _told(skeleton, root, rotations, feed, path, touches)
     return Struck(root, rotations, path, gap, shift, moved)
+
+
+def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: float) -> Touch:
+    """The touch at the frame at which a hand passes the ball nearest, where words allow for that and the ball is out of
+    reach at the key moment itself."""
+    first, last = _nearest(touch.frame, len(root)), _nearest(touch.frame + met_within(touch.words) * fps, len(root))
+    if first == last or not np.isfinite(feed[first : last + 1]).all():
+        return touch
+    places, world = pose_kinematics(skeleton, root[first : last + 1], rotations[first : last + 1])
+    gaps = contact_gap(skeleton, places, world, touch.words, feed[first : last + 1])
+    later = int(np.argmin(gaps))
+    if not later or gaps[0] < BALL_NOISE:
+        return touch
+    return replace(touch, frame=float(first + later), entry=touch.entry + later, leave=touch.leave - later)
 
 
 @dataclass(frozen=True)
@@ -183,7 +199,7 @@ class _Scene:
 def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, height_known, fps: float) -> _Scene:
     at = moment.frame - origin
     choices = surfaces(body.skeleton, moment.words)
-    if choices[0].part == "hand":
+    if choices[0].part == "hand" and _together(body, choices, at, moment.words):
         parts = choices
     else:
         parts = (_likeliest(body, choices, at, contacts, path[moment.frame], fps),)
@@ -199,6 +215,13 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
     rise, ball = _RISE[parts[0].part], path[moment.frame]
     best = best_meeting(line, radius, ahead, rise, ball, scene.room(moment.frame), avoid)
     return replace(scene, direction=best.direction)
+
+
+def _together(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:
+    """Whether all hands that are named go to the ball: in a dive only to catch it, and where they are not far apart."""
+    middles = [np.mean(body.line(hand, at), axis=0) for hand in hands]
+    near = np.linalg.norm(middles[0] - middles[-1]) < _HANDS_APART
+    return not met_within(words) or bool(near and by_both_hands(words))
 
 
 def _likeliest(body: Body, choices: Sequence[Surface], at: int, contacts, ball: np.ndarray, fps: float) -> Surface:
@@ -246,6 +269,8 @@ def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.nda
     reach = max(int(round(0.1 * fps)), 1)
     coming = _flat(path[moment.frame] - path[max(moment.frame - reach, 0)]) / 0.1
     leaving = _flat(path[min(moment.frame + reach, len(path) - 1)] - path[moment.frame]) / 0.1
+    if part.part == "hand" and met_within(moment.words):
+        return _unit(-coming, ahead)
     if part.part != "foot":
         return ahead
     if _STOPPING & moment.words:

@@ -104,3 +104,25 @@ def test_the_side_of_another_row_is_not_the_kick_s():
     clip = Clip("made.bvh", False, motion, rows, np.zeros((len(motion), 2, 2), bool))
     (found,) = keys_of((clip,))
     assert found.words == {"kick", "right", "low", "turning", "walking", "front"}
+
+
+DIVES = (key("jump left high dive"), key("jump right high dive"))
+
+
+@pytest.mark.parametrize(
+    "words, keys",
+    [
+        ("catchb dive short_duration high left", (DIVES[0],)),
+        ("stomp dive long_duration low right", (DIVES[1],)),
+        ("catchb dive", DIVES),
+        ("catchb high", ()),  # a catch that is no dive
+        ("kick left", (LEFT,)),
+    ],
+)
+def test_a_dive_stands_for_a_dive_whatever_the_hands_do(words, keys):
+    assert nearest_serving((*KICKS, *DIVES), words.split()) == keys
+
+
+def test_without_a_dive_nothing_stands_for_one_and_the_nearest_words_are_named():
+    assert nearest_serving(KICKS, ["catchb", "dive", "left"]) == nearest_serving(KICKS, ["dive", "left"]) == ()
+    assert nearest_words(KICKS, ["dive", "left"])[0] == "kick left inside low"

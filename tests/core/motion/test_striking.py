@@ -56,3 +56,17 @@ def test_head_chest_and_hands():
     assert gap("receive body", JOINTS[BODY.chest] + [0.33, 0, 0]) == pytest.approx(0.10)
     assert gap("throwb right", JOINTS[BODY.right.hand] + [0.26, 0, 0]) == pytest.approx(0.10)
     assert np.isnan(gap("walking", [0, 0, 0]))
+
+
+def test_either_hand_serves_a_dive_whose_side_is_where_it_goes():
+    wrist = JOINTS[BODY.left.hand]
+    ball = wrist + [0.3, 0.0, 0.0]
+    assert gap("dive left", ball) == pytest.approx(gap("dive right", ball)) == pytest.approx(0.3 - 0.05 - 0.11)
+    assert gap("catchb left", ball) < gap("catchb right", ball)
+
+
+@pytest.mark.parametrize(
+    "words, later", [("jump left high dive", True), ("catchb dive", True), ("catchb high", False), ("kick slide", False)]
+)
+def test_only_a_dive_by_hand_may_meet_the_ball_after_its_key(words, later):
+    assert (striking.met_within(words.split()) > 0.0) == later

@@ -199,3 +199,29 @@ def test_inputs_are_not_changed_and_results_repeat(kick):
     first, second = (met(kick, ball, touch(kick)) for _ in range(2))
     assert np.array_equal(ball, kept) and not root.flags.writeable and not rotations.flags.writeable
     assert np.array_equal(first.rotations, second.rotations) and np.array_equal(first.ball, second.ball)
+
+
+def reaching(walk):
+    """A ball that flies past the left hand, ten metres a second, nearest 6 frames after frame 30."""
+    places, _ = kinematics(walk.motion)
+    wrist = places[36, identify(walk.motion.skeleton).left.hand]
+    seconds = (np.arange(len(walk.motion)) - 36) / FPS
+    return wrist + [0.05, 0.25, 0.1] + seconds[:, None] * [-10.0, 0.0, 0.0]
+
+
+def test_a_hand_meets_the_ball_on_the_flight_of_a_dive(walk):
+    ball = reaching(walk)
+    struck = met(walk, ball, Touch(30.0, ("dive", "right"), 10.0, 40.0))
+    assert min(gaps(walk.motion, struck, 36, ("dive",))) == pytest.approx(0.0, abs=0.005)
+    assert struck.gap[0] < 0.005 and struck.ball_shift[0] <= BALL_NOISE + 1e-9
+    check_whole(walk.motion, struck, slice(20, 56))
+    before, after = kinematics(walk.motion)[0], kinematics(walk.motion, struck)[0]
+    other = identify(walk.motion.skeleton).right.hand
+    assert np.allclose(before[:, other], after[:, other], atol=1e-9)  # the other arm stays with the dive
+
+
+def test_what_is_no_dive_meets_the_ball_at_its_key_or_not_at_all(walk):
+    ball = reaching(walk)
+    struck = met(walk, ball, Touch(30.0, ("catchb", "high"), 10.0, 40.0))
+    assert struck.gap[0] > 1.0
+    assert np.array_equal(struck.rotations, walk.motion.rotations)
