@@ -47,9 +47,12 @@ def _key_words(clip, row) -> frozenset[str]:
 
 
 def serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
-    """The keys that carry all of `words`."""
+    """The keys that carry all of `words`; of these the ones that show the fewest other actions beside: a dive is also a
+    jump, but who asks for a jump wants no dive where there is another."""
     wanted = frozenset(words)
-    return tuple(key for key in keys if wanted <= key.words)
+    found = [key for key in keys if wanted <= key.words]
+    others = [len((key.words & (DISCRETE | _SAME_MOVE)) - wanted) for key in found]
+    return tuple(key for key, count in zip(found, others) if count == min(others))
 
 
 def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:

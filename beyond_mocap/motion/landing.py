@@ -9,7 +9,7 @@ nearest way of getting up begins, and gets up.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,10 +32,11 @@ _MEASURED = 0.05  # seconds over which speeds at the recording's end are taken
 _FASTEST_TURN = 6.0  # radians per second; faster ones are the end of a filter
 _MIDDLE = 0.25  # of the way from hips to neck: the body's middle, which falls freely
 _LONGEST_FALL = 1.5
-_SETTLING, _LYING_STILL = 0.45, 0.25  # seconds from touching the ground to turning, and from there to getting up
+_SETTLING, _LYING_STILL = 0.4, 0.15  # seconds from touching the ground to turning, and from there to getting up
 _FRICTION = 0.13  # seconds in which a sliding body loses two thirds of its speed
 _CUSHION = 0.05  # metres over which the ground takes the fall up
 _RATES = (11.0, 11.0, 7.0)  # per second: in the air, landing, turning over and getting up
+_HASTE = 1.25  # a player gets up faster than who shows it in a studio
 _LEAD = 0.4  # seconds before the hips rise at which a way of getting up is begun
 _RISEN = 0.04
 _SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # metres per second squared of a marker taken for another, near the end
@@ -100,7 +101,7 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     start = first + 1 + len(down) + wait
     own = ways_up[way]
     begun = _begin(own)
-    frames = begun + np.arange(len(up)) * (own.fps / fps)
+    frames = begun + np.arange(len(up)) * (_HASTE * own.fps / fps)
     return Landed(out, len(motion), first, start, way, np.clip(frames, 0, len(own) - 1))
 
 
@@ -236,7 +237,8 @@ def _nearest_way(ways: Sequence[Motion], lying: np.ndarray, fps: float) -> tuple
     """Which way up needs least turning over from lying (J, 4), and its motion at `fps` from where it is worth playing."""
     found = []
     for number, way in enumerate(ways):
-        cut = resample(way.frames(int(round(_begin(way))), len(way)), fps)
+        cut = way.frames(int(round(_begin(way))), len(way))
+        cut = resample(replace(cut, fps=_HASTE * way.fps), fps)
         first = _headed_as(cut, lying).rotations[0, 0]
         off = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(first), lying[0]))
         found.append((float(np.linalg.norm(off)), number, cut))

@@ -126,3 +126,10 @@ def test_a_dive_stands_for_a_dive_whatever_the_hands_do(words, keys):
 def test_without_a_dive_nothing_stands_for_one_and_the_nearest_words_are_named():
     assert nearest_serving(KICKS, ["catchb", "dive", "left"]) == nearest_serving(KICKS, ["dive", "left"]) == ()
     assert nearest_words(KICKS, ["dive", "left"])[0] == "kick left inside low"
+
+
+def test_who_asks_for_a_jump_gets_no_dive_where_there_is_another():
+    jump = key("jump")
+    assert serving((*DIVES, jump), ["jump"]) == (jump,)
+    assert serving(DIVES, ["jump"]) == DIVES
+    assert serving((*DIVES, jump), ["dive"]) == DIVES

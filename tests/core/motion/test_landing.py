@@ -100,7 +100,7 @@ def test_the_ground_stops_it_and_nothing_goes_below(whole):
     height = places[: whole.rising - whole.recorded, BODY.hips, 2]
     down = whole.touched - whole.recorded + int(0.15 * FPS)
     assert height[down : down + 40].max() < 0.3 and np.ptp(height[down : down + 40]) < 0.12  # no bounce
-    lies = slice(down + 30, whole.rising - whole.recorded - 20)
+    lies = slice(down + 15, whole.rising - whole.recorded - 12)
     assert np.linalg.norm(np.diff(places[lies, BODY.hips, :2], axis=0), axis=1).max() * FPS < 0.5
 
 
