@@ -335,4 +335,6 @@ def key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, play
 def _gave_way(library: Library, plan: Plan, take: Take) -> list[str]:
     """What could not all hold, and when."""
     played = played_from_take(take)
-    return give_way(played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss)
+    return give_way(
+        played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss, asked=plan.timeline
+    )

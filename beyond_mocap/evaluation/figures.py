@@ -237,9 +237,11 @@ def annotation_similarity(view: View) -> dict:
     }
 
 
-def warnings(view: View, ik_miss: np.ndarray | None) -> list[str]:
+def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> list[str]:
     """What gave way, and when."""
-    lines = give_way(view.played, track=view.track, timeline=view.timeline, library=view.library, ik_miss=ik_miss)
+    lines = give_way(
+        view.played, track=view.track, timeline=view.timeline, library=view.library, ik_miss=ik_miss, asked=asked
+    )
     if view.reference is None:
         return lines
     hard = jerk.jerk(view.played.positions, view.fps)

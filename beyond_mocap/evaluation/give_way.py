@@ -7,9 +7,11 @@ figures, so that it costs a synthesis a few milliseconds; jolts at seams need th
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
-from ..annotation import Timeline
+from ..annotation import Timeline, words_per_frame
 from ..library.library import Library
 from ..library.landings import LANDING_FOLDER
 from ..library.made import MADE_FOLDER
@@ -26,6 +28,7 @@ SHORT_LEG = 0.005
 BELOW_GROUND = -TARGETS["ground_mm.min"].least / 1000.0
 OUT_OF_REACH = KEY_TARGETS["contact_gap_m"].most
 JOIN_SECONDS = 0.4
+WORD_SECONDS = 0.5
 MOST_STRETCHES = 6
 _TOLERANCE = 1e-3
 
@@ -37,17 +40,18 @@ def give_way(
     timeline: Timeline | None = None,
     library: Library | None = None,
     ik_miss: np.ndarray | None = None,
+    asked: Timeline | None = None,
 ) -> list[str]:
     """A line for each kind of thing that gave way in what was played, with its seconds on the track's clock.
 
     track: the player's samples as measured; timeline: what was asked, for the key moments; library: what it was made
-    from, without made clips; ik_miss (T, 2) m: how far each leg was short of where its foot should stand. What is not
-    known is not told.
+    from, without made clips; ik_miss (T, 2) m: how far each leg was short of where its foot should stand; asked: the
+    user's own words, where `timeline` has automatic ones beside them. What is not known is not told.
     """
     stride = played.stride(library)
     source = played.clip, played.mirrored, played.clip_frame, stride
     starts = seams(*source)
-    asked = moments(played, timeline.keys, stride, library) if timeline is not None else []
+    keys = moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
         _made_running(played),
         _made_landing(played),
@@ -56,8 +60,9 @@ def give_way(
         _sliding(played),
         _short_legs(played, ik_miss),
         _off_track(played, track),
-        _late(played, asked),
-        _out_of_reach(played, asked),
+        _late(played, keys),
+        _out_of_reach(played, keys),
+        _other_words(played, asked if asked is not None else timeline, keys, library),
         _below_ground(played),
     ]
     return [line for line in lines if line]
@@ -178,17 +183,38 @@ def _off_track(played: Played, track: Track | None) -> str | None:
     return f"{told}: the body is off the track, by up to {error.max():.2f} m"
 
 
-def _late(played: Played, asked: list[Moment]) -> str | None:
+def _late(played: Played, keys: list[Moment]) -> str | None:
     half = 0.5 / played.motion.fps + _TOLERANCE
-    late = [(moment.asked.time, moment.played_at - moment.asked.time) for moment in asked]
+    late = [(moment.asked.time, moment.played_at - moment.asked.time) for moment in keys]
     told = [f"{time:g} s by {error:+.2f} s" for time, error in late if np.isfinite(error) and abs(error) > half]
     return f"key moments not at their time: {', '.join(told)}" if told else None
 
 
-def _out_of_reach(played: Played, asked: list[Moment]) -> str | None:
-    gaps = [(moment.asked.time, met(played, moment)[1]) for moment in asked]
+def _out_of_reach(played: Played, keys: list[Moment]) -> str | None:
+    gaps = [(moment.asked.time, met(played, moment)[1]) for moment in keys]
     told = [f"{time:g} s by {gap:.2f} m" for time, gap in gaps if np.isfinite(gap) and gap > OUT_OF_REACH]
     return f"the ball is out of the body's reach at key moments: {', '.join(told)}" if told else None
+
+
+def _other_words(played: Played, asked: Timeline | None, keys: list[Moment], library: Library | None) -> str | None:
+    """Words of the user's spans that clips carry, and that are not shown for WORD_SECONDS or more, but for entry and exit
+    of key moments."""
+    if asked is None or played.words is None or library is None:
+        return None
+    had = [(words or frozenset()) & library.words for words in words_per_frame(asked, played.times)]
+    missing = [want.difference(shown) for want, shown in zip(had, played.words)]
+    for moment in keys:
+        missing[moment.entry : moment.exit + 1] = [frozenset()] * (moment.exit + 1 - moment.entry)
+    edges = [0, *(i for i in range(1, len(missing)) if bool(missing[i]) != bool(missing[i - 1])), len(missing)]
+    long = [span for span in zip(edges, edges[1:]) if span[1] - span[0] >= WORD_SECONDS * played.motion.fps]
+    flags = np.zeros(len(missing), bool)
+    for low, high in long:
+        flags[low:high] = bool(missing[low])
+    if not np.any(flags):
+        return None
+    count = Counter(word for frame in np.flatnonzero(flags) for word in sorted(missing[frame]))
+    told = ", ".join(word for word, _ in count.most_common(3)) + (", ..." if len(count) > 3 else "")
+    return f"{stretches(played.times, flags)}: words asked for and not shown: {told}"
 
 
 def _below_ground(played: Played) -> str | None:

@@ -26,7 +26,8 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     scores of the recordings beside ours.
     """
     report = evaluate_played(
-        played_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss
+        played_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
+        asked=take.plan.timeline if take.plan else Timeline(),
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
     warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
@@ -40,11 +41,13 @@ def evaluate_played(
     timeline: Timeline | None = None,
     library: Library | None = None,
     ik_miss: np.ndarray | None = None,
+    asked: Timeline | None = None,
 ) -> dict:
     """The report of anything played, from memory or files (`played_from_take`, `played_from_tables`).
 
-    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. InputError where
-    the library has another skeleton than the motion.
+    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. asked: the user's
+    own words, where `timeline` has automatic ones beside them. InputError where the library has another skeleton than
+    the motion.
     """
     view = View(played, track, timeline, library)
     report = {
@@ -61,7 +64,7 @@ def evaluate_played(
         **figures.seams_and_loops(view),
         **figures.poses(view),
         "annotation_similarity": figures.annotation_similarity(view),
-        "warnings": figures.warnings(view, ik_miss),
+        "warnings": figures.warnings(view, ik_miss, asked),
     }
     return rounded(report)
 

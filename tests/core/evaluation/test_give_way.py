@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import KeyMoment, Timeline
+from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.evaluation import evaluate, played_from_take
 from beyond_mocap.evaluation.give_way import give_way, jolts, stretches
 from beyond_mocap.library.made import MADE_FOLDER
@@ -85,6 +85,15 @@ def test_key_moments_late_or_out_of_reach_are_told(cut, told, still_ball):
     assert far.startswith("the ball is out of the body's reach at key moments: 12.4 s by ")
     away = np.linalg.norm(take.motion.root_positions[72, :2] - [0.0, 9.0])
     assert float(far.rpartition("by ")[2].removesuffix(" m")) == pytest.approx(away, abs=1.5)
+
+
+def test_words_that_are_not_shown_are_told_but_for_key_moments_and_what_nobody_has(cut, told):
+    spans = (Span(10.0, 14.0, ("jogging",)), Span(14.0, 18.0, ("walking", "header")))
+    key = KeyMoment(12.5, ("kick", "right"))
+    take = cut(("jog.bvh", 150, 180), ("walk.bvh", 0, 60), timeline=Timeline(spans, (key,)))
+    (line,) = [line for line in told(take, timeline=take.timeline) if "words" in line]
+    assert line == "14.0-16.0 s: words asked for and not shown: walking"
+    assert not any("words" in line for line in told(take, timeline=take.timeline, asked=Timeline()))
 
 
 def test_a_body_in_the_ground_is_told(jog, told):
