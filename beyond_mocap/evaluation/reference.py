@@ -158,7 +158,7 @@ def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
 
 
 def measure(clip: Clip, fps: float) -> Recording:
-    """One clip at `fps`, uncut, measured frame by frame; its floor is at height 0."""
+    """One clip at `fps`, uncut, measured frame by frame."""
     motion = resample(clip.recording, fps)
     skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
     positions, rotations = forward_kinematics(motion)
@@ -166,7 +166,7 @@ def measure(clip: Clip, fps: float) -> Recording:
     at = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
     contacts = clip.contacts[at]
     spans = feet.stances(contacts)
-    heel_rest = feet.heel_rest_height(planted, contacts)
+    heel_rest, floor = feet.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
     return Recording(
         path=clip.path,
         rate=clip.motion.fps,
@@ -175,7 +175,7 @@ def measure(clip: Clip, fps: float) -> Recording:
         surge=root.surge(pelvis, fps),
         speed=root.travel_speed(pelvis, fps),
         contact_speed=np.concatenate([feet.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
-        skating=np.append(feet.skating_steps(planted[:, :, 1], 0.0, fps), False),
+        skating=np.append(feet.skating_steps(planted[:, :, 1], floor, fps), False),
         heel_rest=heel_rest,
         support=feet.support_height(planted, contacts, heel_rest),
         tip=feet.tip_height(skeleton, positions, rotations),

@@ -130,7 +130,7 @@ def _sample(motions: Sequence[Motion], standing: Sequence[np.ndarray]) -> tuple[
     for motion, points, end in zip(motions, standing, ends):
         here = frames[(frames >= end - len(motion)) & (frames < end)] - (end - len(motion))
         if len(here):
-            roots.append(motion.root_positions[here] - [0.0, 0.0, contacts.floor_height(motion)])
+            roots.append(motion.root_positions[here] - [0.0, 0.0, contacts.ground_height(motion)])
             rotations.append(motion.rotations[here])
             feet.append(points.all(axis=2)[here])
     sample = Motion(motions[0].skeleton, np.concatenate(roots), np.concatenate(rotations), motions[0].fps)

@@ -94,7 +94,7 @@ def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = False) -> Repaired:
-    """The motion on a level floor at height 0 (2nd percentile of its toes), with feet that stand still.
+    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), with feet that stand still.
 
     standing (T, 2, 2) bool: left and right, heel and toe; found where it is not given. Feet are held, and the way is
     corrected, where the balls of standing feet slide faster than 0.13 m/s; with `plants` feet are held in any case (a
@@ -113,7 +113,7 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 
 def held(motion: Motion, standing: np.ndarray) -> Motion:
     """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, on the floor it has."""
-    floor = np.array([0.0, 0.0, contacts.floor_height(motion)])
+    floor = np.array([0.0, 0.0, contacts.ground_height(motion)])
     planted = plant(motion.skeleton, motion.root_positions - floor, motion.rotations, standing, motion.fps, _SINKS)
     return replace(motion, root_positions=planted.root + floor, rotations=planted.rotations)
 
@@ -136,7 +136,7 @@ def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
 
 
 def _on_floor(motion: Motion) -> Motion:
-    floor = contacts.floor_height(motion)
+    floor = contacts.ground_height(motion)
     return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, floor])
 
 

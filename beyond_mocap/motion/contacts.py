@@ -15,6 +15,7 @@ from scipy.ndimage import grey_opening, maximum_filter1d
 
 from .humanoid import Humanoid, identify, leg_length
 from .motion import Motion, forward_kinematics
+from .skeleton import Skeleton
 
 _ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once within it
 _SWING_SECONDS = 1.2
@@ -24,6 +25,7 @@ _SLOW = (0.15, 0.25)  # metres per second above the envelope: to enter, to leave
 _SLOW_SHARE = (0.04, 0.08)  # of the swing's speed: to enter, to leave
 _HELD_UP = 0.10  # metres above the other foot's envelope: this foot does not stand at all
 _UPRIGHT = 0.45  # of the leg's length: hips above the foot
+_ANKLE = 0.087  # of the leg's length
 _SHORTEST = 0.04  # seconds of contact
 _SHORTEST_GAP = 0.05
 
@@ -33,6 +35,18 @@ def floor_height(motion: Motion) -> float:
     body = identify(motion.skeleton)
     positions, _ = forward_kinematics(motion)
     return float(np.percentile(positions[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2], 2))
+
+
+def sole_height(skeleton: Skeleton) -> float:
+    """Metres from the ground up to the foremost joint of a foot that stands flat: 0 where that is a toe, which the floor
+    is told by; an ankle's usual height (as `neutral` has it) where there are no toes."""
+    body = identify(skeleton)
+    return 0.0 if body.left.toe is not None or body.right.toe is not None else _ANKLE * leg_length(skeleton)
+
+
+def ground_height(motion: Motion) -> float:
+    """The height in metres of the ground that the clip's soles stand on."""
+    return floor_height(motion) - sole_height(motion.skeleton)
 
 
 def detect(motion: Motion) -> np.ndarray:

@@ -18,6 +18,7 @@ from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d
 
 from ..motion import quaternion
+from ..motion.contacts import sole_height
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
@@ -92,7 +93,7 @@ def plant(
     places, world = pose_kinematics(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
     feet = [_turned(_laid(places, world, limb, standing[:, side]), scale) for side, limb in enumerate((body.left, body.right))]
-    lifts = [_lift(foot, scale) for foot in feet]
+    lifts = [_lift(foot, sole_height(skeleton), scale) for foot in feet]
     firm = [foot.weight for foot in feet]
     for turn in range(_EASED_ROUNDS + 1):
         goals = [_goal(foot, weight, lift, scale, spread) for foot, weight, lift in zip(feet, firm, lifts)]
@@ -226,10 +227,10 @@ def _add_differences(band: np.ndarray, stencil: np.ndarray, weight: np.ndarray) 
             band[i - j, j : j + len(weight)] += weight * a * b
 
 
-def _lift(foot: _Foot, scale: float) -> np.ndarray:
-    """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes on the ground, and keeps
-    both above it at all times."""
-    heel, toe, weight = foot.heel[:, 2], foot.toe[:, 2], np.ceil(foot.weight) * [HEEL_SHARE, 1.0]
+def _lift(foot: _Foot, sole: float, scale: float) -> np.ndarray:
+    """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes `sole` m above the ground,
+    and keeps both above it at all times."""
+    heel, toe, weight = foot.heel[:, 2] - sole, foot.toe[:, 2] - sole, np.ceil(foot.weight) * [HEEL_SHARE, 1.0]
     flat = weight.min(axis=1) > 0
     rest = float(np.median((heel - toe)[flat])) if np.any(flat) else float(np.percentile(heel, 5))
     low = np.stack([heel - max(rest, 0.0), toe], axis=1)

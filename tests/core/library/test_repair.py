@@ -125,3 +125,35 @@ def test_suits_slide_less_than_half_as_fast():
         feet = [identify(motion.skeleton).left.foot, identify(motion.skeleton).right.foot]
         assert forward_kinematics(done.motion)[0][:, feet, 2].min() > -0.02
     assert mean(before) > 0.15 and mean(after) < 0.5 * mean(before)
+
+
+def without_toes(motion: Motion) -> Motion:
+    """The same motion on a skeleton whose feet end in a tip where the toe joints were."""
+    skeleton, body = motion.skeleton, identify(motion.skeleton)
+    toes = (body.left.toe, body.right.toe)
+    kept = [joint for joint in range(len(skeleton)) if joint not in toes]
+    new = {joint: place for place, joint in enumerate(kept)} | {-1: -1}
+    ends = [(new[skeleton.parents[toe]], skeleton.offsets[toe]) for toe in toes]
+    bare = replace(
+        skeleton,
+        names=tuple(skeleton.names[joint] for joint in kept),
+        parents=tuple(new[skeleton.parents[joint]] for joint in kept),
+        offsets=skeleton.offsets[kept],
+        end_parents=tuple(parent for parent, _ in ends),
+        end_offsets=np.array([offset for _, offset in ends]),
+    )
+    return replace(motion, skeleton=bare, rotations=motion.rotations[:, kept])
+
+
+@pytest.mark.parametrize("plants", [False, True])
+def test_boots_without_toe_joints_stand_on_the_ground_and_not_in_it(walk, plants):
+    bare = without_toes(walk)
+    done = repair.grounded(bare, plants=plants).motion
+    body = identify(bare.skeleton)
+    places, rotations = forward_kinematics(done)
+    stands = contacts.detect(done)
+    for side, limb in enumerate((body.left, body.right)):
+        offset = bare.skeleton.end_offsets[bare.skeleton.end_parents.index(limb.foot)]
+        tip = places[:, limb.foot] + quaternion.rotate(rotations[:, limb.foot], offset)
+        assert abs(np.median(tip[stands[:, side], 2])) < 0.035
+        assert np.median(places[stands[:, side], limb.foot, 2]) == pytest.approx(contacts.sole_height(bare.skeleton), abs=0.02)
