@@ -37,7 +37,7 @@ from .synthesis.path_search import Between, PathSearch
 from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
-    Progress, faced, given, key_result, met, smoothed, sources_shown, synthesize, touches, with_made_gaits,
+    Progress, faced, given, key_result, leaning, met, smoothed, sources_shown, synthesize, touches, with_made_gaits,
     with_warnings, words_shown,
 )
 from .take import BallPath, KeyResult, Take
@@ -257,9 +257,8 @@ class _Window:
             angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept)
         ground = self._pulled(root_with_sway(track.positions, smooth.sway, angle))
         root = np.concatenate([ground, smooth.height[:, None]], axis=1)
-        root, pose = given(
-            update.library, plan, track, root, faced(smooth.pose, angle), smooth.standing, 1.0 - self.share
-        )
+        pose = leaning(update.library, plan, track, smooth, faced(smooth.pose, angle))
+        root, pose = given(update.library, plan, track, root, pose, smooth.standing, 1.0 - self.share)
         return plant(update.library.skeleton, root, pose, smooth.standing, plan.fps)
 
     def _same_way_round(self, angle: np.ndarray, old: np.ndarray) -> np.ndarray | None:

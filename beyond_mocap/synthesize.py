@@ -29,6 +29,7 @@ from .motion.humanoid import identify
 from .motion.motion import Motion, pose_kinematics
 from .motion.track import SampledTrack, sample
 from .plan import METHODS, Plan
+from .polish.banking import banked, missing_lean
 from .polish.cross_fade import faded_rotations, faded_values, share
 from .polish.foot_plant import Planted, plant
 from .polish.give import give
@@ -140,6 +141,7 @@ def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footag
     pose = faced(smooth.pose, angle)
     root = np.concatenate([ground, smooth.height[:, None]], axis=1)
     if plan.method == "path":
+        pose = leaning(library, plan, track, smooth, pose)
         root, pose = given(library, plan, track, root, pose, footage.standing)
         return plant(library.skeleton, root, pose, footage.standing, plan.fps)
     none = np.zeros((len(root), 2))
@@ -169,6 +171,12 @@ def _spread(footage: Footage, reach: float) -> Footage:
         height=spread_values(footage.height, footage.seams, footage.ahead_height, reach),
         sway=spread_values(footage.sway, footage.seams, footage.ahead_sway, reach),
     )
+
+
+def leaning(library: Library, plan: Plan, track: SampledTrack, footage: Footage, pose: np.ndarray) -> np.ndarray:
+    """Local rotations (T, J, 4) of a body that leans into the track's curves as far as its footage does not."""
+    lean = missing_lean(track.speed, track.direction, footage.velocity, footage.turn, footage.seams, plan.fps)
+    return banked(library.skeleton, pose, track.direction, lean)
 
 
 def given(library: Library, plan: Plan, track: SampledTrack, root, pose, standing: np.ndarray, free=1.0):
