@@ -29,8 +29,11 @@ from .skeleton import Skeleton
 
 # how far ahead of and behind the hips a flat foot stands at most, shares of the leg's length
 _AHEAD, _BEHIND = 0.41, 0.72
-# how far a leg is straightened at most in stance, share of its length
-_STRAIGHTEST = 0.9955
+# how far a leg is straightened at most, walking and running, share of its length: runners' knees stay bent by some 20
+# degrees (V, and recordings), and a knee that snaps straight is what eyes notice first
+_STRAIGHTEST = (0.9955, 0.984)
+# where a swinging leg begins to ease towards that, share of its length below it
+_EASE = 0.03
 
 
 def gait(
@@ -161,10 +164,27 @@ def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, Foots
     posture = posture.changed(hips=hips)
     tops = hip_joints(posture, neutral)
     paths = [travel(steps[s], times, tops[:, s], posture.heading, neutral, _thigh_shank(neutral, s)) for s in (0, 1)]
+    ankles = [_bent(paths[s].ankle, tops[:, s], times, steps[s], sum(_thigh_shank(neutral, s))) for s in (0, 1)]
     feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
     return posture.changed(
-        ankles=np.stack([p.ankle for p in paths], axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1)
+        ankles=np.stack(ankles, axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1)
     )
+
+
+def _straightest(steps: Footsteps, times: np.ndarray) -> np.ndarray:
+    """How far a leg may be straightened at `times` (T,): (T,) share of its length."""
+    walking, running = _STRAIGHTEST
+    return walking + (running - walking) * tables.run_share(steps.speed[steps.current(times)])
+
+
+def _bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:
+    """The ankle (T, 3) drawn to its hip (T, 3) where the leg, `leg` metres long, would be straightened too far in swing."""
+    away = ankle - hip
+    far = np.linalg.norm(away, axis=1)
+    begin = (_straightest(steps, times) + 0.006 - _EASE) * leg
+    eased = begin + _EASE * leg * np.tanh((far - begin) / (_EASE * leg))
+    share = np.where(steps.standing(times) | (far < begin), 1.0, eased / np.maximum(far, 1e-9))
+    return hip + away * share[:, None]
 
 
 def _thigh_shank(neutral: Neutral, side: int) -> tuple[float, float]:
@@ -180,7 +200,7 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
     need = np.zeros(len(times))
     for side in (0, 1):
         path = travel(steps[side], times, tops[:, side], posture.heading, neutral, _thigh_shank(neutral, side))
-        longest = _STRAIGHTEST * sum(_thigh_shank(neutral, side))
+        longest = _straightest(steps[side], times) * sum(_thigh_shank(neutral, side))
         flat = np.sum((tops[:, side, :2] - path.ankle[:, :2]) ** 2, axis=-1)
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
         need = np.maximum(need, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))

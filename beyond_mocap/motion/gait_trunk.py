@@ -128,7 +128,7 @@ def arms(course: Course, style: GaitStyle, seed: int) -> np.ndarray:
     sides = []
     for side, shift in ((0, 0.5), (1, 0.0)):
         uneven = 1.0 + style.life * (0.08 * wander(course.times, seed + 5 + side, 2.6) + (0.04, -0.04)[side])
-        turn = 2.0 * np.pi * (course.phase - shift - 0.02 + 0.07 * run)
+        turn = 2.0 * np.pi * (course.phase - shift - 0.02 + 0.17 * run)
         wave = np.cos(turn) * uneven * less * style.arm_swing
         slow = idle * np.radians(2.0) * wander(course.times, seed + 7 + side, 5.0)
         sides.append(

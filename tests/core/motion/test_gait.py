@@ -187,7 +187,7 @@ def test_the_striking_foot_is_where_the_recipe_says(kind):
     wanted = next(row for row in gestures.STRIKES[kind].foot if row[0] == 0.0)
     assert ankle[:2] == pytest.approx(wanted[1:3], abs=0.02)
     assert places[frame, body.right.foot, 2] == pytest.approx(wanted[3], abs=0.03)
-    standing = places[frame - 3 : frame + 4, body.left.toe]
+    standing = places[frame - 2 : frame + 4, body.left.toe]
     assert np.ptp(standing[:, :2], axis=0).max() < 0.01  # the other foot carries
     assert move.start < move.key < move.end
 
