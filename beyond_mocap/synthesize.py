@@ -111,12 +111,19 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry
 
 
 def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
-    """The library that a plan is made from: with made running, where its track is faster than any recording, and with the
+    """The library that a plan is made from: with made clips, where recordings lack what its track asks for, and with the
     chosen gaits."""
-    if plan.method == "path" and plan.made and sample(plan.track, library.fps, plan.track_window).speed.max() > library.fastest:
-        report(0.0, "Making faster gaits")
+    if plan.method == "path" and plan.made and _lacks(library, plan):
+        report(0.0, "Making what the recordings lack")
         library = library.extended
     return with_chosen_gaits(library, dict(plan.gaits))
+
+
+def _lacks(library: Library, plan: Plan) -> bool:
+    """Whether the recordings lack speeds that the track asks for, or kicks as fast as its key moments."""
+    track = sample(plan.track, library.fps, plan.track_window)
+    moments = np.array([key.time for key in plan.timeline.keys])
+    return library.lacks(track.speed, np.interp(moments, track.times, track.speed))
 
 
 def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cancelled, hurry) -> Found:

@@ -6,7 +6,7 @@ words of a branch of the vocabulary may be left out, so carrying is being a subs
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
 
@@ -74,6 +74,22 @@ def _actions(words: frozenset[str]) -> frozenset[str]:
 def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
     both = any(part <= a for part in _FOOT_ON_BALL) and any(part <= b for part in _FOOT_ON_BALL)
     return 0.5 if both else 0.0
+
+
+def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...]) -> tuple[Key, ...]:
+    """Made key moments that may stand in for `choices`, recorded ones: the same act of the same side. Each takes the words
+    of the one for which it stands, since what is asked is that action, only faster."""
+    found = []
+    for key in made:
+        alike = [one for one in choices if _act(key) == _act(one)]
+        if alike:
+            best = max(alike, key=lambda one: (len(one.words & key.words), sorted(one.words)))
+            found.append(replace(key, words=best.words))
+    return tuple(found)
+
+
+def _act(key: Key) -> frozenset[str]:
+    return key.words & (DISCRETE | _SIDES)
 
 
 def nearest_words(keys: tuple[Key, ...], words, count: int = 3) -> tuple[str, ...]:

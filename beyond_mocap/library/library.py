@@ -27,7 +27,7 @@ from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
 from .features import Frames, describe, joined
 from .keys import Key, keys_of
 from .landings import LANDING_FOLDER
-from .made import MADE_FOLDER, made_clips
+from .made import MADE_FOLDER, gaps, kick_speed, locomotion, made_clips
 from .scan import CACHE_FOLDER, Annotations, find_clips
 
 FPS = 30.0
@@ -53,7 +53,7 @@ class Clip:
 
     @property
     def made(self) -> bool:
-        """Whether it is made running (`library.made`) and no recording."""
+        """Whether it is made (`library.made`) and no recording."""
         return self.path.startswith(MADE_FOLDER)
 
     @property
@@ -144,8 +144,9 @@ class Library:
 
     @cached_property
     def extended(self) -> "Library":
-        """The recordings and, behind them, the made gait above the fastest of them (`library.made`); made on first use
-        and kept beside the cache. It has no clusters. InputError where no recording shows locomotion."""
+        """The recordings and, behind them, what `library.made` makes of them: the speeds between and above them, and kicks
+        on the run; made on first use and kept beside the cache. It has no clusters. InputError where no recording shows
+        locomotion."""
         measure_gaits(self)  # a library without locomotion stays an error
         made = cache.load(*self.kept, "made") if self.kept else None
         if made is None:
@@ -157,6 +158,18 @@ class Library:
             return self
         frames = joined(self.frames, made.frames)
         return replace(self, clips=(*self.clips, *made.clips), frames=frames, clusters={})
+
+    @cached_property
+    def gaps(self) -> tuple[tuple[float, float], ...]:
+        """(from, to) m/s of the speeds that recorded locomotion does not reach."""
+        return gaps(self.frames.speed[locomotion(self.frames, self.clips)], self.fps)
+
+    def lacks(self, speed: np.ndarray, at_keys: np.ndarray) -> bool:
+        """Whether a track at `speed` (T,) m/s, at the library's rate, stays in a gap for a fifth of a second or more, or
+        has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick can be played."""
+        inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.gaps)
+        too_fast = 1.15 * kick_speed(self.frames, self.clips, self.keys)
+        return inside >= 0.2 * self.fps or bool(np.any(at_keys > too_fast))
 
     @cached_property
     def fastest(self) -> float:
@@ -212,11 +225,11 @@ def build(
 
 
 def _made(library: Library) -> Library:
-    """The made gait for this library's skeleton and style, described like its recordings."""
+    """What the recordings lack (`library.made`), described like them."""
+    speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != "standing"}
     clips = []
-    for name, motion, words in made_clips(library.skeleton, _example(library), library.fastest):
-        row = ClipAnnotation(0, len(motion) - 1, None, words)
-        clip = Clip(name, False, motion, (row,), foot_contacts.points(motion))
+    for made in made_clips(library.clips, library.frames, library.fps, speeds, library.keys):
+        clip = Clip(made.name, False, made.motion, made.rows, made.standing)
         clips += [clip, clip.twin()]
     if not clips:
         return replace(library, clips=())
@@ -235,15 +248,6 @@ def _keep_made(place: Path, made: Iterable[Clip]) -> None:
                 bvh.write(file, clip.motion)
     except OSError:
         return
-
-
-def _example(library: Library) -> Motion:
-    """A second or two of the fastest recorded locomotion: its posture, arms and width are the made gait's style."""
-    frames = library.frames
-    best = int(np.argmax(np.where(frames.words.any(axis=1), frames.speed, 0.0)))
-    clip = library.clips[int(frames.clip[best])]
-    middle, reach = int(round(frames.source[best])), int(round(clip.motion.fps))
-    return clip.motion.frames(max(0, middle - reach), min(len(clip.motion), middle + reach + 1))
 
 
 def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled) -> tuple[Clip, ...]:

@@ -1,55 +1,228 @@
-"""Gaits faster than any recording: made ones, on the library's skeleton and in the style of its fastest clip.
+"""What the recordings lack, made from them: speeds between and above them, and kicks on the run.
 
-Tracked players run at up to 9 m/s, recordings seldom at more than 4 or 5 (../shared/data/README.md). Playing the fastest
-clip faster with stretched strides keeps the figures and loses the look: knees pop, the body floats. `motion.gait` makes
-running at any speed from published cadences, strides and flight times; here it is made once per library, from just below
-the fastest recording up to 9.5 m/s, steady, speeding up, slowing down and in curves, for the path search to choose from.
+Tracked players go at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875 to
+1.125 of its rate covers some speeds around its own; where too few seconds of recording reach a speed that way is a gap.
+
+Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). Between a walk and a
+run, too: judged by eye and figure, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a spring, then a shuffling jog,
+with flight coming in gradually (7 % at 1.7 m/s, 32 % at 2.3 m/s), in the actors' own style, and closer to their poses than a
+made walk or jog.
+
+Above the recordings `motion.gait` makes running at any speed from published figures, with the skeleton's own upright stance:
+long runs that slowly gain and lose speed, so that few cuts are needed, quick ones, and weaving ones. The fastest recording
+played faster with stretched strides would keep the figures and lose the look: knees pop, the body floats.
+
+Recorded kicks are seldom faster than a jog; carried along at 8 m/s their standing foot slides by metres. `motion.gestures`
+makes kicks on the run at the speeds they lack; they answer to the words of the recorded kicks that they stand in for.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
 
+from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
+from ..motion import contacts, gestures
 from ..motion.gait import gait
-from ..motion.motion import Motion
-from ..motion.skeleton import Skeleton
+from ..motion.motion import Motion, at_frames, forward_kinematics
+from ..motion.humanoid import identify
+from ..motion.phase_blend import Strides, blend, strides
+from ..polish.foot_plant import plant
+from .features import Frames
 from .scan import CACHE_FOLDER
 
 MADE_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-FASTEST = 9.4
-STEP = 1.12
 FPS = 60.0
-STEADY_SECONDS = 2.5
-_BANDS = ((2.0, "walking"), (4.0, "jogging"), (5.5, "running"), (np.inf, "sprinting"))
+FASTEST = 9.4
+# made running begins here, m/s: slower it is left to blends
+_RUNS_FROM = 2.4
+# how far from its own speed a clip is played, and the seconds that have to reach a speed for it not to be a gap
+_WARP = (0.875, 1.125)
+_ENOUGH_SECONDS = 1.5
+_GRID = 1.03
+# speeds of blends and of kicks lie so far apart
+_BLEND_STEP, _KICK_STEP = 1.06, 1.4
+_PAIRS = 3
+_STEADY = 0.15
+_GAITS = ("walking", "jogging", "running", "sprinting")
+# m/s of gaits that no recording shows
+_USUAL = {"running": 4.6, "sprinting": 7.3}
+# m/s within which a point of a foot stands still
+_STILL = 0.25
 
 
-def made_clips(skeleton: Skeleton, example: Motion, fastest: float) -> list[tuple[str, Motion, tuple[str, ...]]]:
-    """(name, motion at 60 fps, words) of made running above `fastest` m/s on `skeleton`, styled after `example`; none
-    where the recordings are as fast as people get. Names begin with MADE_FOLDER: they are kept beside the cache."""
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A made clip. name: its path below the library's folder; standing (T, 2, 2): left and right, heel and toe."""
+
+    name: str
+    motion: Motion
+    rows: tuple[ClipAnnotation, ...]
+    standing: np.ndarray
+
+
+def gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float], ...]:
+    """(from, to) m/s of all ranges of speed, from the slowest recording's to a sprint, that too few seconds of recorded
+    locomotion reach within the time warp. speed (N,): of frames of locomotion, at `fps`."""
+    grid = np.exp(np.arange(np.log(0.6), np.log(FASTEST), np.log(_GRID)))
+    ordered = np.sort(speed)
+    reached = np.searchsorted(ordered, grid / _WARP[0]) - np.searchsorted(ordered, grid / _WARP[1])
+    lacking = reached < _ENOUGH_SECONDS * fps
+    if lacking.all():
+        return ()
+    lacking[: int(np.argmin(lacking))] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lacking, [False]]).astype(np.int8)))
+    ends = np.append(grid, FASTEST)
+    return tuple((float(grid[a]), float(ends[b])) for a, b in zip(edges[::2], edges[1::2]))
+
+
+def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
+    """(N,) bool: frames of recordings, twins left out, that show locomotion and no action."""
+    named = {word: frames.words[:, column] for column, word in enumerate(frames.vocabulary)}
+    none = np.zeros(len(frames), bool)
+    moves = np.any([named.get(word, none) for word in _GAITS], axis=0)
+    acts = np.any([none, *(named[word] for word in DISCRETE if word in named)], axis=0)
+    own = np.array([not clip.mirrored and not clip.made for clip in clips])
+    return moves & ~acts & own[frames.clip]
+
+
+def kick_speed(frames: Frames, clips: Sequence, keys: Sequence) -> float:
+    """m/s of the fastest approach of a kick among `keys`; infinite where there is none."""
+    found = [
+        frames.speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
+        for key in keys
+        if "kick" in key.words and not clips[key.clip].made
+    ]
+    return float(max(found)) if found else np.inf
+
+
+def made_clips(clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence) -> Iterator[Made]:
+    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with key moments `keys`.
+
+    gait_speeds: m/s of the recorded gaits. Names begin with MADE_FOLDER: they are kept beside the cache."""
+    speeds = {**{word: v for word, v in _USUAL.items() if v > max(gait_speeds.values())}, **gait_speeds}
+    example = upright_example(clips)
+    for low, high in gaps(frames.speed[locomotion(frames, clips)], fps):
+        yield from _blends(clips, frames, fps, low, high, speeds)
+        yield from _runs(max(0.93 * low, _RUNS_FROM), min(1.05 * high, FASTEST), example, speeds)
+    yield from _kicks(kick_speed(frames, clips, keys), keys, example, speeds)
+
+
+def upright_example(clips: Sequence) -> Motion:
+    """Frames of all recordings, one a second: `motion.neutral` takes the most upright of them for the way this skeleton
+    stands. A single recording of a run leans, and made running would lean twice."""
+    parts = [
+        at_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips if not clip.mirrored
+    ]
+    root, rotations = (np.concatenate(column) for column in zip(*parts))
+    return Motion(clips[0].motion.skeleton, root, rotations, 1.0)
+
+
+def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: dict[str, float]) -> Iterator[Made]:
+    """Mixtures of the nearest steady recordings below and above a gap; none where one side is lacking."""
+    slow, fast = _neighbours(clips, frames, fps, low, high)
+    if not slow or not fast:
+        return
+    top = min(high, max(one.speed for one in fast))
+    count = max(1, int(np.ceil(np.log(top / low) / np.log(_BLEND_STEP))))
+    for number, speed in enumerate(low * (top / low) ** ((np.arange(count) + 0.5) / count)):
+        motion, standing = blend(slow[number % len(slow)], fast[number % len(fast)], float(speed), FPS)
+        rows = _gait_rows(np.full(len(motion), speed), speeds)
+        yield _grounded(f"{MADE_FOLDER}blend_{speed:.2f}.bvh", motion, standing, rows, hold=True)
+
+
+def _neighbours(clips, frames: Frames, fps: float, low: float, high: float) -> tuple[list[Strides], list[Strides]]:
+    """The steadiest straight stretches of locomotion below and above a gap, nearest in speed first, of several clips."""
+    slow: list[tuple[float, int, ClipAnnotation]] = []
+    fast: list[tuple[float, int, ClipAnnotation]] = []
+    for index, clip in enumerate(clips):
+        for row in () if clip.mirrored or clip.made else clip.annotations:
+            if row.key is not None or "front" not in row.words or not set(row.words) & set(_GAITS):
+                continue
+            rate = fps / clip.motion.fps
+            part = frames.first[index] + np.arange(int(np.ceil(row.start * rate)), int(row.end * rate) + 1)
+            speed = frames.speed[part]
+            if len(part) < 0.9 * fps or speed.std() > _STEADY * speed.mean() or _acts(clip, row):
+                continue
+            if np.ptp(frames.heading[part]) > 0.5 + 0.3 * len(part) / fps:
+                continue
+            mean = float(speed.mean())
+            if 0.6 * low < mean < 1.1 * low:
+                slow.append((abs(mean - low), index, row))
+            elif mean > 1.15 * low and mean < 1.45 * high:
+                fast.append((abs(mean - high), index, row))
+    return _stretches(clips, slow), _stretches(clips, fast)
+
+
+def _acts(clip, row: ClipAnnotation) -> bool:
+    return any(other.key is not None and other.start < row.end and other.end > row.start for other in clip.annotations)
+
+
+def _stretches(clips, found) -> list[Strides]:
     out = []
-    for name, speed, turn in _courses(fastest):
-        motion = gait(speed, None, FPS, skeleton, turn_rate=turn, example=example)
-        word = next(word for limit, word in _BANDS if speed.mean() < limit)
-        out.append((f"{MADE_FOLDER}{name}.bvh", motion, (word, "front")))
-    return out
+    for _, index, row in sorted(found, key=lambda one: one[:2])[: 2 * _PAIRS]:
+        clip, span = clips[index], slice(int(row.start), int(row.end) + 1)
+        steps = strides(clip.motion.frames(span.start, span.stop), clip.standing[span])
+        if steps is not None:
+            out.append(steps)
+    return out[:_PAIRS]
 
 
-def _courses(fastest: float) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """(name, speed (T,) m/s, turn rate (T,) rad/s) of every made clip."""
-    speeds = []
-    speed = max(0.95 * fastest, 0.5)
+def _runs(low: float, high: float, example: Motion, speeds: dict[str, float]) -> Iterator[Made]:
+    """Running from `low` to `high` m/s and back: slowly, as quickly as players do, and weaving."""
+    if high < 1.1 * low:
+        return
+    for name, pace, weaves in (("slow", 0.8, False), ("quick", 2.5, False), ("weave", 1.0, True)):
+        ramp = np.linspace(low, high, max(int((high - low) / pace * FPS), int(1.5 * FPS)))
+        speed = np.concatenate([ramp, ramp[::-1]])
+        # as much sideways acceleration as players show at speed, about 4 m/s^2, to one side and the other
+        turn = np.sin(2.0 * np.pi * np.arange(len(speed)) / (3.0 * FPS)) * np.minimum(1.2, 4.0 / speed) * weaves
+        motion = gait(speed, None, FPS, example.skeleton, turn_rate=turn, example=example)
+        yield _grounded(f"{MADE_FOLDER}{name}_{low:.1f}.bvh", motion, None, _gait_rows(speed, speeds))
+
+
+def _kicks(recorded: float, keys: Sequence, example: Motion, speeds: dict[str, float]) -> Iterator[Made]:
+    """Kicks with the right foot on the run, from what recorded ones reach to a sprint, of the kinds that are recorded."""
+    words = [key.words for key in keys if "kick" in key.words]
+    kinds = sorted({"inside" if "inside" in found else "top" for found in words})
+    speed = 1.15 * recorded
     while speed < FASTEST:
-        speeds.append(speed)
-        speed *= STEP
-    if not speeds:
-        return []
-    steady = np.zeros(int(STEADY_SECONDS * FPS))
-    out = [(f"steady_{v:.1f}", steady + v, steady) for v in speeds]
-    for seconds in (2.5, 5.0):
-        ramp = np.linspace(speeds[0], speeds[-1], int(seconds * FPS))
-        out += [(f"up_in_{seconds:g}s", ramp, 0 * ramp), (f"down_in_{seconds:g}s", ramp[::-1], 0 * ramp)]
-    for v in speeds[::2]:
-        # as much sideways acceleration as players show at speed, about 4 m/s^2
-        turn = np.sin(np.linspace(0.0, np.pi, int(3.0 * FPS))) * min(1.2, 4.0 / v)
-        out.append((f"curve_{v:.1f}", 0 * turn + v, turn))
-    return out
+        for kind in kinds:
+            made = gestures.strike(f"kick low {kind}", example.skeleton, FPS, example=example, at_speed=speed)
+            row = ClipAnnotation(
+                np.ceil(made.start * FPS), np.floor(made.end * FPS), made.key * FPS, ("kick", "right", "low", kind, "front")
+            )
+            gait_row = _gait_rows(np.full(len(made.motion), speed), speeds)
+            yield _grounded(f"{MADE_FOLDER}kick_{kind}_{speed:.1f}.bvh", made.motion, None, (row, *gait_row))
+        speed *= _KICK_STEP
+
+
+def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
+    """Rows that name the gait of every frame by its speed (T,), with the thresholds by which tracks are annotated."""
+    words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
+    band = np.searchsorted(gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
+    edges = [0, *(np.flatnonzero(np.diff(band)) + 1), len(speed)]
+    return tuple(
+        ClipAnnotation(int(a), int(b) - 1, None, (words[band[a]], "front")) for a, b in zip(edges[:-1], edges[1:])
+    )
+
+
+def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold: bool = False) -> Made:
+    """The clip with its toes' floor at height 0, as recordings are, its feet held where they stand (`hold`), and no point
+    called standing that still moves."""
+    standing = contacts.points(motion) if standing is None else standing
+    motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, contacts.floor_height(motion)])
+    if hold:
+        planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing, motion.fps)
+        motion = replace(motion, root_positions=planted.root, rotations=planted.rotations)
+    return Made(name, motion, rows, standing & _still(motion))
+
+
+def _still(motion: Motion) -> np.ndarray:
+    """(T, 2, 2) bool: left and right, heel and toe move over the ground by less than a stance's creep."""
+    body = identify(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    points = np.stack([places[:, [limb.foot, limb.toe_or_foot], :2] for limb in (body.left, body.right)], axis=1)
+    return np.linalg.norm(np.gradient(points, axis=0), axis=-1) * motion.fps < _STILL

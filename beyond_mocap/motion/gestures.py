@@ -115,15 +115,34 @@ STRIKES = {
 }
 
 
+# a kick at full run: shares of the run's speed, the body hardly slows for it
+_RUNNING_SPEEDS = ((-0.8, 1.0), (-0.35, 1.0), (0.0, 0.96), (0.25, 0.95), (0.8, 1.0))
+# m/s between which a kick becomes one at full run, and there the factor on cadence and the share of the standing foot's
+# stance that has passed at the touch
+_FULL_RUN, _RUNNING_PACE, _RUNNING_STANCE = (3.0, 6.0), 0.93, 0.45
+
+
+# seconds that the kicking foot needs for its way to the ground
+_LANDING = 0.1
+
+
 def strike(
-    kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 1.0, seed: int = 0
+    kind: str,
+    skeleton: Skeleton | None = None,
+    fps: float = 60.0,
+    speed: float = 1.0,
+    seed: int = 0,
+    *,
+    at_speed: float | None = None,
+    example: Motion | None = None,
 ) -> Gesture:
     """The right foot meets the ball after an approach and runs on: `kind` is one of STRIKES; facing and travelling +X.
 
-    speed: factor on the approach's speed. At the key moment the ball is at the foot, see `foot` of the Strike.
+    speed: factor on the approach's speed. at_speed: m/s of a run in which the kick happens, instead of an approach that
+    slows down. example: as for `gait`. At the key moment the ball is at the foot, see `foot` of the Strike.
     """
-    recipe = STRIKES[kind]
-    neutral = neutral_stance(skeleton or adult_skeleton())
+    recipe = STRIKES[kind] if at_speed is None else _on_the_run(STRIKES[kind], at_speed)
+    neutral = neutral_stance(skeleton or adult_skeleton(), example)
     key = -recipe.speeds[0][0]
     end = key + recipe.speeds[-1][0]
     times = np.arange(int(round(end * fps)) + 1) / fps
@@ -136,6 +155,20 @@ def strike(
     posture = _laid_over(posture, course, steps, key, recipe, neutral)
     begin, land = _swing_around(steps[RIGHT], key)
     return Gesture(to_motion(posture.frames(course.asked), neutral), key, begin - 0.15, land + 0.1)
+
+
+def _on_the_run(recipe: Strike, speed: float) -> Strike:
+    """The same strike in a run at `speed` m/s: the steps keep their rhythm, and the touch falls into the middle of the
+    standing foot's short stance."""
+    share = float(smooth_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
+    duty = float(tables.at_speed("duty", speed))
+    at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
+    return replace(
+        recipe,
+        speeds=tuple((time, part * speed) for time, part in _RUNNING_SPEEDS),
+        pace=recipe.pace + (_RUNNING_PACE - recipe.pace) * share,
+        at=recipe.at + (max(at, recipe.at) - recipe.at) * share,
+    )
 
 
 def _in_step(course: Course, key: float, recipe: Strike) -> Course:
@@ -183,7 +216,7 @@ def _kicking_foot(
     into = quaternion.about_up(-posture.heading)
     frame = np.concatenate([quaternion.rotate(into, posture.ankles[:, RIGHT] - ground), posture.feet[:, RIGHT]], axis=1)
     frame[:, 5] -= posture.heading
-    rows = np.array([r for r in rows if swing[0] + 0.04 < key + r[0] < swing[1] - 0.04], dtype=float)
+    rows = np.array([r for r in rows if swing[0] + 0.04 < key + r[0] < swing[1] - _LANDING], dtype=float)
     values = np.column_stack([rows[:, 1:4] * scale, np.radians(rows[:, [6, 4, 5]])])
     at = np.concatenate([course.times[edges[:1]], key + rows[:, 0], course.times[edges[1:]]])
     speeds = np.gradient(frame, course.times, axis=0)[edges + [-1, 1]]

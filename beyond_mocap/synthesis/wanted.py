@@ -8,7 +8,7 @@ import numpy as np
 
 from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, gait_thresholds, spoken, words_per_frame
 from ..errors import NotInLibrary
-from ..library.keys import Key, nearest_serving, nearest_words, serving
+from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
 from ..motion.track import SampledTrack, sample
 from ..plan import Plan
@@ -83,10 +83,11 @@ def _automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) ->
 
 def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:
     frame = float(np.clip((moment.time - track.times[0]) * library.fps, 0, len(track.times) - 1))
-    usable = tuple(key for key in library.keys if allowed[key.clip])
+    usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made)
+    made = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
     choices = serving(usable, moment.words)
     if choices:
-        return WantedKey(moment, frame, choices, None)
+        return WantedKey(moment, frame, (*choices, *standing_in(choices, made)), None)
     offered = nearest_words(usable, moment.words)
     line = f"line {moment.line}, " if moment.line else ""
     text = f"{line}{moment.time:g} s: the library has no clip for '{' '.join(moment.words)}'; nearest: {_listed(offered)}"
@@ -96,7 +97,7 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     gait_words = library.gaits[int(gait[int(round(frame))])].words
     used = spoken(choices[0].words) if choices else gait_words
     warnings.append(f"{text}; used instead: {' '.join(used) if choices else 'locomotion goes on there'}")
-    return WantedKey(moment, frame, choices, used)
+    return WantedKey(moment, frame, (*choices, *standing_in(choices, made)), used)
 
 
 def _listed(offered: tuple[str, ...]) -> str:
