@@ -80,7 +80,7 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--seed", type=int, default=0, help="of the clustering that blocks and distance search in")
     _add_settings(verb)
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
-    verb.add_argument("--no-made", action="store_true", help="no made running where the track outruns the recordings")
+    verb.add_argument("--no-made", action="store_true", help="no made or blended clips where recordings lack a speed")
     verb.add_argument("--nearest", action="store_true", help="go on with the nearest words that the library has")
     _add_library_options(verb)
     verb.set_defaults(run=run_synthesize)

@@ -33,7 +33,7 @@ class Plan:
     nearest: go on with the nearest words where the library lacks a key moment. seed: of every random choice.
     delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1), 1 or more; 0:
     by "path" where the recordings' own labels change, else the paper's 4.
-    made: whether made running may stand in where the track is faster than any recording (method "path" only).
+    made: whether made clips may stand in where recordings lack a speed (method "path" only; `library.made`).
     seam_window: seconds over which a jump at a seam is spread (eq. 25, twice its s; "path" fades over half of it).
     track_window: seconds of the window that takes the feed's jitter out (`motion.track.smoothed`). root_window: seconds of
     the window behind which the root is pulled onto the track (method "path" only; the root error is measured with 1.5).

@@ -14,7 +14,7 @@ import numpy as np
 from ..annotation import Timeline, words_per_frame
 from ..library.library import Library
 from ..library.landings import LANDING_FOLDER
-from ..library.made import MADE_FOLDER
+from ..library.made import BLENDED, KICKED, MADE_FOLDER
 from ..motion.track import Track
 from . import feet, jerk, root
 from .moments import Moment, met, moments
@@ -53,7 +53,7 @@ def give_way(
     starts = seams(*source)
     keys = moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
-        _made_running(played),
+        *_made_lines(played),
         _made_landing(played),
         _too_fast(played, track, library),
         _warped(played, source, starts),
@@ -100,24 +100,34 @@ def _span(first: float, last: float) -> str:
     return low if low == high else f"{low}-{high}"
 
 
-def _made(played: Played, folder: str = MADE_FOLDER) -> np.ndarray:
-    """(T,) bool: frames of made running, or of what else is kept in `folder`."""
-    table = np.array([path.startswith(folder) for path in played.clips] + [False])
+def _made(played: Played) -> np.ndarray:
+    """(T,) bool: frames of made clips."""
+    return _whose(played, MADE_FOLDER)
+
+
+def _whose(played: Played, *begins: str) -> np.ndarray:
+    """(T,) bool: frames of clips whose path begins with one of `begins`."""
+    table = np.array([path.startswith(begins) for path in played.clips] + [False])
     return table[played.clip]
 
 
-def _made_running(played: Played) -> str | None:
-    made = _made(played)
-    if not np.any(made):
-        return None
-    return (
-        f"{stretches(played.times, made)} ({np.sum(made) / played.motion.fps:.1f} s in all): made running, styled after the "
-        "fastest recording, since none has the speed that the track asks for"
+def _made_lines(played: Played) -> list[str]:
+    """A line per kind of made clip: running, two recordings blended, kicks."""
+    blends, kicks = _whose(played, MADE_FOLDER + BLENDED), _whose(played, MADE_FOLDER + KICKED)
+    kinds = (
+        (_made(played) & ~blends & ~kicks, "made running, since no recording has the speed that the track asks for"),
+        (blends, "blended from a slower and a faster recording, since none has the speed that the track asks for"),
+        (kicks, "a kick made on the run, since no recorded one is as fast as the player"),
     )
+    return [
+        f"{stretches(played.times, there)} ({np.sum(there) / played.motion.fps:.1f} s in all): {what}"
+        for there, what in kinds
+        if np.any(there)
+    ]
 
 
 def _made_landing(played: Played) -> str | None:
-    made = _made(played, LANDING_FOLDER)
+    made = _whose(played, LANDING_FOLDER)
     if not np.any(made):
         return None
     seconds = np.sum(made) / played.motion.fps

@@ -34,6 +34,8 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 MADE_FOLDER = f"{CACHE_FOLDER}/made-gait/"
+# how names of blends and of kicks begin, below it
+BLENDED, KICKED = "blend_", "kick_"
 FPS = 60.0
 FASTEST = 9.4
 # made running begins here, m/s: slower it is left to blends
@@ -50,7 +52,7 @@ _GAITS = ("walking", "jogging", "running", "sprinting")
 # m/s of gaits that no recording shows
 _USUAL = {"running": 4.6, "sprinting": 7.3}
 # m/s within which a point of a foot stands still
-_STILL = 0.25
+_STILL = 0.18
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,30 +132,35 @@ def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: 
     for number, speed in enumerate(low * (top / low) ** ((np.arange(count) + 0.5) / count)):
         motion, standing = blend(slow[number % len(slow)], fast[number % len(fast)], float(speed), FPS)
         rows = _gait_rows(np.full(len(motion), speed), speeds)
-        yield _grounded(f"{MADE_FOLDER}blend_{speed:.2f}.bvh", motion, standing, rows, hold=True)
+        yield _grounded(f"{MADE_FOLDER}{BLENDED}{speed:.2f}.bvh", motion, standing, rows, hold=True)
 
 
 def _neighbours(clips, frames: Frames, fps: float, low: float, high: float) -> tuple[list[Strides], list[Strides]]:
-    """The steadiest straight stretches of locomotion below and above a gap, nearest in speed first, of several clips."""
+    """Steady straight stretches of forward locomotion below and above a gap, nearest in speed first."""
     slow: list[tuple[float, int, ClipAnnotation]] = []
     fast: list[tuple[float, int, ClipAnnotation]] = []
     for index, clip in enumerate(clips):
         for row in () if clip.mirrored or clip.made else clip.annotations:
-            if row.key is not None or "front" not in row.words or not set(row.words) & set(_GAITS):
+            if row.key is not None or not set(row.words) & set(_GAITS) or _acts(clip, row):
                 continue
             rate = fps / clip.motion.fps
-            part = frames.first[index] + np.arange(int(np.ceil(row.start * rate)), int(row.end * rate) + 1)
-            speed = frames.speed[part]
-            if len(part) < 0.9 * fps or speed.std() > _STEADY * speed.mean() or _acts(clip, row):
+            last = min(int(row.end * rate) + 1, frames.count[index])
+            part = frames.first[index] + np.arange(int(np.ceil(row.start * rate)), last)
+            if len(part) < 0.9 * fps or not _straight(frames, part, fps):
                 continue
-            if np.ptp(frames.heading[part]) > 0.5 + 0.3 * len(part) / fps:
-                continue
-            mean = float(speed.mean())
+            mean = float(frames.speed[part].mean())
             if 0.6 * low < mean < 1.1 * low:
                 slow.append((abs(mean - low), index, row))
             elif mean > 1.15 * low and mean < 1.45 * high:
                 fast.append((abs(mean - high), index, row))
     return _stretches(clips, slow), _stretches(clips, fast)
+
+
+def _straight(frames: Frames, part: np.ndarray, fps: float) -> bool:
+    """Whether frames `part` (K,) go on at one speed, forward, and hardly turn."""
+    speed, off = frames.speed[part], np.arctan2(frames.velocity[part, 1], frames.velocity[part, 0])
+    steady = speed.std() < _STEADY * speed.mean() and np.mean(np.abs(off)) < 0.35
+    return steady and np.ptp(frames.heading[part]) < 0.5 + 0.3 * len(part) / fps
 
 
 def _acts(clip, row: ClipAnnotation) -> bool:
@@ -195,7 +202,7 @@ def _kicks(recorded: float, keys: Sequence, example: Motion, speeds: dict[str, f
                 np.ceil(made.start * FPS), np.floor(made.end * FPS), made.key * FPS, ("kick", "right", "low", kind, "front")
             )
             gait_row = _gait_rows(np.full(len(made.motion), speed), speeds)
-            yield _grounded(f"{MADE_FOLDER}kick_{kind}_{speed:.1f}.bvh", made.motion, None, (row, *gait_row))
+            yield _grounded(f"{MADE_FOLDER}{KICKED}{kind}_{speed:.1f}.bvh", made.motion, None, (row, *gait_row))
         speed *= _KICK_STEP
 
 

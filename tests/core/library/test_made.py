@@ -1,4 +1,4 @@
-"""Made running above the recordings' speed: offered only where the track asks for it, and told."""
+"""What recordings lack is made: speeds between and above them, kicks on the run; offered only where asked for, and told."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation import KeyMoment, Timeline
+from beyond_mocap.library.keys import Key, standing_in
 from beyond_mocap.library.library import build
-from beyond_mocap.library.made import MADE_FOLDER, made_clips
-from beyond_mocap.motion.gait import gait
+from beyond_mocap.library.made import BLENDED, FASTEST, KICKED, MADE_FOLDER, gaps
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.plan import Plan
 from beyond_mocap.synthesize import synthesize
@@ -21,46 +24,95 @@ def straight(speed: float, seconds: float = 6.0) -> Track:
 
 
 @pytest.fixture(scope="module")
-def fast(library):
+def more(library):
     return library.extended
 
 
-def test_made_clips_reach_from_the_fastest_recording_to_a_sprint(library):
-    clips = made_clips(library.skeleton, gait(4.0, 2.0, 60.0, library.skeleton), 4.0)
-    speeds = [np.linalg.norm(np.diff(m.root_positions[:, :2], axis=0), axis=1).mean() * m.fps for _, m, _ in clips]
-    assert min(speeds) == pytest.approx(3.8, abs=0.3) and max(speeds) > 8.0
-    assert all(name.startswith(MADE_FOLDER) for name, _, _ in clips)
+def made(library, begins: str = ""):
+    return [clip for clip in library.clips if clip.path.startswith(MADE_FOLDER + begins) and not clip.mirrored]
 
 
-def test_no_made_clips_where_recordings_are_as_fast(library):
-    assert made_clips(library.skeleton, gait(4.0, 2.0, 60.0, library.skeleton), 10.0) == []
+def test_gaps_are_what_the_warp_does_not_reach():
+    speed = np.repeat([1.2, 1.4, 4.0], 100)
+    (low, high), (above, top) = gaps(speed, 30.0)
+    assert low == pytest.approx(1.4 * 1.125, rel=0.04) and high == pytest.approx(4.0 * 0.875, rel=0.04)
+    assert above == pytest.approx(4.0 * 1.125, rel=0.04) and top == FASTEST
 
 
-def test_the_recordings_come_first_and_unchanged(library, fast):
+def test_a_second_of_recording_is_not_enough_to_fill_a_gap():
+    assert len(gaps(np.r_[np.full(300, 1.5), np.full(30, 2.2), np.full(300, 3.0)], 30.0)) == 2
+
+
+def test_no_locomotion_no_gaps():
+    assert gaps(np.zeros(100), 30.0) == ()
+
+
+def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):
+    speed = np.concatenate([more.frames.speed[more.frames.clip == i] for i, c in enumerate(more.clips) if c.made])
+    for low, high in library.gaps:
+        for wanted in np.linspace(low, min(high, 9.0), 9):
+            assert np.sum(np.abs(np.log(speed / wanted)) < 0.12) > 10
+    assert made(more, BLENDED) and made(more, KICKED)
+
+
+def test_made_clips_stand_on_the_ground_and_do_not_slide(more):
+    body = identify(more.skeleton)
+    for clip in made(more):
+        toes = forward_kinematics(clip.motion)[0][:, [body.left.toe, body.right.toe]]
+        stands = clip.standing[1:, :, 1] & clip.standing[:-1, :, 1]
+        slide = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1)[stands] * clip.motion.fps
+        assert slide.mean() < 0.08, clip.path
+        assert abs(np.percentile(toes[..., 2], 2)) < 0.003 and toes[..., 2].min() > -0.02, clip.path
+
+
+def test_the_recordings_come_first_and_unchanged(library, more):
     count = len(library.frames)
-    assert fast.clips[: len(library.clips)] == library.clips
-    assert np.array_equal(fast.frames.features[:count], library.frames.features)
+    assert more.clips[: len(library.clips)] == library.clips
+    assert np.array_equal(more.frames.features[:count], library.frames.features)
     for column, word in enumerate(library.frames.vocabulary):
-        there = fast.frames.vocabulary.index(word)
-        assert np.array_equal(fast.frames.words[:count, there], library.frames.words[:, column])
+        there = more.frames.vocabulary.index(word)
+        assert np.array_equal(more.frames.words[:count, there], library.frames.words[:, column])
 
 
-def test_kept_beside_the_cache_and_read_back_the_same(library, fast):
+def test_kept_beside_the_cache_and_read_back_the_same(library, more):
     place = library.kept[0]
     assert (place / "made.npz").is_file() and list((place / "made-gait").glob("*.bvh"))
     again = build(library.folder, cache_dir=place).extended
-    assert np.array_equal(again.frames.features, fast.frames.features)
+    assert np.array_equal(again.frames.features, more.frames.features)
+    assert all(np.array_equal(a.standing, b.standing) for a, b in zip(again.clips, more.clips))
 
 
-def test_a_slow_track_uses_recordings_only(library):
-    take = synthesize(library, Plan(track=straight(2.0)))
+def test_a_track_at_a_recorded_speed_uses_recordings_only(library):
+    take = synthesize(library, Plan(track=straight(1.4)))
     assert not any(name.startswith(MADE_FOLDER) for name in take.clips)
 
 
-def test_a_track_beyond_the_recordings_is_played_by_made_running_and_told(library):
-    plan = Plan(track=straight(min(1.5 * library.fastest, 9.0)))
+def test_a_track_between_two_recordings_is_played_by_a_blend(library):
+    plan = Plan(track=straight(2.05))
     take = synthesize(library, plan)
-    assert any(name.startswith(MADE_FOLDER) for name in take.clips)
-    assert any("made running" in warning for warning in take.warnings)
+    assert any(name.startswith(MADE_FOLDER + BLENDED) for name in take.clips)
     without = synthesize(library, replace(plan, made=False))
     assert not any(name.startswith(MADE_FOLDER) for name in without.clips)
+
+
+def test_a_track_beyond_the_recordings_is_played_by_made_running_and_told(library):
+    take = synthesize(library, Plan(track=straight(min(1.5 * library.fastest, 9.0))))
+    assert any(name.startswith(MADE_FOLDER) for name in take.clips)
+    assert any("made" in warning for warning in take.warnings)
+
+
+def test_a_kick_in_a_sprint_is_made_and_keeps_the_recorded_words(library):
+    timeline = Timeline(keys=(KeyMoment(3.0, ("kick", "right")),))
+    take = synthesize(library, Plan(track=straight(7.0), timeline=timeline))
+    (key,) = take.keys
+    assert key.clip.startswith(MADE_FOLDER + KICKED)
+    assert {"kick", "right", "inside"} <= set(key.words) and key.used_instead is None
+    assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
+
+
+def test_made_kicks_stand_in_for_the_same_foot_only():
+    left, right = (Key(0, 1.0, 0.0, 2.0, frozenset({"kick", side, "standing"})) for side in ("left", "right"))
+    running = Key(1, 1.0, 0.0, 2.0, frozenset({"kick", "right", "sprinting"}))
+    assert standing_in((left,), (running,)) == ()
+    (one,) = standing_in((left, right), (running,))
+    assert one.clip == 1 and one.words == right.words
