@@ -6,7 +6,7 @@ words of a branch of the vocabulary may be left out, so carrying is being a subs
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
 
@@ -76,16 +76,12 @@ def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
     return 0.5 if both else 0.0
 
 
-def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...]) -> tuple[Key, ...]:
-    """Made key moments that may stand in for `choices`, recorded ones: the same act of the same side. Each takes the words
-    of the one for which it stands, since what is asked is that action, only faster."""
-    found = []
-    for key in made:
-        alike = [one for one in choices if _act(key) == _act(one)]
-        if alike:
-            best = max(alike, key=lambda one: (len(one.words & key.words), sorted(one.words)))
-            found.append(replace(key, words=best.words))
-    return tuple(found)
+def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...], words) -> tuple[Key, ...]:
+    """The made key moments that may stand in for `choices`, recorded ones that answer to `words`: the same act of the same
+    side, with all of the words by which a recorded one answers."""
+    wanted = frozenset(words)
+    met = {(_act(one), wanted & one.words) for one in choices}
+    return tuple(key for key in made if any(act == _act(key) and asked <= key.words for act, asked in met))
 
 
 def _act(key: Key) -> frozenset[str]:

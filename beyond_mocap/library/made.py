@@ -13,7 +13,7 @@ long runs that slowly gain and lose speed, so that few cuts are needed, quick on
 played faster with stretched strides would keep the figures and lose the look: knees pop, the body floats.
 
 Recorded kicks are seldom faster than a jog; carried along at 8 m/s their standing foot slides by metres. `motion.gestures`
-makes kicks on the run at the speeds they lack; they answer to the words of the recorded kicks that they stand in for.
+makes kicks on the run at the speeds they lack; they stand in for recorded kicks wherever they carry the words by which those answer.
 """
 
 from __future__ import annotations
@@ -199,7 +199,7 @@ def _kicks(recorded: float, keys: Sequence, example: Motion, speeds: dict[str, f
         for kind in kinds:
             made = gestures.strike(f"kick low {kind}", example.skeleton, FPS, example=example, at_speed=speed)
             row = ClipAnnotation(
-                np.ceil(made.start * FPS), np.floor(made.end * FPS), made.key * FPS, ("kick", "right", "low", kind, "front")
+                np.ceil(made.start * FPS), np.floor(made.end * FPS), made.key * FPS, ("kick", "right", "low", kind, "running", "front")
             )
             gait_row = _gait_rows(np.full(len(made.motion), speed), speeds)
             yield _grounded(f"{MADE_FOLDER}{KICKED}{kind}_{speed:.1f}.bvh", made.motion, None, (row, *gait_row))

@@ -15,8 +15,9 @@ from . import gait_tables as tables
 from .gait_tables import at_speed, smooth_step
 from .neutral import Neutral
 
-# the plan reaches this many seconds beyond both ends, so that stances which cross them are known
-_PAD = 2.5
+# the plan reaches this many seconds beyond both ends, so that stances which cross them are known; less for one who runs
+# all the time, from this speed on, metres per second
+_PAD, _RUNNERS_PAD, _RUNS = 2.5, 1.9, 2.0
 # feet are planned at this rate or a multiple of it
 _PLAN_RATE = 120.0
 
@@ -78,7 +79,7 @@ def plan(
     count = _count(speed, duration, fps, turn_rate, direction)
     stride = int(np.ceil(_PLAN_RATE / fps))
     rate = fps * stride
-    pad = int(np.ceil(_PAD * rate))
+    pad = int(np.ceil((_RUNNERS_PAD if np.min(speed) >= _RUNS else _PAD) * rate))
     times = (np.arange((count - 1) * stride + 1 + 2 * pad) - pad) / rate
     speed, turn_rate, direction = (_at(values, times, fps, count) for values in (speed, turn_rate, direction))
     if np.any(speed < 0.0) or np.any(speed > tables.FASTEST + 1e-9) or not np.all(np.isfinite(speed)):

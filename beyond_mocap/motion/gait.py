@@ -163,8 +163,8 @@ def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, Foots
     hips[:, 2] -= _drop(posture, times, steps, neutral)
     posture = posture.changed(hips=hips)
     tops = hip_joints(posture, neutral)
-    paths = [travel(steps[s], times, tops[:, s], posture.heading, neutral, _thigh_shank(neutral, s)) for s in (0, 1)]
-    ankles = [_bent(paths[s].ankle, tops[:, s], times, steps[s], sum(_thigh_shank(neutral, s))) for s in (0, 1)]
+    paths = [travel(steps[s], times, tops[:, s], posture.heading, neutral, thigh_shank(neutral, s)) for s in (0, 1)]
+    ankles = [kept_bent(paths[s].ankle, tops[:, s], times, steps[s], sum(thigh_shank(neutral, s))) for s in (0, 1)]
     feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
     return posture.changed(
         ankles=np.stack(ankles, axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1)
@@ -177,7 +177,7 @@ def _straightest(steps: Footsteps, times: np.ndarray) -> np.ndarray:
     return walking + (running - walking) * tables.run_share(steps.speed[steps.current(times)])
 
 
-def _bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:
+def kept_bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:
     """The ankle (T, 3) drawn to its hip (T, 3) where the leg, `leg` metres long, would be straightened too far in swing."""
     away = ankle - hip
     far = np.linalg.norm(away, axis=1)
@@ -187,7 +187,7 @@ def _bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footstep
     return hip + away * share[:, None]
 
 
-def _thigh_shank(neutral: Neutral, side: int) -> tuple[float, float]:
+def thigh_shank(neutral: Neutral, side: int) -> tuple[float, float]:
     body = identify(neutral.skeleton)
     joints = (body.left, body.right)[side]
     hip, knee, ankle = (neutral.positions[j] for j in (joints.upper_leg, joints.lower_leg, joints.foot))
@@ -199,8 +199,8 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
     tops = hip_joints(posture, neutral)
     need = np.zeros(len(times))
     for side in (0, 1):
-        path = travel(steps[side], times, tops[:, side], posture.heading, neutral, _thigh_shank(neutral, side))
-        longest = _straightest(steps[side], times) * sum(_thigh_shank(neutral, side))
+        path = travel(steps[side], times, tops[:, side], posture.heading, neutral, thigh_shank(neutral, side))
+        longest = _straightest(steps[side], times) * sum(thigh_shank(neutral, side))
         flat = np.sum((tops[:, side, :2] - path.ankle[:, :2]) ** 2, axis=-1)
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
         need = np.maximum(need, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))

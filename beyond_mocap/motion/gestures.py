@@ -18,12 +18,12 @@ from . import quaternion
 from .adult import adult_skeleton
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, lift_off_ground
-from .gait import footsteps, posture_over, with_feet
+from .gait import footsteps, kept_bent, posture_over, thigh_shank, with_feet
 from .gait_tables import smooth_step
 from .keyed import envelope, keyed, mixed
 from .motion import Motion
 from .neutral import Neutral, neutral_stance
-from .posture import Posture, to_motion
+from .posture import Posture, hip_joints, to_motion
 from .skeleton import Skeleton
 
 LEFT, RIGHT = 0, 1
@@ -46,7 +46,8 @@ class Strike:
     foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); an adult's metres. pelvis,
     spine: rows (time, list, tilt, turn). left_arm, right_arm: rows (time, flexion, abduction, inward, elbow). speeds:
     rows (time, m/s). pace: factor on the cadence around the touch. at: share of the right foot's swing at which it
-    touches. sink: rows (time, metres the hips are lowered). head: nod in degrees."""
+    touches. sink: rows (time, metres the hips are lowered). head: nod in degrees. fling: share of the arms' and trunk's
+    rows that is laid over the run."""
 
     foot: tuple
     pelvis: tuple
@@ -58,6 +59,7 @@ class Strike:
     at: float
     sink: tuple
     head: float = 14.0
+    fling: float = 1.0
 
 
 _KICK_SPEEDS = ((-2.6, 2.4), (-1.4, 2.9), (-0.6, 2.8), (0.0, 1.9), (0.45, 1.3), (1.0, 1.6), (2.2, 2.3))
@@ -158,8 +160,8 @@ def strike(
 
 
 def _on_the_run(recipe: Strike, speed: float) -> Strike:
-    """The same strike in a run at `speed` m/s: the steps keep their rhythm, and the touch falls into the middle of the
-    standing foot's short stance."""
+    """The same strike in a run at `speed` m/s: the steps keep their rhythm, arms and trunk swing out less, and the touch
+    falls into the middle of the standing foot's short stance."""
     share = float(smooth_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
     duty = float(tables.at_speed("duty", speed))
     at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
@@ -168,6 +170,7 @@ def _on_the_run(recipe: Strike, speed: float) -> Strike:
         speeds=tuple((time, part * speed) for time, part in _RUNNING_SPEEDS),
         pace=recipe.pace + (_RUNNING_PACE - recipe.pace) * share,
         at=recipe.at + (max(at, recipe.at) - recipe.at) * share,
+        fling=1.0 - 0.5 * share,
     )
 
 
@@ -195,20 +198,22 @@ def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Stri
     ease = envelope(times, -0.42, -0.16, 0.26, 0.65)
     hips[:, 2] -= scale * ease * keyed(recipe.sink, times)[:, 0]
     posture = with_feet(posture.changed(hips=hips), course.times, steps, neutral)
-    pelvis = mixed(posture.pelvis, np.radians(keyed(recipe.pelvis, times)), ease)
-    spine = mixed(posture.spine, np.radians(keyed(recipe.spine, times)), ease)
+    fling = recipe.fling * ease
+    pelvis = mixed(posture.pelvis, np.radians(keyed(recipe.pelvis, times)), fling)
+    spine = mixed(posture.spine, np.radians(keyed(recipe.spine, times)), fling)
     head = posture.head - (pelvis + spine - posture.pelvis - posture.spine) * np.array([0.8, 0.6, 0.95])
     arms = posture.arms.copy()
     for side, rows in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm)):
-        arms[:, side, :4] = mixed(arms[:, side, :4], np.radians(keyed(rows, times)), ease)
+        arms[:, side, :4] = mixed(arms[:, side, :4], np.radians(keyed(rows, times)), fling)
     posture = posture.changed(pelvis=pelvis, spine=spine, head=head, arms=arms)
-    return _kicking_foot(posture, course, _swing_around(steps[RIGHT], key), key, recipe.foot, neutral)
+    return _kicking_foot(posture, course, steps[RIGHT], key, recipe.foot, neutral)
 
 
 def _kicking_foot(
-    posture: Posture, course: Course, swing: tuple[float, float], key: float, rows, neutral: Neutral
+    posture: Posture, course: Course, steps: Footsteps, key: float, rows, neutral: Neutral
 ) -> Posture:
-    """The right foot's swing between `swing` seconds led through the rows of a Strike; its ends stay as they were."""
+    """The right foot's swing around `key` seconds led through the rows of a Strike; its ends stay as they were."""
+    swing = _swing_around(steps, key)
     scale = neutral.leg / tables.LEG
     inside = (course.times > swing[0]) & (course.times < swing[1])
     edges = np.flatnonzero(inside)[[0, -1]] + [-1, 1]
@@ -224,7 +229,9 @@ def _kicking_foot(
     path = CubicSpline(at, through, axis=0, bc_type=((1, speeds[0]), (1, speeds[1])))(course.times[inside])
     ankles, feet = posture.ankles.copy(), posture.feet.copy()
     back = quaternion.about_up(posture.heading[inside])
-    ankles[inside, RIGHT] = ground[inside] + quaternion.rotate(back, path[:, :3])
+    free = ground[inside] + quaternion.rotate(back, path[:, :3])
+    hip = hip_joints(posture, neutral)[inside, RIGHT]
+    ankles[inside, RIGHT] = kept_bent(free, hip, course.times[inside], steps, sum(thigh_shank(neutral, RIGHT)))
     edge = np.sin(np.pi * (course.times[inside] - swing[0]) / (swing[1] - swing[0]))
     ankles[inside, RIGHT, 2] += lift_off_ground(ankles[inside, RIGHT, 2], path[:, 4], neutral) * np.sqrt(
         np.maximum(edge, 0.0)

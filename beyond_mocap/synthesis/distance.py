@@ -106,9 +106,12 @@ def _played(section: Section, own: np.ndarray, asked: np.ndarray, so_far: float,
 
 
 def _read_through(source: EditList, piece: np.ndarray, place: np.ndarray, keys) -> EditList:
-    """What is shown when frames `place` (T,) of `source` are played; pieces stay apart."""
+    """What is shown when frames `place` (T,) of `source` are played; pieces stay apart, and one that shows a frame twice
+    does not go back for it."""
     nearest = np.clip(np.floor(place + 1e-6).astype(int), 0, len(source) - 1)
-    frame = source.frame[nearest] + (place - nearest)
+    after = np.minimum(nearest + 1, len(source) - 1)
+    step = np.where((piece[after] == piece[nearest]) & (after > nearest), source.frame[after] - source.frame[nearest], 1.0)
+    frame = source.frame[nearest] + step * (place - nearest)
     seams = np.flatnonzero(np.diff(piece[nearest]) != 0) + 1
     return EditList(source.clip[nearest], frame, seams, keys)
 

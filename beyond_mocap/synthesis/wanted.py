@@ -87,7 +87,7 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     made = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
     choices = serving(usable, moment.words)
     if choices:
-        return WantedKey(moment, frame, (*choices, *standing_in(choices, made)), None)
+        return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), None)
     offered = nearest_words(usable, moment.words)
     line = f"line {moment.line}, " if moment.line else ""
     text = f"{line}{moment.time:g} s: the library has no clip for '{' '.join(moment.words)}'; nearest: {_listed(offered)}"
@@ -97,7 +97,7 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     gait_words = library.gaits[int(gait[int(round(frame))])].words
     used = spoken(choices[0].words) if choices else gait_words
     warnings.append(f"{text}; used instead: {' '.join(used) if choices else 'locomotion goes on there'}")
-    return WantedKey(moment, frame, (*choices, *standing_in(choices, made)), used)
+    return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), used)
 
 
 def _listed(offered: tuple[str, ...]) -> str:

@@ -101,7 +101,7 @@ def test_a_track_beyond_the_recordings_is_played_by_made_running_and_told(librar
     assert any("made" in warning for warning in take.warnings)
 
 
-def test_a_kick_in_a_sprint_is_made_and_keeps_the_recorded_words(library):
+def test_a_kick_in_a_sprint_is_made(library):
     timeline = Timeline(keys=(KeyMoment(3.0, ("kick", "right")),))
     take = synthesize(library, Plan(track=straight(7.0), timeline=timeline))
     (key,) = take.keys
@@ -111,8 +111,14 @@ def test_a_kick_in_a_sprint_is_made_and_keeps_the_recorded_words(library):
 
 
 def test_made_kicks_stand_in_for_the_same_foot_only():
-    left, right = (Key(0, 1.0, 0.0, 2.0, frozenset({"kick", side, "standing"})) for side in ("left", "right"))
-    running = Key(1, 1.0, 0.0, 2.0, frozenset({"kick", "right", "sprinting"}))
-    assert standing_in((left,), (running,)) == ()
-    (one,) = standing_in((left, right), (running,))
-    assert one.clip == 1 and one.words == right.words
+    left, right = (Key(0, 1.0, 0.0, 2.0, frozenset({"kick", side, "standing", "low"})) for side in ("left", "right"))
+    running = Key(1, 1.0, 0.0, 2.0, frozenset({"kick", "right", "low", "running"}))
+    assert standing_in((left,), (running,), ("kick",)) == ()
+    assert standing_in((left, right), (running,), ("kick", "low")) == (running,)
+
+
+def test_made_kicks_do_not_stand_in_for_words_that_only_recorded_ones_have():
+    high = Key(0, 1.0, 0.0, 2.0, frozenset({"kick", "right", "high"}))
+    running = Key(1, 1.0, 0.0, 2.0, frozenset({"kick", "right", "low", "running"}))
+    assert standing_in((high,), (running,), ("kick", "high")) == ()
+    assert standing_in((high,), (running,), ("kick", "volley")) == (running,)

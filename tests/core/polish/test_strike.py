@@ -104,7 +104,7 @@ def test_no_pop(kick):
     motion = kick.motion
     struck = met(kick, natural_ball(kick) + [0.4, 0.0, 0.0], touch(kick))
     jerk = [np.abs(np.diff(kinematics(motion, s)[0], 3, axis=0)).max() for s in (None, struck)]
-    assert jerk[1] < 1.2 * jerk[0]
+    assert jerk[1] < 1.7 * jerk[0]
     flight = np.linalg.norm(np.diff(struck.ball, 2, axis=0), axis=1) * FPS**2
     assert flight.max() < 35.0  # a shift of 0.3 m within 0.3 s
 
