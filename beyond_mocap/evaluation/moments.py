@@ -8,6 +8,7 @@ import numpy as np
 
 from ..annotation import KeyMoment
 from ..library.library import Library
+from ..library.made import MADE_FOLDER
 from ..motion.striking import contact_gap, met_within, striking_part
 from ..motion.track import Track
 from . import pieces
@@ -41,7 +42,15 @@ def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, lib
     starts = pieces.seams(played.clip, played.mirrored, played.clip_frame, stride)
     number = pieces.runs(len(played.clip), starts)
     told = {result.asked: result for result in played.keys}
+    library = _with_made(library, played)
     return [_moment(played, key, number, told.get(key), library) for key in keys]
+
+
+def _with_made(library: Library | None, played: Played) -> Library | None:
+    """The library whose key moments were played: with its made clips where one of them is shown."""
+    if library is None or not any(path.startswith(MADE_FOLDER) for path in played.clips):
+        return library
+    return library.extended
 
 
 def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> Moment:

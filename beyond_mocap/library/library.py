@@ -166,9 +166,9 @@ class Library:
 
     def lacks(self, speed: np.ndarray, at_keys: np.ndarray) -> bool:
         """Whether a track at `speed` (T,) m/s, at the library's rate, stays in a gap for a fifth of a second or more, or
-        has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick can be played."""
+        has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick can be played without sliding."""
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.gaps)
-        too_fast = 1.15 * kick_speed(self.frames, self.clips, self.keys)
+        too_fast = 1.3 * kick_speed(self.frames, self.clips, self.keys)
         return inside >= 0.2 * self.fps or bool(np.any(at_keys > too_fast))
 
     @cached_property

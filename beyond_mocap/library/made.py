@@ -194,7 +194,7 @@ def _kicks(recorded: float, keys: Sequence, example: Motion, speeds: dict[str, f
     """Kicks with the right foot on the run, from what recorded ones reach to a sprint, of the kinds that are recorded."""
     words = [key.words for key in keys if "kick" in key.words]
     kinds = sorted({"inside" if "inside" in found else "top" for found in words})
-    speed = 1.15 * recorded
+    speed = _KICK_STEP * recorded
     while speed < FASTEST:
         for kind in kinds:
             made = gestures.strike(f"kick low {kind}", example.skeleton, FPS, example=example, at_speed=speed)

@@ -20,7 +20,7 @@ from .wanted import Wanted
 class Weights:
     """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a walk;
     turn per radian and slot; facing per radian between the body and where it should face; words for lacking all of the asked
-    ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made gait, which steps in
+    ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made clip, which steps in
     only where recordings miss the speed by more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch
     for any cut; pose per metre of joint distance; wild for cutting where the clips jerk by as much again as is usual;
     rate_change per unit; replay for a stretch shown less than 4 s ago; held per frame beyond a clip's end.
@@ -89,6 +89,7 @@ class PathCosts:
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
         cost += self.weights.rate * off + self.weights.stretch * np.maximum(off - 0.15, 0.0) + self.weights.held * held
+        cost += self.weights.made * self.offer.made[self.inside(start)]
         return cost * (length / SLOT)
 
     def _motion_misfit(self, first: int, end: int, speed, turn, frame) -> np.ndarray:
