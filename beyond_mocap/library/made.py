@@ -217,10 +217,10 @@ def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotat
 
 
 def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold: bool = False) -> Made:
-    """The clip with its toes' floor at height 0, as recordings are, its feet held where they stand (`hold`), and no point
+    """The clip with its soles on the ground, height 0, as recordings are, its feet held where they stand (`hold`), and no point
     called standing that still moves."""
     standing = contacts.points(motion) if standing is None else standing
-    motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, contacts.floor_height(motion)])
+    motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, contacts.ground_height(motion)])
     if hold:
         planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing, motion.fps)
         motion = replace(motion, root_positions=planted.root, rotations=planted.rotations)
