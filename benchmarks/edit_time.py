@@ -1,9 +1,10 @@
-"""Edits: processor's seconds from a changed plan to the new take, how much of it is made anew, and what shows at its ends.
+"""Edits: processor's seconds from a changed plan to the new take, how much of it is made anew, and what shows at its
+ends.
 
     lines = edit_times(library, [("scenario 3", track, timeline), ...])
 
-The edits are those of ../shared/metrics.md, "edit time": every key moment by 0.2 s, earlier and later, and the track dragged
-by half a metre at a quarter, half and three quarters of its time, within a second and a half to either side.
+The edits are those of ../shared/metrics.md, "edit time": every key moment by 0.2 s, earlier and later, and the track
+dragged by half a metre at a quarter, half and three quarters of its time, within a second and a half to either side.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ TARGET = 0.3
 
 
 def edit_times(library: Library, orders: Iterable[tuple[str, Track, Timeline]], runs: int = 3) -> list[str]:
-    """Markdown lines: a row per kind of edit, over all orders (name, track, timeline); seconds are the best of `runs`."""
+    """Markdown lines: a row per kind of edit, over all orders (name, track, timeline); seconds are the best of
+    `runs`."""
     figures: dict[str, list[tuple[float, ...]]] = {}
     for _, track, timeline in orders:
         before = synthesize(library, Plan(track=track, timeline=timeline, nearest=True))
@@ -39,8 +41,8 @@ def edit_times(library: Library, orders: Iterable[tuple[str, Track, Timeline]], 
             if len(anew):
                 figures.setdefault(kind, []).append((best, len(anew) / after.motion.fps, *_ends(before, after, anew)))
     return [
-        f"| edit | n | median s | 95 % s | within {TARGET:g} s | made anew, median s | jerk at its ends, before -> after | "
-        "feet slide there, before -> after |",
+        f"| edit | n | median s | 95 % s | within {TARGET:g} s | made anew, median s | "
+        "jerk at its ends, before -> after | feet slide there, before -> after |",
         "|---" * 8 + "|",
         *(_row(kind, np.array(found)) for kind, found in figures.items()),
     ]
@@ -49,7 +51,8 @@ def edit_times(library: Library, orders: Iterable[tuple[str, Track, Timeline]], 
 def _row(kind: str, found: np.ndarray) -> str:
     seconds, anew, jerk, jerk_after, slide, slide_after = found.T
     return (
-        f"| {kind} | {len(found)} | {np.median(seconds):.2f} | {np.percentile(seconds, 95):.2f} | {np.mean(seconds <= TARGET):.0%} | "
+        f"| {kind} | {len(found)} | {np.median(seconds):.2f} | {np.percentile(seconds, 95):.2f} | "
+        f"{np.mean(seconds <= TARGET):.0%} | "
         f"{np.median(anew):.1f} | {np.nanmedian(jerk):.0f} -> {np.nanmedian(jerk_after):.0f} m/s^3 | "
         f"{np.nanmean(slide):.1f} -> {np.nanmean(slide_after):.1f} cm/s |"
     )
@@ -71,9 +74,7 @@ def dragged(track: Track, at: float, aside: Sequence[float] = (0.0, ASIDE), widt
     """The track with a smooth bump of `aside` (2,) m around second `at`, `width` s to each side."""
     share = np.clip(1.0 - np.abs(track.times - at) / width, 0.0, 1.0)
     bump = (share * share * (3.0 - 2.0 * share))[:, None] * np.asarray(aside)
-    return Track(
-        track.times, track.positions + bump, track.ball, track.ball_height_known, track.filled, track.outlier, track.name
-    )
+    return replace(track, positions=track.positions + bump)
 
 
 def _timed(library: Library, plan: Plan, before: Take, runs: int) -> tuple[float, Take]:
@@ -92,8 +93,8 @@ def _changed(before: Take, after: Take) -> np.ndarray:
 
 
 def _ends(before: Take, after: Take, anew: np.ndarray) -> tuple[float, ...]:
-    """Largest jerk of any joint, m/s^3, and mean speed of standing toes, cm/s, before and after, within the half second in
-    which old and new meet; NaN where the whole take is new."""
+    """Largest jerk of any joint, m/s^3, and mean speed of standing toes, cm/s, before and after, within the half second
+    in which old and new meet; NaN where the whole take is new."""
     count, hand = len(after.motion), int(0.5 * after.motion.fps)
     starts = [anew[0]] * (anew[0] > 0) + [anew[-1] - hand] * (anew[-1] + 1 < count)
     frames = np.unique(np.clip([np.arange(start - 3, start + hand + 3) for start in starts], 0, count - 4))

@@ -5,9 +5,10 @@
     take = resynthesize(library, plan, take)
 
 What counts as touched is said in `synthesis.touched`. Touched stretches are searched between frames that stay
-(`synthesis.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed over to the
-old motion on both sides (`polish.hand_over`). All other frames come back bit for bit; only where the body turns a full turn
-more or less than before, the quaternions behind may have the other sign, since a motion's signs are continuous.
+(`synthesis.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed over to
+the old motion on both sides (`polish.hand_over`). All other frames come back bit for bit; only where the body turns a
+full turn more or less than before, the quaternions behind may have the other sign, since a motion's signs are
+continuous.
 """
 
 from __future__ import annotations
@@ -65,9 +66,9 @@ def resynthesize(
 ) -> Take:
     """The take `before` after its plan has become `plan`: searched and built anew only where the change touches it.
 
-    A whole synthesis where the change is not one of words, track or ball (another method, rate, length or choice), where
-    `before` was made from another library or by another method than "path", or where all of it is touched. The same library,
-    plan and take give the same bits. progress, cancelled, hurry and what is raised: as for `synthesize`.
+    A whole synthesis where the change is not one of words, track or ball (another method, rate, length or choice),
+    where `before` was made from another library or by another method than "path", or where all of it is touched. The
+    same library, plan and take give the same bits. progress, cancelled, hurry and what is raised: as for `synthesize`.
     """
     from threadpoolctl import threadpool_limits
 
@@ -156,7 +157,8 @@ class _Update:
         self.index = _index(len(track), library, plan.fps, len(edit))
         self.shown = shown(library, edit, self.index)
         self.root, self.rotations = before.motion.root_positions.copy(), before.motion.rotations.copy()
-        self.contacts, self.correction, self.miss = (a.copy() for a in (before.contacts, before.correction, before.ik_miss))
+        kept = before.contacts, before.correction, before.ik_miss
+        self.contacts, self.correction, self.miss = (values.copy() for values in kept)
         self.ball = track.ball.copy() if before.ball is None else before.ball.positions.copy()
         self.anew = np.zeros(len(track), bool)
         self.keys = self._keys()
@@ -166,8 +168,8 @@ class _Update:
         return tuple(key_result(self.library, self.plan, self.order, self.edit, self.shown, number) for number in count)
 
     def stretches(self, again: list[Stretch], moved: np.ndarray) -> list[Stretch]:
-        """Output frames (first, end) that are laid out anew: what was searched, where the track moved (T,), and the frames
-        over which seams are spread otherwise than before."""
+        """Output frames (first, end) that are laid out anew: what was searched, where the track moved (T,), and the
+        frames over which seams are spread otherwise than before."""
         touched = moved.copy()
         for first, end in again:
             touched |= (self.index > first - 1) & (self.index < end)
@@ -203,7 +205,8 @@ class _Update:
         """The take as it now is."""
         made = self.anew
         mirrored = np.array([clip.mirrored for clip in self.library.clips])
-        part = Shown(*(values[made] for values in (self.shown.clip, self.shown.frame, self.shown.clip_frame, self.shown.piece)))
+        what = self.shown
+        part = Shown(what.clip[made], what.frame[made], what.clip_frame[made], what.piece[made])
         new, sources = iter(words_shown(self.library, part)), sources_shown(self.library, part)
         names = tuple(dict.fromkeys((*self.before.clips, *sources)))
         clip = np.array(self.before.clip)
@@ -220,12 +223,17 @@ class _Update:
             seams=self.shown.seams,
             timeline=self.order.timeline,
             keys=tuple(self._as_before(key) for key in self.keys),
-            ball=BallPath(self.track.times, self.ball, self.track.ball_measured) if np.isfinite(self.ball[:, :2]).any() else None,
+            ball=self._ball_path(),
             correction=self.correction,
             ik_miss=self.miss,
             plan=self.plan,
             edit=self.edit,
         )
+
+    def _ball_path(self) -> BallPath | None:
+        if not np.isfinite(self.ball[:, :2]).any():
+            return None
+        return BallPath(self.track.times, self.ball, self.track.ball_measured)
 
     def _as_before(self, key: KeyResult) -> KeyResult:
         """The old result of a key moment whose frame has not been touched, under the line in which it is asked now."""
@@ -262,8 +270,9 @@ class _Window:
         return plant(update.library.skeleton, root, pose, smooth.standing, plan.fps)
 
     def _same_way_round(self, angle: np.ndarray, old: np.ndarray) -> np.ndarray | None:
-        """The track's direction (W,) with which a body that now turns the other way round than it did, where it is so slow
-        that both ways will do, turns as it did; None where that is not so. angle, old: (W,) facing now and then, unwrapped.
+        """The track's direction (W,) with which a body that now turns the other way round than it did, where it is so
+        slow that both ways will do, turns as it did; None where that is not so. angle, old: (W,) facing now and then,
+        unwrapped.
         """
         first, end = max(self.stretch[0] - 1, 0), min(self.stretch[1], len(angle) - 1)
         turns = np.round((angle[end] - angle[first] - old[end] + old[first]) / (2.0 * np.pi))

@@ -88,8 +88,8 @@ class SynthesisVerb(BackgroundVerb):
 
     @staticmethod
     def work(order, progress, cancelled, hurry):
-        """The library, where this session has none yet, then one player after the other. In a hurry the player whose turn
-        it is comes to an early end, and those that follow are left as they are."""
+        """The library, where this session has none yet, then one player after the other. In a hurry the player whose
+        turn it is comes to an early end, and those that follow are left as they are."""
         from ..beyond_mocap.evaluation.report import evaluate
         from ..beyond_mocap.library.library import build
         from ..beyond_mocap.resynthesize import resynthesize
@@ -140,7 +140,8 @@ class SynthesisVerb(BackgroundVerb):
         if lost:
             self.report({"WARNING"}, f"not in the list any more, so their takes are dropped: {', '.join(lost)}")
         if len(result.made) < result.asked:
-            self.report({"WARNING"}, f"ended early: {len(result.made)} of {result.asked} players, the others are as before")
+            told = f"ended early: {len(result.made)} of {result.asked} players, the others are as before"
+            self.report({"WARNING"}, told)
         self.report({"INFO"}, f"players synthesized: {len(result.made) - len(lost)}; press Bake to see them")
 
 

@@ -67,9 +67,10 @@ class BackgroundVerb(Verb):
     """A verb in three parts, so that the middle one can run in a thread while the window stays alive.
 
     `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled,
-    hurry)`, a static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called from
-    a script (`execute`) all three run at once; pressed as a button (`invoke`) the work goes to a thread. ESC cancels it;
-    where the work `keeps` what it has found, the first ESC lets it come to an early end, and the second cancels.
+    hurry)`, a static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called
+    from a script (`execute`) all three run at once; pressed as a button (`invoke`) the work goes to a thread. ESC
+    cancels it; where the work `keeps` what it has found, the first ESC lets it come to an early end, and the second
+    cancels.
     """
 
     kind = ""

@@ -20,13 +20,14 @@ _newest: dict[str, "Job"] = {}
 class Job:
     """Work of one kind ("library", "synthesis") in a thread of its own.
 
-    `work(progress, cancelled, hurry)` is called there; `hurry()` turns true when the user wants an end and what is there
-    by then. `fraction` and `text` say how far it is; after `poll()` has returned True either `result` or `error` is set.
+    `work(progress, cancelled, hurry)` is called there; `hurry()` turns true when the user wants an end and what is
+    there by then. `fraction` and `text` say how far it is; after `poll()` has returned True either `result` or `error`
+    is set.
     """
 
     def __init__(self, kind: str, work: Work, keeps: bool = False):
-        """Starts at once and takes the place of an older job of the same kind, which is cancelled. keeps: whether the work
-        can come to an early end with what it has."""
+        """Starts at once and takes the place of an older job of the same kind, which is cancelled. keeps: whether the
+        work can come to an early end with what it has."""
         stop(kind)
         self.kind, self.keeps = kind, keeps
         self.fraction, self.text = 0.0, ""

@@ -1,9 +1,9 @@
 """A stretch that was made anew joined to the frames around it, which stay: no jump, and no foot that slides for it.
 
-Around the stretch both motions show the same footage, but what was solved over all frames (how far a foot is shifted, how
-low the pelvis goes) may differ there by some centimetres. Root and joints go over from the one to the other within the
-hand-over; feet go over at once, where they are in the air. A foot that stands at the border stands where the old motion has
-it until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all.
+Around the stretch both motions show the same footage, but what was solved over all frames (how far a foot is shifted,
+how low the pelvis goes) may differ there by some centimetres. Root and joints go over from the one to the other within
+the hand-over; feet go over at once, where they are in the air. A foot that stands at the border stands where the old
+motion has it until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Pose = tuple[np.ndarray, np.ndarray]
 
 
 def old_share(count: int, stretch: tuple[int, int], frames: int) -> np.ndarray:
-    """(count,) share of the old motion: 0 within the `stretch` (first, end), 1 from `frames` before and behind it on."""
+    """(count,) share of the old motion: 0 within the `stretch` (first, end), 1 from `frames` around it on."""
     at = np.arange(count)
     away = np.maximum(stretch[0] - at, at - stretch[1] + 1) / (frames + 1.0)
     return eased(away, np.ones(count))
@@ -31,8 +31,8 @@ def old_share(count: int, stretch: tuple[int, int], frames: int) -> np.ndarray:
 def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, standing: np.ndarray, fps: float) -> Pose:
     """Root (T, 3) m and local rotations (T, J, 4) that are `new` where share (T,) is 0 and `old` where it is 1.
 
-    new, old: root and rotations of T frames; what `old` has where share is 0 counts for nothing. standing (T, 2, 2) bool:
-    heels and toes, left and right, that stand.
+    new, old: root and rotations of T frames; what `old` has where share is 0 counts for nothing. standing (T, 2, 2)
+    bool: heels and toes, left and right, that stand.
     """
     root = new[0] + share[:, None] * (old[0] - new[0])
     rotations = quaternion.slerp(_signed_like(new[1], old[1], share), old[1], share[:, None])
@@ -43,18 +43,17 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
         carries = standing[:, side].any(axis=1).astype(float)[:, None]
         moved, turned = _offsets([values[:, limb.foot] for values in (*fresh, *stays)], share, carries, fps)
         chain = leg(limb)
-        rotations = limb_carried(
-            body, Resting.of(body, chain), fresh[0][:, limb.foot] + moved - body.places[:, limb.foot], rotations=rotations
-        )
+        away = fresh[0][:, limb.foot] + moved - body.places[:, limb.foot]
+        rotations = limb_carried(body, Resting.of(body, chain), away, rotations=rotations)
         above = quaternion.inverse(_world(skeleton, rotations, skeleton.parents[limb.foot]))
         foot = quaternion.multiply(above, quaternion.multiply(turned, fresh[1][:, limb.foot]))
         rotations[:, limb.foot] = _nearest_sign(foot, rotations[:, limb.foot])
     return root, rotations
 
 
-def _offsets(feet: list[np.ndarray], share: np.ndarray, carries: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Shift (T, 3) m and turn (T, 4) that bring a new foot to where the old one is, wherever that is known; feet: place and
-    rotation of the new one and of the old one."""
+def _offsets(feet: list[np.ndarray], share: np.ndarray, carries: np.ndarray, fps: float) -> Pose:
+    """Shift (T, 3) m and turn (T, 4) that bring a new foot to where the old one is, wherever that is known; feet: place
+    and rotation of the new one and of the old one."""
     place, turn, old_place, old_turn = feet
     known = share > 0.0
     away = quaternion.to_rotation_vector(quaternion.multiply(old_turn, quaternion.inverse(turn)))

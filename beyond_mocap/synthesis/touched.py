@@ -1,10 +1,10 @@
-"""What an edit touches: where the new order differs from the old one, in frames, and what of it has to be searched anew.
+"""What an edit touches: where the new order differs from the old one, and what of it has to be searched anew.
 
-Touched is what is asked otherwise: other words, another speed (by more than 5 cm/s) or turning (by more than 0.05 rad over a
-slot), and key moments that moved, changed their words, came or went, with the entry and exit of their clips. Around it a
-run-up of a second is searched too, so that the new motion finds into the old one; key moments that stay are gone round where
-they do not lie within. Where only the track or the ball lies elsewhere (by more than a millimetre), what is shown stays and
-is laid out anew.
+Touched is what is asked otherwise: other words, another speed (by more than 5 cm/s), turning (by more than 0.05 rad
+over a slot) or facing (by more than 0.3 rad), and key moments that moved, changed their words, came, went, or whose
+ball has moved (by more than 15 cm), with the entry and exit of their clips. Around it a run-up of a second is searched
+too, so that the new motion finds into the old one; key moments that stay are gone round where they do not lie within.
+Where only the track or the ball lies elsewhere (by more than a millimetre), what is shown stays and is laid out anew.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ import numpy as np
 
 from ..library.library import Library
 from .edit_list import EditList, PlacedKey
+from .gaze import wanted_offset
 from .wanted import Wanted, WantedKey, needed
 
 RUN_UP = 1.0
-SPEED, TURN, PLACE = 0.05, 0.05, 0.001
+SPEED, TURN, FACING, PLACE, BALL = 0.05, 0.05, 0.3, 0.001, 0.15
 NEAR = 6
 
 Stretch = tuple[int, int]
@@ -37,23 +38,36 @@ def asked_otherwise(before: Wanted, after: Wanted, slot: int) -> np.ndarray:
     old, new = before.track, after.track
     words = np.array([a != b for a, b in zip(before.asked, after.asked)])
     turn = np.abs(_wrapped(_turn(new.direction, slot) - _turn(old.direction, slot))) * np.minimum(1.0, new.speed)
-    return words | (np.abs(new.speed - old.speed) > SPEED) | (turn > TURN)
+    facing = np.abs(_wrapped(wanted_offset(new) - wanted_offset(old))) * np.minimum(1.0, new.speed)
+    return words | (np.abs(new.speed - old.speed) > SPEED) | (turn > TURN) | (facing > FACING)
 
 
 def kept_keys(edit: EditList, before: Wanted, after: Wanted) -> tuple[PlacedKey, ...]:
     """Placed keys whose key moment is asked as it was, under its number in the new order."""
-    number = {key.wanted: n for key in edit.keys for n, new in enumerate(after.keys) if new == before.keys[key.wanted]}
+    number = _same_keys(before, after)
     return tuple(PlacedKey(number[key.wanted], key.key) for key in edit.keys if key.wanted in number)
+
+
+def _same_keys(before: Wanted, after: Wanted) -> dict[int, int]:
+    """Number in the old order -> number in the new one of the key moments that are asked as they were."""
+    found = {}
+    for number, key in enumerate(after.keys):
+        at = int(np.clip(round(key.frame), 0, len(after) - 1))
+        ball = np.linalg.norm(before.track.ball[at] - after.track.ball[at])
+        if key in before.keys and not ball > BALL:  # NaN where there is none
+            found[before.keys.index(key)] = number
+    return found
 
 
 def to_search(library: Library, edit: EditList, before: Wanted, after: Wanted, slot: int) -> list[Stretch]:
     """Stretches (first, end) that have to be searched anew, in the order of time, apart from each other."""
     touched = asked_otherwise(before, after, slot)
+    same = _same_keys(before, after)
     for placed in edit.keys:
-        if before.keys[placed.wanted] not in after.keys:
+        if placed.wanted not in same:
             touched[slice(*_played(library, before.keys[placed.wanted], placed))] = True
-    for key in after.keys:
-        if key.choices and key not in before.keys:
+    for number, key in enumerate(after.keys):
+        if key.choices and number not in same.values():
             touched[slice(*_asked_for(library, key, len(after)))] = True
     stays = [_played(library, after.keys[key.wanted], key) for key in kept_keys(edit, before, after)]
     run_up = int(round(RUN_UP * library.fps))
@@ -62,7 +76,8 @@ def to_search(library: Library, edit: EditList, before: Wanted, after: Wanted, s
 
 
 def stretches(touched: np.ndarray, gap: int) -> list[Stretch]:
-    """(first, end) of the stretches in which `touched` (T,) is true, those less than `gap` frames apart taken together."""
+    """(first, end) of the stretches in which `touched` (T,) is true, those less than `gap` frames apart taken
+    together."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], touched, [False]]).astype(int)))
     return _joined(list(zip(edges[::2].tolist(), edges[1::2].tolist())), gap)
 

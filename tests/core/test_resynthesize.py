@@ -1,4 +1,4 @@
-"""Edits: what is touched is made anew and is as asked, all else comes back bit for bit, and nothing shows where they meet."""
+"""Edits: what is touched is made anew and is as asked, all else comes back bit for bit, and no join shows."""
 
 from dataclasses import replace
 
@@ -18,7 +18,8 @@ from beyond_mocap.synthesize import synthesize
 @pytest.fixture(scope="module")
 def track(track_of):
     """Twenty seconds: a walk that becomes a jog, in a wide bow, with the ball ahead."""
-    return track_of(lambda t: 1.4 + 0.7 * (1 + np.tanh(t - 6.0)), seconds=20.0, turn=lambda t: 0.6 * np.sin(0.3 * t), ball=True)
+    speed, way = (lambda t: 1.4 + 0.7 * (1 + np.tanh(t - 6.0))), (lambda t: 0.6 * np.sin(0.3 * t))
+    return track_of(speed, seconds=20.0, turn=way, ball=True)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +69,8 @@ def test_nothing_touched_nothing_changed(library, take):
 
 @pytest.mark.parametrize("time", [4.8, 5.2, 6.0])
 def test_a_key_moment_is_moved(library, take, time):
-    timeline = replace(take.plan.timeline, keys=(replace(take.plan.timeline.keys[0], time=time), take.plan.timeline.keys[1]))
+    kick, other = take.plan.timeline.keys
+    timeline = replace(take.plan.timeline, keys=(replace(kick, time=time), other))
     after = resynthesize(library, replace(take.plan, timeline=timeline), take)
     assert abs(after.keys[0].frame / 30.0 - time) <= 0.5 / 30.0
     near = int(round(after.keys[0].frame))
@@ -91,7 +93,8 @@ def test_words_of_a_span_are_changed(library, take, timeline_of):
 
 
 def test_key_moments_come_and_go(library, take, timeline_of):
-    without = resynthesize(library, replace(take.plan, timeline=timeline_of((12.0, 14.0, "walking left"), (17.0, "kick"))), take)
+    timeline = timeline_of((12.0, 14.0, "walking left"), (17.0, "kick"))
+    without = resynthesize(library, replace(take.plan, timeline=timeline), take)
     assert len(without.keys) == 1 and without.keys[0] == take.keys[1]
     assert "kick" not in without.words[150]
     again = resynthesize(library, take.plan, without)
@@ -164,7 +167,8 @@ def test_other_choices_are_a_whole_synthesis(library, take, change):
 
 def test_another_length_is_a_whole_synthesis(library, take):
     old = take.plan.track
-    plan = replace(take.plan, track=Track(old.times[:400], old.positions[:400], old.ball[:400]), timeline=type(take.timeline)())
+    track = Track(old.times[:400], old.positions[:400], old.ball[:400])
+    plan = replace(take.plan, track=track, timeline=type(take.timeline)())
     assert not changed(synthesize(library, plan), resynthesize(library, plan, take)).any()
 
 

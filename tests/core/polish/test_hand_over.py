@@ -34,7 +34,8 @@ def test_the_old_share_grows_from_the_stretch_on():
 
 def test_the_same_motion_comes_back(walk):
     pose = walk.root_positions, walk.rotations
-    root, rotations = handed_over(walk.skeleton, pose, pose, old_share(len(walk), STRETCH, HAND), contacts.points(walk), 30.0)
+    share, stands = old_share(len(walk), STRETCH, HAND), contacts.points(walk)
+    root, rotations = handed_over(walk.skeleton, pose, pose, share, stands, 30.0)
     assert np.allclose(root, walk.root_positions)
     assert np.abs(np.sum(rotations * walk.rotations, axis=-1)).min() > 1.0 - 1e-9
 

@@ -66,6 +66,16 @@ def test_faster_is_another_thing_to_ask_for_and_elsewhere_is_not(order, long, tr
     assert 270 < off[0] < 300 and off[-1] == 600
 
 
+def test_a_key_moment_is_touched_where_its_ball_lies_elsewhere(library, order, track_of):
+    track = track_of(1.4, seconds=20.0, ball=True)
+    before = order((10.0, "kick right"), track=track)
+    edit = PathSearch(library, before).run()
+    for moved, touched in ((0.05, False), (0.4, True)):
+        ball = track.ball + np.where(np.abs(track.times - 10.0) < 0.3, moved, 0.0)[:, None] * [0.0, 1.0, 0.0]
+        after = order((10.0, "kick right"), track=type(track)(track.times, track.positions, ball))
+        assert bool(to_search(library, edit, before, after, SLOT)) == touched == (not kept_keys(edit, before, after))
+
+
 def test_stretches_near_each_other_are_one():
     touched = np.zeros(50, bool)
     touched[[3, 4, 8, 30]] = True
