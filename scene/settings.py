@@ -106,15 +106,15 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         "0: where the recordings' own labels change (Path), else a quarter of the way",
     )
     seam_window: FloatProperty(
-        name="Cut Smoothing", default=0.8, min=0.0, max=4.0, precision=2, unit="TIME_ABSOLUTE",
+        name="Cut Window", default=0.8, min=0.0, max=4.0, precision=2, unit="TIME_ABSOLUTE",
         description="Time over which the jump at a cut between two clips is spread",
     )
     track_window: FloatProperty(
-        name="Track Smoothing", default=1.2, min=0.2, max=5.0, precision=2, unit="TIME_ABSOLUTE",
+        name="Track Window", default=1.2, min=0.2, max=5.0, precision=2, unit="TIME_ABSOLUTE",
         description="Window that takes the jitter out of the track",
     )
     root_window: FloatProperty(
-        name="Sway Kept", default=1.5, min=0.2, max=5.0, precision=2, unit="TIME_ABSOLUTE",
+        name="Sway Window", default=1.5, min=0.2, max=5.0, precision=2, unit="TIME_ABSOLUTE",
         description="Of On the path: the body is on the track when both are seen through this window; shorter keeps less sway",
     )
     gaits: StringProperty(
