@@ -2,7 +2,8 @@
 
 Everything of one run is measured in one process on one core; seconds are the best of three. Written to
 benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
-`--compare` measures instead what is decided once and writes that section anew.
+`--compare` measures instead what is decided once and writes that section anew. A Blender measures with the numpy that it
+has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ def bench(scenarios: list[int], libraries: list[str], command: str) -> list[str]
     lines = [
         "# Results", "", f"`{command}`; Python {platform.python_version()}, numpy {np.__version__}, one core, one thread.",
         "Seconds are the processor's, the best of three in one process with the library loaded; `--nearest` everywhere.", "",
-        f"- {effort.bvh_speed()}", f"- {effort.library_speed()}",
+        f"- {effort.blas_speed()}", f"- {effort.bvh_speed()}", f"- {effort.library_speed()}",
     ]
     with tempfile.TemporaryDirectory() as place:
         results = {name: measured(name, scenarios, Path(place) / name) for name in libraries}
@@ -144,12 +145,13 @@ def main() -> int:
     options.add_argument("--library", choices=tuple(LIBRARIES), nargs="+", default=list(LIBRARIES))
     options.add_argument("--compare", action="store_true", help="what is decided once, instead of the methods")
     options.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
-    chosen = options.parse_args()
+    arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+    chosen = options.parse_args(arguments)
     if not (DATA / "mocap").is_dir():
         print(f"bench: {DATA} is missing; the benchmarks need its recordings and were skipped")
         return 0
     effort.on_one_core()
-    command = " ".join(["python -m benchmarks", *sys.argv[1:]])
+    command = " ".join(["python -m benchmarks", *arguments])
     before, compared = sections(chosen.out)
     if chosen.compare:
         told = [COMPARED, "", f"`{command}`", "", *compare.all_of(chosen.scenarios, chosen.library)]

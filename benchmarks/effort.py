@@ -39,6 +39,14 @@ def on_one_core() -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
+def blas_speed() -> str:
+    """What numpy's products are worth here: official Blenders have no fast BLAS, and everything that multiplies is slower."""
+    random = np.random.default_rng(0)
+    a, b = (random.normal(size=(2000, 27)).astype(np.float32) for _ in range(2))
+    took, _ = seconds(lambda: [a @ b.T for _ in range(10)])
+    return f"numpy multiplies at {10 * 2 * 2000 * 2000 * 27 / took / 1e9:.0f} GFLOP/s (pip's some 100, one without BLAS 2 to 6)"
+
+
 def bvh_speed() -> str:
     """How fast a long clip is read, in MB per second of the whole file."""
     source = DATA / "mocap" / "lafan1" / "walk1_subject1_walk2_filtered.bvh"
