@@ -27,7 +27,7 @@ from .motion.track.sampling import MOVING_SPEED
 from .plan import Plan
 from .polish.hand_over import handed_over, old_share
 from .polish.meeting import eased
-from .polish.on_track import facing, pulled_to_track, root_with_sway
+from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
 from .polish.foot_plant import Planted, plant
 from .polish.smoothing import reaches
 from .synthesis.balance import balanced
@@ -259,10 +259,11 @@ class _Window:
         rotation = update.rotations[self.low : self.high, 0]
         kept = quaternion.yaw(quaternion.multiply(rotation, quaternion.inverse(smooth.pose[:, 0])))
         kept[~stays] = np.nan
-        angle = facing(track.direction, track.speed, smooth.velocity, smooth.turn, kept)
+        firm = firmness(smooth.standing, smooth.height, plan.fps)
+        angle = facing(track.direction, track.speed, smooth.velocity, smooth.turn, kept, firm)
         direction = self._same_way_round(angle, np.unwrap(quaternion.yaw(rotation)))
         if direction is not None:
-            angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept)
+            angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept, firm)
         ground = self._pulled(root_with_sway(track.positions, smooth.sway, angle))
         root = np.concatenate([ground, smooth.height[:, None]], axis=1)
         pose = leaning(update.library, plan, track, smooth, faced(smooth.pose, angle))

@@ -34,7 +34,7 @@ from .polish.cross_fade import faded_rotations, faded_values, share
 from .polish.foot_plant import Planted, plant
 from .polish.give import give
 from .polish.joining import chained_facing, chained_root, torso_corrections
-from .polish.on_track import facing, pulled_to_track, root_with_sway
+from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
 from .polish.smoothing import spread_rotations, spread_values
 from .polish.strike import Struck, Touch, strike
 from .synthesis.balance import balanced
@@ -206,7 +206,8 @@ def faced(pose: np.ndarray, angle: np.ndarray) -> np.ndarray:
 def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, index):
     """Facing (T,) and root (T, 2): at the track's place at every time, or, by distance, where the track has come as far."""
     if found.travelled is None:
-        angle = facing(track.direction, track.speed, footage.velocity, footage.turn)
+        firm = firmness(footage.standing, footage.height, plan.fps)
+        angle = facing(track.direction, track.speed, footage.velocity, footage.turn, firm=firm)
         root = root_with_sway(track.positions, footage.sway, angle)
         return angle, pulled_to_track(root, track.raw, plan.fps, plan.root_window)
     travelled = np.interp(index, np.arange(len(found.travelled)), found.travelled)

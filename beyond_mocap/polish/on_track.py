@@ -13,6 +13,12 @@ from ..motion import quaternion
 from ..motion.track import zero_phase_hann
 
 TURN_WEIGHT = 12.0
+OFF_THE_FEET = 40.0
+"""How many times firmer the recording's own turning is followed by who flies, lies or kneels and so cannot turn at will."""
+
+_FLIGHT_SECONDS = 0.3  # without a foot on the ground; the flights of running are shorter
+_LOW = 0.6  # of the usual height of the hips
+
 HOLD = 1e6
 """Weight of a facing that is given: so much more than all else that it stays."""
 
@@ -20,7 +26,8 @@ ROOT_WINDOW = 1.5
 
 
 def facing(
-    direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, kept: np.ndarray | None = None
+    direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, kept: np.ndarray | None = None,
+    firm: np.ndarray | float = 1.0,
 ) -> np.ndarray:
     """(T,) facing in radians, unwrapped: the least squares compromise between travel and the recording's own turning.
 
@@ -28,7 +35,8 @@ def facing(
     frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle to
     the direction of travel; where either stands still there is no such angle and the recording's turning decides alone.
     Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the facing has to be, NaN where
-    it is free: what lies around a stretch that is made anew.
+    it is free: what lies around a stretch that is made anew. firm (T,): how many times firmer than usual the recording's
+    own turning is followed (`firmness`).
     """
     count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
@@ -38,16 +46,29 @@ def facing(
     if kept is not None:
         goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
     goal = _unwrapped(goal, turn)
+    weight = TURN_WEIGHT * np.broadcast_to(firm, count)[1:]
     diagonal = trust.copy()
-    diagonal[1:] += TURN_WEIGHT
-    diagonal[:-1] += TURN_WEIGHT
+    diagonal[1:] += weight
+    diagonal[:-1] += weight
     right = trust * goal
-    right[1:] += TURN_WEIGHT * turn[1:]
-    right[:-1] -= TURN_WEIGHT * turn[1:]
+    right[1:] += weight * turn[1:]
+    right[:-1] -= weight * turn[1:]
     band = np.zeros((2, count))
     band[0] = diagonal
-    band[1, :-1] = -TURN_WEIGHT
+    band[1, :-1] = -weight
     return solveh_banded(band, right, lower=True) if count > 1 else goal
+
+
+def firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) `firm` of `facing`: OFF_THE_FEET where no foot stands for a while or the hips are low, else 1; standing
+    (T, 2, 2) bool of heels and toes, height (T,) m of the root."""
+    off = ~standing.any(axis=(1, 2))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(np.int8)))
+    out = np.where(height < _LOW * np.median(height), OFF_THE_FEET, 1.0)
+    for first, last in zip(edges[::2], edges[1::2]):
+        if last - first >= _FLIGHT_SECONDS * fps:
+            out[first:last] = OFF_THE_FEET
+    return out
 
 
 def _unwrapped(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.track import zero_phase_hann
-from beyond_mocap.polish.on_track import facing, pulled_to_track, root_with_sway
+from beyond_mocap.polish.on_track import OFF_THE_FEET, facing, firmness, pulled_to_track, root_with_sway
 
 
 def ahead(count, speed=2.0, angle=0.0):
@@ -87,3 +87,24 @@ def test_what_drifts_is_pulled_back_and_what_sways_stays(fps):
 def test_short_roots(count):
     root = np.arange(2.0 * count).reshape(count, 2)
     assert np.all(np.isfinite(pulled_to_track(root + 0.3, root, 30.0)))
+
+
+def test_who_lies_does_not_turn_but_who_stands_up_afterwards_does():
+    count = 120
+    lying = (np.arange(count) >= 30) & (np.arange(count) < 90)
+    standing = np.repeat(~lying, 4).reshape(count, 2, 2)
+    height = np.where(lying, 0.2, 0.9)
+    direction = np.where(np.arange(count) < 15, 0.0, 2.0)
+    speed = np.where((np.arange(count) < 15) | (np.arange(count) > 105), 2.0, 0.0)
+    velocity = np.tile([2.0, 0.0], (count, 1))
+    firm = firmness(standing, height, 30.0)
+    assert (firm[lying] == OFF_THE_FEET).all() and (firm[~lying] == 1.0).all()
+    loose, kept = (facing(direction, speed, velocity, np.zeros(count), firm=f) for f in (1.0, firm))
+    assert np.ptp(loose[lying]) > 0.8 and np.ptp(kept[lying]) < 0.25
+    assert kept[0] == pytest.approx(0.0, abs=0.3) and kept[-1] == pytest.approx(2.0, abs=0.3)
+
+
+def test_the_flights_of_running_and_a_single_step_stay_as_they_were():
+    standing = np.ones((60, 2, 2), bool)
+    standing[10:17] = standing[30:37] = False
+    assert (firmness(standing, np.full(60, 0.9), 30.0) == 1.0).all()
