@@ -18,7 +18,7 @@ from .gait_tables import GRAVITY, smooth_step
 from .humanoid import Humanoid, identify
 from .motion import Motion, concatenate, pose_kinematics, resample
 from .neutral import neutral_stance
-from .resting import lowest_root, on_the_side
+from .resting import arms_above_ground, lowest_root, on_the_side, widened
 from .skeleton import Skeleton
 from .spring import Offset
 
@@ -80,7 +80,8 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     poses = track.towards(landing, fall, _RATES[0])
     centre = _Fall.of(motion, body)
     height = centre.height(fall) - _to_middle(skeleton, body, poses)[:, 2]
-    touched = int(np.argmax(height < lowest_root(skeleton, poses))) if (height < lowest_root(skeleton, poses)).any() else -1
+    under = height < lowest_root(skeleton, poses, arms=False)
+    touched = int(np.argmax(under)) if under.any() else len(fall) - 1
     seconds_down = float(fall[touched])
     track = track.at(landing, seconds_down, _RATES[0])
     settle = np.arange(1, int(_SETTLING * fps) + 1) / fps
@@ -94,6 +95,8 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     over = track.towards(turned.rotations[shown], rise, _RATES[2])
     rotations = np.concatenate([poses[: touched + 1], down, over])
     root = _root(motion, centre, rotations, touched + 1, len(down), turned, shown)
+    rotations = arms_above_ground(skeleton, root, rotations, fps)
+    root[:, 2] += widened(np.maximum(lowest_root(skeleton, rotations) - root[:, 2], 0.0), fps)
     out = Motion(
         skeleton, np.concatenate([motion.root_positions, root]), np.concatenate([motion.rotations, rotations]), fps
     )
@@ -261,13 +264,13 @@ def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up
     middle = _to_middle(skeleton, body, rotations)
     root = np.empty((len(rotations), 3))
     root[:, :2] = fall.level(seconds, flight / fps) - middle[:, :2]
-    ground = lowest_root(skeleton, rotations)
+    ground = lowest_root(skeleton, rotations, arms=False)
     free = fall.height(np.minimum(seconds, (flight + settling) / fps)) - middle[:, 2]
     root[:, 2] = _cushioned(free, ground, smooth_step(seconds / 0.15))
     start = flight + settling
     root[start:, :2] = _carried(root[start - 3 : start, :2], up.root_positions[shown, :2], fps)
     way = np.arange(len(shown)) / fps
-    clear = np.maximum(up.root_positions[:, 2] - lowest_root(skeleton, up.rotations), 0.0)
+    clear = np.maximum(up.root_positions[:, 2] - lowest_root(skeleton, up.rotations, arms=False), 0.0)
     root[start:, 2] += smooth_step((way - _LYING_STILL) / 0.6) * clear[shown]
     return root
 

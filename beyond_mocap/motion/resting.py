@@ -6,6 +6,7 @@ A skeleton has no flesh; a joint lies as far above the ground as the body is thi
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from . import gait_tables as tables
 from . import quaternion
@@ -14,6 +15,7 @@ from .motion import pose_kinematics
 from .neutral import Neutral
 from .posture import Posture, to_motion
 from .skeleton import Skeleton
+from .track import zero_phase_hann
 
 THICKNESS = {
     "hips": 0.09, "chest": 0.09, "neck": 0.06, "head": 0.07, "shoulder": 0.06, "upper_arm": 0.06, "lower_arm": 0.04,
@@ -22,17 +24,74 @@ THICKNESS = {
 """Metres from a joint to the skin below it."""
 
 _OTHERS, _TIP = 0.02, 0.01
+_RAISED = np.radians(np.arange(0.0, 100.0, 1.0))  # by how much an arm may be turned up
+_EVEN_SECONDS = 0.3
 
 
-def lowest_root(skeleton: Skeleton, rotations: np.ndarray) -> np.ndarray:
-    """Height (T,) m of the root at which the lowest part of the body touches the ground; rotations (T, J, 4) local."""
-    thick = thickness(skeleton)
+def lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) -> np.ndarray:
+    """Height (T,) m of the root at which the lowest part of the body touches the ground; rotations (T, J, 4) local.
+    arms: whether they count, which give way where a body falls or rolls onto them (`arms_above_ground`)."""
     places, world = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
-    lowest = (places[:, :, 2] - thick).min(axis=1)
+    without = set() if arms else {joint for chain in _arms(skeleton) for joint in chain}
+    points = [(place, thick) for joint, place, thick in _surface(skeleton, places, world) if joint not in without]
+    return -np.min([place[:, 2] - thick for place, thick in points], axis=0)
+
+
+def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float) -> np.ndarray:
+    """Local rotations (T, J, 4) with arms that reach below the ground turned up at the shoulder, evenly over time, so that
+    little of them is left below; root (T, 3) m, rotations (T, J, 4) local."""
+    places, world = pose_kinematics(skeleton, root, rotations)
+    out = rotations.copy()
+    for chain in _arms(skeleton):
+        shoulder = places[:, chain[0]]
+        points = [(p - shoulder, thick) for joint, p, thick in _surface(skeleton, places, world) if joint in chain[1:]]
+        out_level = points[-1][0][:, :2]
+        level = out_level / np.maximum(np.linalg.norm(out_level, axis=1, keepdims=True), 1e-9)
+        along = np.stack([np.sum(p[:, :2] * level, axis=1) for p, _ in points], axis=1)[..., None]
+        above = np.stack([p[:, 2] for p, _ in points], axis=1)[..., None]
+        thick = np.array([t for _, t in points])[:, None]
+        raised = above * np.cos(_RAISED) + along * np.sin(_RAISED) - thick + shoulder[:, 2, None, None]
+        angle = _RAISED[_first_enough(raised.min(axis=1))]
+        axis = np.stack([level[:, 1], -level[:, 0], np.zeros(len(level))], axis=1)
+        turn = zero_phase_hann(axis * widened(angle, fps)[:, None], fps, _EVEN_SECONDS)
+        turned = quaternion.multiply(quaternion.from_rotation_vector(turn), world[:, chain[0]])
+        parent = world[:, skeleton.parents[chain[0]]]
+        moved = np.any(turn != 0.0, axis=1)[:, None]
+        out[:, chain[0]] = np.where(moved, quaternion.multiply(quaternion.inverse(parent), turned), out[:, chain[0]])
+    return out
+
+
+def widened(values: np.ndarray, fps: float) -> np.ndarray:
+    """An even curve (T,) that is nowhere below `values` (T,) >= 0: the greatest around each frame, then their mean."""
+    width = 2 * int(_EVEN_SECONDS * fps / 2) + 1
+    return uniform_filter1d(maximum_filter1d(values, width), width)
+
+
+def _first_enough(height: np.ndarray) -> np.ndarray:
+    """The first column (T,) of height (T, A) m that is not below the ground; the highest where all are."""
+    enough = height >= 0.0
+    return np.where(enough.any(axis=1), np.argmax(enough, axis=1), np.argmax(height, axis=1))
+
+
+def _arms(skeleton: Skeleton) -> list[list[int]]:
+    """The joints of both arms from the upper arm on, fingers too."""
+    body = identify(skeleton)
+    tops = [limb.upper_arm for limb in (body.left, body.right) if limb.upper_arm is not None]
+    return [[joint for joint in range(top, len(skeleton)) if _below(skeleton, joint, top)] for top in tops]
+
+
+def _below(skeleton: Skeleton, joint: int, top: int) -> bool:
+    while joint > top:
+        joint = skeleton.parents[joint]
+    return joint == top
+
+
+def _surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
+    """(joint, place (T, 3) m, thickness m) of every joint and every tip."""
+    for joint, thick in enumerate(thickness(skeleton)):
+        yield joint, places[:, joint], thick
     for joint, tip in zip(skeleton.end_parents, skeleton.end_offsets):
-        end = places[:, joint] + quaternion.rotate(world[:, joint], tip)
-        lowest = np.minimum(lowest, end[:, 2] - _TIP)
-    return -lowest
+        yield joint, places[:, joint] + quaternion.rotate(world[:, joint], tip), _TIP
 
 
 def thickness(skeleton: Skeleton) -> np.ndarray:
@@ -60,7 +119,7 @@ _LANDING = {
     "roll": 8.0, "spine": (6.0, -4.0), "head": (4.0, 10.0),
 }
 _LYING = {
-    "arms": ((118, 0, 0, 34), (88, -4, 22, 70)),
+    "arms": ((160, 10, 0, 50), (88, -4, 22, 70)),
     "ankles": ((0.10, 0.62, -0.13), (0.20, 0.52, -0.07)),
     "roll": 22.0, "spine": (14.0, 0.0), "head": (10.0, 6.0),
 }
