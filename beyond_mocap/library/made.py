@@ -1,19 +1,22 @@
 """What the recordings lack, made from them: speeds between and above them, and kicks on the run.
 
-Tracked players go at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875 to
-1.125 of its rate covers some speeds around its own; where too few seconds of recording reach a speed that way is a gap.
+Tracked players go at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
+to 1.125 of its rate covers some speeds around its own; where too few seconds of recording reach a speed that way is a
+gap.
 
-Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). Between a walk and a
-run, too: judged by eye and figure, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a spring, then a shuffling jog,
-with flight coming in gradually (7 % at 1.7 m/s, 32 % at 2.3 m/s), in the actors' own style, and closer to their poses than a
-made walk or jog.
+Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). Between a walk
+and a run, too: judged by eye and figure, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a spring, then a
+shuffling jog, with flight coming in gradually (7 % at 1.7 m/s, 32 % at 2.3 m/s), in the actors' own style, and closer
+to their poses than a made walk or jog.
 
-Above the recordings `motion.gait` makes running at any speed from published figures, with the skeleton's own upright stance:
-long runs that slowly gain and lose speed, so that few cuts are needed, quick ones, and weaving ones. The fastest recording
-played faster with stretched strides would keep the figures and lose the look: knees pop, the body floats.
+Above the recordings `motion.gait` makes running at any speed from published figures, with the skeleton's own upright
+stance and the recorded runners' elbows and lean: long runs that slowly gain and lose speed, so that few cuts are
+needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
+figures and lose the look: knees pop, the body floats.
 
-Recorded kicks are seldom faster than a jog; carried along at 8 m/s their standing foot slides by metres. `motion.gestures`
-makes kicks on the run at the speeds they lack; they stand in for recorded kicks wherever they carry the words by which those answer.
+Recorded kicks are seldom faster than a jog; carried along at 8 m/s their standing foot slides by metres.
+`motion.gestures` makes kicks on the run at the speeds they lack; they stand in for recorded kicks wherever they carry
+the words by which those answer.
 """
 
 from __future__ import annotations
@@ -24,10 +27,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
-from ..motion import contacts, gestures
+from ..motion import contacts, gestures, quaternion
+from ..motion.course import GaitStyle
 from ..motion.gait import gait
+from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics
-from ..motion.humanoid import identify
 from ..motion.phase_blend import Strides, blend, strides
 from ..polish.foot_plant import plant
 from .features import Frames
@@ -51,6 +55,8 @@ _STEADY = 0.15
 _GAITS = ("walking", "jogging", "running", "sprinting")
 # m/s of gaits that no recording shows
 _USUAL = {"running": 4.6, "sprinting": 7.3}
+# radians by which a runner's style differs from the usual at most
+_STYLE = np.array([0.35, 0.10])
 # m/s within which a point of a foot stands still
 _STILL = 0.18
 
@@ -100,15 +106,18 @@ def kick_speed(frames: Frames, clips: Sequence, keys: Sequence) -> float:
     return float(max(found)) if found else np.inf
 
 
-def made_clips(clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence) -> Iterator[Made]:
+def made_clips(
+    clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
+) -> Iterator[Made]:
     """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with key moments `keys`.
 
     gait_speeds: m/s of the recorded gaits. Names begin with MADE_FOLDER: they are kept beside the cache."""
     speeds = {**{word: v for word, v in _USUAL.items() if v > max(gait_speeds.values())}, **gait_speeds}
     example = upright_example(clips)
+    style = runner_style(clips, frames, example)
     for low, high in gaps(frames.speed[locomotion(frames, clips)], fps):
         yield from _blends(clips, frames, fps, low, high, speeds)
-        yield from _runs(max(0.93 * low, _RUNS_FROM), min(1.05 * high, FASTEST), example, speeds)
+        yield from _runs(max(0.93 * low, _RUNS_FROM), min(1.05 * high, FASTEST), example, style, speeds)
     yield from _kicks(kick_speed(frames, clips, keys), keys, example, speeds)
 
 
@@ -120,6 +129,40 @@ def upright_example(clips: Sequence) -> Motion:
     ]
     root, rotations = (np.concatenate(column) for column in zip(*parts))
     return Motion(clips[0].motion.skeleton, root, rotations, 1.0)
+
+
+def runner_style(clips: Sequence, frames: Frames, example: Motion) -> GaitStyle:
+    """How far the recorded runners bend their elbows and lean, against a made one at their mean speed; the usual style
+    where nobody runs."""
+    rows = np.flatnonzero(locomotion(frames, clips) & (frames.speed > _RUNS_FROM))
+    if len(rows) < _ENOUGH_SECONDS * 30.0:
+        return GaitStyle()
+    rows = rows[np.linspace(0, len(rows) - 1, 60).astype(int)]
+    shown = [at_frames(clips[frames.clip[row]].motion, frames.source[row : row + 1]) for row in rows]
+    recorded = Motion(example.skeleton, *(np.concatenate(column) for column in zip(*shown)), 30.0)
+    made = gait(min(float(frames.speed[rows].mean()), FASTEST), 1.5, 30.0, example.skeleton, example=example)
+    elbow, lean = np.clip(_elbow_and_lean(recorded) - _elbow_and_lean(made), -_STYLE, _STYLE)
+    return GaitStyle(elbow=float(elbow), lean=float(lean))
+
+
+def _elbow_and_lean(motion: Motion) -> np.ndarray:
+    """(2,) radians, means over all frames: flexion of both elbows, and the trunk's lean ahead."""
+    body = identify(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    bends = [
+        _between(places[:, arm.lower_arm] - places[:, arm.upper_arm], places[:, arm.hand] - places[:, arm.lower_arm])
+        for arm in (body.left, body.right)
+        if None not in (arm.upper_arm, arm.lower_arm, arm.hand)
+    ]
+    facing = heading_from_positions(motion.skeleton, places)
+    trunk = places[:, body.chest if body.neck is None else body.neck] - places[:, body.hips]
+    lean = np.arctan2(quaternion.turned_level(trunk[:, :2], -facing)[:, 0], trunk[:, 2])
+    return np.array([np.mean(bends) if bends else 0.0, np.mean(lean)])
+
+
+def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The angle (T,) in radians between vectors (T, 3)."""
+    return np.arctan2(np.linalg.norm(quaternion.cross(a, b), axis=1), np.sum(a * b, axis=1))
 
 
 def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: dict[str, float]) -> Iterator[Made]:
@@ -177,7 +220,7 @@ def _stretches(clips, found) -> list[Strides]:
     return out[:_PAIRS]
 
 
-def _runs(low: float, high: float, example: Motion, speeds: dict[str, float]) -> Iterator[Made]:
+def _runs(low: float, high: float, example: Motion, style: GaitStyle, speeds: dict[str, float]) -> Iterator[Made]:
     """Running from `low` to `high` m/s and back: slowly, as quickly as players do, and weaving."""
     if high < 1.1 * low:
         return
@@ -186,7 +229,7 @@ def _runs(low: float, high: float, example: Motion, speeds: dict[str, float]) ->
         speed = np.concatenate([ramp, ramp[::-1]])
         # as much sideways acceleration as players show at speed, about 4 m/s^2, to one side and the other
         turn = np.sin(2.0 * np.pi * np.arange(len(speed)) / (3.0 * FPS)) * np.minimum(1.2, 4.0 / speed) * weaves
-        motion = gait(speed, None, FPS, example.skeleton, turn_rate=turn, example=example)
+        motion = gait(speed, None, FPS, example.skeleton, turn_rate=turn, style=style, example=example)
         yield _grounded(f"{MADE_FOLDER}{name}_{low:.1f}.bvh", motion, None, _gait_rows(speed, speeds))
 
 
@@ -217,8 +260,8 @@ def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotat
 
 
 def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold: bool = False) -> Made:
-    """The clip with its soles on the ground, height 0, as recordings are, its feet held where they stand (`hold`), and no point
-    called standing that still moves."""
+    """The clip with its soles on the ground, height 0, as recordings are, its feet held where they stand (`hold`), and no
+    point called standing that still moves."""
     standing = contacts.points(motion) if standing is None else standing
     motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, contacts.ground_height(motion)])
     if hold:
