@@ -1,7 +1,7 @@
 """Key moments: which clips carry the asked words at their key frame, and what is nearest where none does.
 
-"The library has a key moment when one clip's key frame, or its mirror's, carries all of its words" (../shared/contract.md);
-words of a branch of the vocabulary may be left out, so carrying is being a subset.
+"The library has a key moment when one clip's key frame, or its mirror's, carries all of its words"
+(../shared/contract.md); words of a branch of the vocabulary may be left out, so carrying is being a subset.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Key:
 
 
 def keys_of(clips) -> tuple[Key, ...]:
-    """Key moments of all clips, in their order. A key's words are its row's and those of every other row that covers its
-    frame, but for their sides: a kick with the right foot while the body turns left is no kick left."""
+    """Key moments of all clips, in their order. A key's words are its row's and those of every other row that covers
+    its frame, but for their sides: a kick with the right foot while the body turns left is no kick left."""
     found = []
     for index, clip in enumerate(clips):
         for row in clip.annotations:
@@ -56,9 +56,9 @@ def serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
 
 
 def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
-    """The keys whose words come nearest to `words`: most shared words, then fewest extra; none where the action itself is
-    not shared (a kick is no answer to a slide, and a right kick none to a right header), except that a foot on the ball
-    stands for a foot on the ball, and a dive for a dive."""
+    """The keys whose words come nearest to `words`: most shared words, then fewest extra; none where the action
+    itself is not shared (a kick is no answer to a slide, and a right kick none to a right header), except that a foot
+    on the ball stands for a foot on the ball, and a dive for a dive."""
     wanted = frozenset(words)
     actions = _actions(wanted) | (wanted & _SAME_MOVE)
     near = [key for key in keys if actions & key.words or _same_contact(wanted, key.words)]
@@ -67,7 +67,8 @@ def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
 
 
 def _actions(words: frozenset[str]) -> frozenset[str]:
-    """The words that say what is done, not which side, at which pace: roots of App. A, else what is not a mere colour."""
+    """The words that say what is done, not which side, at which pace: roots of App. A, else what is not a mere
+    colour."""
     return words & DISCRETE or words - CONTINUOUS - VOCABULARY["modifier"].keys() or words
 
 
@@ -77,8 +78,8 @@ def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
 
 
 def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...], words) -> tuple[Key, ...]:
-    """The made key moments that may stand in for `choices`, recorded ones that answer to `words`: the same act of the same
-    side, with all of the words by which a recorded one answers."""
+    """The made key moments that may stand in for `choices`, recorded ones that answer to `words`: the same act of the
+    same side, with all of the words by which a recorded one answers."""
     wanted = frozenset(words)
     met = {(_act(one), wanted & one.words) for one in choices}
     return tuple(key for key in made if any(act == _act(key) and asked <= key.words for act, asked in met))

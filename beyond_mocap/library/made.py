@@ -109,7 +109,8 @@ def kick_speed(frames: Frames, clips: Sequence, keys: Sequence) -> float:
 def made_clips(
     clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
 ) -> Iterator[Made]:
-    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with key moments `keys`.
+    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with key moments
+    `keys`.
 
     gait_speeds: m/s of the recorded gaits. Names begin with MADE_FOLDER: they are kept beside the cache."""
     speeds = {**{word: v for word, v in _USUAL.items() if v > max(gait_speeds.values())}, **gait_speeds}
@@ -234,16 +235,16 @@ def _runs(low: float, high: float, example: Motion, style: GaitStyle, speeds: di
 
 
 def _kicks(recorded: float, keys: Sequence, example: Motion, speeds: dict[str, float]) -> Iterator[Made]:
-    """Kicks with the right foot on the run, from what recorded ones reach to a sprint, of the kinds that are recorded."""
+    """Kicks with the right foot on the run, from what recorded ones reach to a sprint, of the kinds that are
+    recorded."""
     words = [key.words for key in keys if "kick" in key.words]
     kinds = sorted({"inside" if "inside" in found else "top" for found in words})
     speed = _KICK_STEP * recorded
     while speed < FASTEST:
         for kind in kinds:
             made = gestures.strike(f"kick low {kind}", example.skeleton, FPS, example=example, at_speed=speed)
-            row = ClipAnnotation(
-                np.ceil(made.start * FPS), np.floor(made.end * FPS), made.key * FPS, ("kick", "right", "low", kind, "running", "front")
-            )
+            words = ("kick", "right", "low", kind, "running", "front")
+            row = ClipAnnotation(np.ceil(made.start * FPS), np.floor(made.end * FPS), made.key * FPS, words)
             gait_row = _gait_rows(np.full(len(made.motion), speed), speeds)
             yield _grounded(f"{MADE_FOLDER}{KICKED}{kind}_{speed:.1f}.bvh", made.motion, None, (row, *gait_row))
         speed *= _KICK_STEP
@@ -260,8 +261,8 @@ def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotat
 
 
 def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold: bool = False) -> Made:
-    """The clip with its soles on the ground, height 0, as recordings are, its feet held where they stand (`hold`), and no
-    point called standing that still moves."""
+    """The clip with its soles on the ground, height 0, as recordings are, its feet held where they stand (`hold`),
+    and no point called standing that still moves."""
     standing = contacts.points(motion) if standing is None else standing
     motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, contacts.ground_height(motion)])
     if hold:

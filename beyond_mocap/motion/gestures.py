@@ -1,9 +1,10 @@
 """Made touches of the ball on the run: kicks, a trap, a dribble.
 
-Each is the gait's own posture with key poses laid over it, given as tables over seconds from the key moment (the touch).
-Instants, foot speeds and ranges of the instep kick follow Nunome, Asai, Ikegami and Sakurai 2002 (Med Sci Sports Exerc
-34) and Lees, Asai, Andersen, Nunome and Sterzing 2010 (J Sports Sci 28): backswing to 100 degrees of knee flexion,
-impact with the knee near 45 and opening, support foot down a fifth of a second before, the opposite arm flung out.
+Each is the gait's own posture with key poses laid over it, given as tables over seconds from the key moment (the
+touch). Instants, foot speeds and ranges of the instep kick follow Nunome, Asai, Ikegami and Sakurai 2002 (Med Sci
+Sports Exerc 34) and Lees, Asai, Andersen, Nunome and Sterzing 2010 (J Sports Sci 28): backswing to 100 degrees of
+knee flexion, impact with the knee near 45 and opening, support foot down a fifth of a second before, the opposite arm
+flung out.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ LEFT, RIGHT = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class Gesture:
-    """A made move. motion; key: seconds of the key moment (None for continuous moves); start, end: seconds of the move."""
+    """A made move. motion; key: seconds of the key moment (None for continuous moves); start, end: seconds of the
+    move."""
 
     motion: Motion
     key: float | None
@@ -160,8 +162,8 @@ def strike(
 
 
 def _on_the_run(recipe: Strike, speed: float) -> Strike:
-    """The same strike in a run at `speed` m/s: the steps keep their rhythm, arms and trunk swing out less, and the touch
-    falls into the middle of the standing foot's short stance."""
+    """The same strike in a run at `speed` m/s: the steps keep their rhythm, arms and trunk swing out less, and the
+    touch falls into the middle of the standing foot's short stance."""
     share = float(smooth_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
     duty = float(tables.at_speed("duty", speed))
     at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
@@ -175,7 +177,8 @@ def _on_the_run(recipe: Strike, speed: float) -> Strike:
 
 
 def _in_step(course: Course, key: float, recipe: Strike) -> Course:
-    """The course with a cadence that dips around the touch, and a phase at which the right foot is in its swing there."""
+    """The course with a cadence that dips around the touch, and a phase at which the right foot is in its swing
+    there."""
     rate = np.gradient(course.phase, course.times)
     dip = 1.0 - (1.0 - recipe.pace) * np.exp(-(((course.times - key - 0.1) / 0.33) ** 2))
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate * dip)[1:] + 0.5 * (rate * dip)[:-1])])

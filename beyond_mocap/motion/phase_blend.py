@@ -1,10 +1,10 @@
 """Locomotion between two recorded speeds, blended from both in phase (Faustino §6.2).
 
-Two recordings of steady locomotion are laid side by side step by step: every landing of a foot is a whole (left) or half
-(right) stride, so that at the same phase both bodies do the same thing. Joint rotations, the pelvis's height and sway are
-then mixed; so is the way travelled *per stride*, while a stride's duration is mixed in the logarithm: a foot that stands
-still in both recordings then hardly slides in the mixture. (Park, Shin and Shin 2002, "On-line locomotion generation based
-on motion blending", mix parameterized recordings in this manner.)
+Two recordings of steady locomotion are laid side by side step by step: every landing of a foot is a whole (left) or
+half (right) stride, so that at the same phase both bodies do the same thing. Joint rotations, the pelvis's height and
+sway are then mixed; so is the way travelled *per stride*, while a stride's duration is mixed in the logarithm: a foot
+that stands still in both recordings then hardly slides in the mixture. (Park, Shin and Shin 2002, "On-line locomotion
+generation based on motion blending", mix parameterized recordings in this manner.)
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _LEFT, _RIGHT = 0, 1
 class Strides:
     """A stretch of steady locomotion that begins and ends with a landing.
 
-    motion: T frames. landings (K,): fractional frames at which feet land in turn, the first one's side in `first` (0 left,
-    1 right). standing (T, 2, 2) bool: left and right, heel and toe on the ground. facing (T,) radians; path (T, 2) m: the
-    pelvis's way without its sway."""
+    motion: T frames. landings (K,): fractional frames at which feet land in turn, the first one's side in `first` (0
+    left, 1 right). standing (T, 2, 2) bool: left and right, heel and toe on the ground. facing (T,) radians; path (T,
+    2) m: the pelvis's way without its sway."""
 
     motion: Motion
     landings: np.ndarray
@@ -66,7 +66,8 @@ class Strides:
 
 
 def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
-    """The longest stretch of `motion` in which feet land in turn, by `standing` (T, 2, 2); None with less than two steps."""
+    """The longest stretch of `motion` in which feet land in turn, by `standing` (T, 2, 2); None with less than two
+    steps."""
     sides, frames = _landings(standing, motion.fps)
     edges = np.flatnonzero(np.diff(sides) == 0) + 1
     first, last = max(zip([0, *edges], [*edges, len(sides)]), key=lambda run: run[1] - run[0])
@@ -131,8 +132,9 @@ def _weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
 
 
 def _sampled(one: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarray]:
-    """A recording at `phase` (T,) steps: pose (T, J, 4) relative to facing, height (T,), sway (T, 2) in the facing frame,
-    turn (T,) radians and way (T, 2) metres per step, and how far inside a stance each point is (T, 2, 2) steps."""
+    """A recording at `phase` (T,) steps: pose (T, J, 4) relative to facing, height (T,), sway (T, 2) in the facing
+    frame, turn (T,) radians and way (T, 2) metres per step, and how far inside a stance each point is (T, 2, 2)
+    steps."""
     curve = PchipInterpolator(np.arange(steps + 1.0), one.landings[: steps + 1])
     frames, pace = curve(phase), curve.derivative()(phase)
     root, pose = at_frames(one.motion, frames)

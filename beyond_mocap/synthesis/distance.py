@@ -82,8 +82,8 @@ def _fixed(search: BlockSearch, sections: list[Section]) -> list[int]:
 
 
 def _own_distance(library: Library, source: EditList) -> np.ndarray:
-    """(M,) metres that the clips travel up to each frame of `source`; nothing is travelled across a seam but what the frame
-    before it would have gone on to do."""
+    """(M,) metres that the clips travel up to each frame of `source`; nothing is travelled across a seam but what the
+    frame before it would have gone on to do."""
     frames = library.frames
     first, last = frames.first[source.clip], frames.first[source.clip] + frames.count[source.clip] - 1
     at = np.clip(np.round(source.frame).astype(int), first, last)
@@ -106,11 +106,12 @@ def _played(section: Section, own: np.ndarray, asked: np.ndarray, so_far: float,
 
 
 def _read_through(source: EditList, piece: np.ndarray, place: np.ndarray, keys) -> EditList:
-    """What is shown when frames `place` (T,) of `source` are played; pieces stay apart, and one that shows a frame twice
-    does not go back for it."""
+    """What is shown when frames `place` (T,) of `source` are played; pieces stay apart, and one that shows a frame
+    twice does not go back for it."""
     nearest = np.clip(np.floor(place + 1e-6).astype(int), 0, len(source) - 1)
     after = np.minimum(nearest + 1, len(source) - 1)
-    step = np.where((piece[after] == piece[nearest]) & (after > nearest), source.frame[after] - source.frame[nearest], 1.0)
+    together = (piece[after] == piece[nearest]) & (after > nearest)
+    step = np.where(together, source.frame[after] - source.frame[nearest], 1.0)
     frame = source.frame[nearest] + step * (place - nearest)
     seams = np.flatnonzero(np.diff(piece[nearest]) != 0) + 1
     return EditList(source.clip[nearest], frame, seams, keys)

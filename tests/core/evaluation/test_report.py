@@ -213,7 +213,7 @@ def test_files_score_as_the_take_in_memory(cut, track_of, still_ball, library, t
     track = track_of(take)
     read = evaluate_played(played, track=track, timeline=take.timeline, library=library)
     made = evaluate(take, track, library)
-    for report in (read, made):  # every stride of a steady made run has the jerk of the p95 itself: the last bits decide
+    for report in (read, made):  # all strides of a steady made run have the p95 jerk itself: the last bits decide
         del report["seam_jerk_ratio"]["rest_share_above_real"]
     for name in (*CONTRACT, "keys", "loop_share", "pose_realism", "pelvis_surge_ratio"):
         if name != "seconds":
