@@ -1,5 +1,9 @@
 """A part of the body carried elsewhere: a foot or hand by its limb, head or chest by the spine, the rest as it was.
 
+A limb is swung about its upper joint and bends or straightens by a share of the way to the least or largest angle of its
+knee or elbow. A shift of the foot in space, the same at every frame, would ask for more than the leg's length where the
+recording stretches it, and the knee would snap straight.
+
 What is applied is the difference between reaching for the new place and reaching for the old one, so that a shift of
 zero changes nothing at all, however straight the limb is.
 """
@@ -20,6 +24,13 @@ from .reach import two_bone
 MOST_BEND = {"head": 0.6, "chest": 0.35}
 """Radians that the whole spine bends at most."""
 
+LEAST_ANGLE, MOST_ANGLE = np.radians(35.0), np.radians(170.0)
+"""Radians inside a knee or elbow that a carried limb has at least and at most, unless the recording has less or more."""
+
+MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}
+"""Radians that the whole limb turns about its hip or shoulder at most."""
+
+SOFT = 0.003
 _DAMPING = 1e-3
 
 
@@ -64,11 +75,56 @@ class Resting:
     world: dict[int, np.ndarray]
 
     @classmethod
-    def of(cls, body: Body, chain: tuple[int, int, int], soft: float = 0.01) -> "Resting":
+    def of(cls, body: Body, chain: tuple[int, int, int], soft: float = SOFT) -> "Resting":
         """The limb of a body."""
         end = body.places[:, chain[2]]
         still = two_bone(body.skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
         return cls(chain, soft, _limb_world(body, still, chain))
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """How a limb goes elsewhere. turn (3,) rad: rotation vector about the upper joint. bend: share of the way to the
+    middle joint's largest angle, or, negative, to its least. lowered: m by which the upper joint sinks."""
+
+    turn: np.ndarray
+    bend: float
+    lowered: float = 0.0
+
+
+def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray, most: float, lowered=0.0) -> Swing:
+    """The swing that brings the limb's end to `place` (3,) m at frame `at`, or as near as MOST_ANGLE, LEAST_ANGLE and a turn
+    of `most` rad let it."""
+    top, middle, end = body.places[at, list(chain)]
+    old, new = end - top, place - top + [0.0, 0.0, lowered]
+    turn = quaternion.to_rotation_vector(quaternion.between(old[None], new[None]))[0]
+    turn *= min(1.0, most / max(np.linalg.norm(turn), 1e-9))
+    bones = np.linalg.norm(middle - top), np.linalg.norm(end - middle)
+    own, wanted = (_inside(*bones, np.linalg.norm(line)) for line in (old, new))
+    limit = MOST_ANGLE if wanted > own else LEAST_ANGLE
+    left = limit - own
+    return Swing(turn, 0.0 if left * (wanted - own) <= 0.0 else min((wanted - own) / left, 1.0) * np.sign(left), lowered)
+
+
+def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarray) -> np.ndarray:
+    """(W, 3) m by which the limb's end moves, with a share (W,) of a swing at each frame. What bends less than the limit
+    at one frame bends less at all, so that the knee's speed stays that of the recording."""
+    top, middle, end = (body.places[:, joint] for joint in chain)
+    line = end - top
+    length = np.linalg.norm(line, axis=1)
+    bones = np.linalg.norm(middle - top, axis=1), np.linalg.norm(end - middle, axis=1)
+    own = _inside(*bones, length)
+    left = np.maximum(MOST_ANGLE - own, 0.0) if swing.bend > 0.0 else np.minimum(LEAST_ANGLE - own, 0.0)
+    angle = own + share * abs(swing.bend) * left
+    reach = np.sqrt(bones[0] ** 2 + bones[1] ** 2 - 2.0 * bones[0] * bones[1] * np.cos(angle))
+    turned = quaternion.rotate(quaternion.from_rotation_vector(share[:, None] * swing.turn), line)
+    moves = turned * (reach / length)[:, None] - line - share[:, None] * [0.0, 0.0, swing.lowered]
+    return np.where(share[:, None] > 0.0, moves, 0.0)
+
+
+def _inside(upper, lower, length):
+    """Angle (...,) rad between two bones whose ends are `length` (...,) m apart."""
+    return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
 
 
 def limb_carried(

@@ -3,7 +3,7 @@ path."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,11 @@ BALL_SECONDS = 0.3
 
 _SLACK = 0.06  # metres that the ball may be above or below where the part would strike it squarely
 _ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])
-_ANGLE_COST = 0.08  # metres of moved foot that a radian off the part's own direction is worth
-_INSIDE_COST = 5.0  # and a metre of ball within the other foot
+_ALONG = (0.5, 0.2, 0.8)
+_ANGLE_COST = 0.08  # metres of moved foot that a radian off the part's own direction is worth,
+_ALONG_COST = 0.1  # that the other end of the foot is,
+_INSIDE_COST = 5.0  # a metre of ball within the other leg,
+_MISS_COST = 3.0  # and a metre that the part cannot be moved
 _GRAVITY = 9.81
 
 Line = tuple[np.ndarray, np.ndarray]
@@ -32,58 +35,84 @@ class Room:
 
 
 @dataclass(frozen=True, eq=False)
+class Aim:
+    """Where a part strikes. direction (3,) level, unit: from part to ball. along: share of the way from the start of the
+    part's line (the ankle) to its end (the toes)."""
+
+    direction: np.ndarray
+    along: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
 class Meeting:
-    """ball (3,) m: its centre, moved. need (3,) m: what the part has to move to touch it. direction (3,): from part to
-    ball."""
+    """ball (N, 3) m: its centre, moved. need (N, 3) m: what the part has to move to touch it."""
 
     ball: np.ndarray
     need: np.ndarray
-    direction: np.ndarray
 
 
-def best_meeting(
-    line: Line, radius: float, direction: np.ndarray, rise: float, ball: np.ndarray, room: Room, avoid: Sequence[tuple]
-) -> Meeting:
-    """The meeting that asks least of the body, of those within 60 degrees of `direction`.
+def best_aim(
+    line: Line,
+    radius: float,
+    direction: np.ndarray,
+    rise: float,
+    ball: np.ndarray,
+    room: Room,
+    avoid: Sequence[tuple[Line, float]],
+    possible: Callable[[np.ndarray], np.ndarray],
+) -> Aim:
+    """The aim that asks least of the body, of those within 60 degrees of `direction`: inside, instep, outside.
 
     line: ends (3,) m of the part's line, radius its own, m; direction (3,) level, unit: where the part strikes; rise:
     sine of the ball's elevation as seen from the part; ball (3,) m as measured; avoid: (line, radius) that it may not
-    lie in.
+    lie in; possible: of a move (3,) m of the part, what the body can make of it.
     """
-    def cost(angle: float) -> tuple[float, Meeting]:
-        found = meeting(line, radius, _turned(direction, angle), rise, ball, room)
-        inside = sum(max(0.0, -float(ball_gap(other, own, found.ball))) for other, own in avoid)
-        return np.linalg.norm(found.need) + _ANGLE_COST * abs(angle) + _INSIDE_COST * inside, found
+    aims = [Aim(_turned(direction, angle), along) for angle in _ANGLES for along in _ALONG[: 1 if rise else None]]
+    found = meetings(line, radius, aims, rise, ball, room)
+    least = np.linalg.norm(found.need, axis=1)
+    least += _ANGLE_COST * np.abs(np.repeat(_ANGLES, len(aims) // len(_ANGLES)))
+    least += _ALONG_COST * np.abs([aim.along - 0.5 for aim in aims])
+    for other, own in avoid:
+        least += _INSIDE_COST * np.maximum(-ball_gap(other, own, found.ball), 0.0)
+    best, cost = aims[0], np.inf
+    for number in np.argsort(least, kind="stable"):
+        if least[number] >= cost:
+            break
+        need = found.need[number]
+        whole = least[number] + _MISS_COST * float(np.linalg.norm(need - possible(need)))
+        best, cost = (aims[number], whole) if whole < cost else (best, cost)
+    return best
 
-    return min((cost(angle) for angle in _ANGLES), key=lambda pair: pair[0])[1]
 
-
-def meeting(line: Line, radius: float, direction: np.ndarray, rise: float, ball: np.ndarray, room: Room) -> Meeting:
-    """Ball and part meet with the ball in `direction` (3,) of the part: the ball moves as far as it may, the part the
-    rest."""
-    middle = 0.5 * (line[0] + line[1])
+def meetings(line: Line, radius: float, aims: Sequence[Aim], rise: float, ball: np.ndarray, room: Room) -> Meeting:
+    """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may, the part the rest."""
+    along = np.array([aim.along for aim in aims])[:, None]
+    start = line[0] + along * (line[1] - line[0])
     above = rise * (radius + BALL_RADIUS)
-    height = np.clip(middle[2] + above, ball[2] - room.upright, ball[2] + room.upright)
-    height = max(height, BALL_RADIUS)
-    lift = (height - middle[2] - above) - np.clip(height - middle[2] - above, -_SLACK, _SLACK)
-    raised = line[0] + [0.0, 0.0, lift], line[1] + [0.0, 0.0, lift]
-    touching = _touching(raised, radius, np.array([*middle[:2], height]), direction)
-    level = np.sqrt(max(room.whole**2 - (height - ball[2]) ** 2, 0.0))
-    away = touching[:2] - ball[:2]
-    way = away * min(1.0, level / max(np.linalg.norm(away), 1e-12))
-    place = np.array([*(ball[:2] + way), height])
-    return Meeting(place, place - touching + [0.0, 0.0, lift], direction)
+    height = np.clip(start[:, 2] + above, ball[2] - room.upright, ball[2] + room.upright)
+    height = np.maximum(height, BALL_RADIUS)
+    lift = height - start[:, 2] - above
+    lift = np.stack([0.0 * lift, 0.0 * lift, lift - np.clip(lift, -_SLACK, _SLACK)], axis=1)
+    raised = tuple((end + lift)[:, None] for end in line)
+    start[:, 2] = height
+    touching = _touching(raised, radius, start, np.array([aim.direction for aim in aims]))
+    level = np.sqrt(np.maximum(room.whole**2 - (height - ball[2]) ** 2, 0.0))
+    away = touching[:, :2] - ball[:2]
+    way = away * np.minimum(1.0, level / np.maximum(np.linalg.norm(away, axis=1), 1e-12))[:, None]
+    places = np.concatenate([ball[:2] + way, height[:, None]], axis=1)
+    return Meeting(places, places - touching + lift)
 
 
 def _touching(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """The centre (3,) of a ball that touches the surface, on the ray from `start`, which is inside it, along
-    `direction`; searched on ever finer grids, to some micrometres within a metre."""
-    near, step = 0.0, 1.0
+    """The centres (N, 3) of balls that touch surfaces with lines (N, 1, 3), on the rays from `start` (N, 3), which is
+    inside, along `direction` (N, 3); searched on ever finer grids, to some micrometres within a metre."""
+    near, step = np.zeros(len(start)), 1.0
     for _ in range(3):
-        ways = near + step * np.linspace(0.0, 1.0, 65)
-        outside = ball_gap(line, radius, start + ways[:, None] * direction) >= 0.0
-        near, step = ways[max(int(np.argmax(outside)) - 1, 0)], step / 64
-    return start + (near + step) * direction
+        ways = near[:, None] + step * np.linspace(0.0, 1.0, 65)
+        outside = ball_gap(line, radius, start[:, None] + ways[..., None] * direction[:, None]) >= 0.0
+        first = np.maximum(np.argmax(outside, axis=1) - 1, 0)
+        near, step = near + first * step / 64, step / 64
+    return start + (near + step)[:, None] * direction
 
 
 def held_meeting(hands: Sequence[Line], radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:

@@ -18,13 +18,13 @@ from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.striking import Surface, ball_gap, by_both_hands, contact_gap, met_within, surfaces
 from ..motion.track import BALL_RADIUS
-from .carry import Body, Resting, arm, leg, limb_carried, spine_bent
-from .meeting import Room, best_meeting, eased, held_meeting, lofted, meeting, shifted
+from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
+from .meeting import Aim, Room, best_aim, eased, held_meeting, lofted, meetings, shifted
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from where it was measured, and where the feed has filled it in."""
 
-MOST_MOVED = {"foot": 0.25, "hand": 0.4, "head": 0.2, "chest": 0.12}
+MOST_MOVED = {"foot": 0.35, "hand": 0.4, "head": 0.2, "chest": 0.12}
 """Metres that a part may be moved from where the recording has it."""
 
 PELVIS_RANGE = (0.20, 0.64)
@@ -37,8 +37,7 @@ OUT_OF_REACH = 0.25
 MOST_DROP = 0.04
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
-_FULL_REACH = 0.99
-_SOLE = 0.02  # metres of the lowest foot joint above the ground
+_SOLE, _ROUNDING = 0.02, 0.03  # metres of the lowest foot joint above the ground, and over which it nears that
 _IN_THE_AIR = 0.2
 _HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
 _STOPPING = {"receive", "trap", "catch", "catchb"}
@@ -112,7 +111,7 @@ def strike(
         scene = _scene(body, moment, span.start, contacts[span], path, measured, height_known, fps)
         struck, moved[number] = _reached(scene, body)
         root[span], rotations[span] = struck.root, struck.rotations
-        places = [_ball_and_needs(scene, struck, frame)[0] for frame in moment.held]
+        places = [scene.ball_and_needs(scene.lines(struck, frame), frame)[0] for frame in moment.held]
         path = shifted(scene.ball, moment.held, np.array(places), moment.bounds, fps)
     gap, shift = _told(skeleton, root, rotations, feed, path, touches)
     return Struck(root, rotations, path, gap, shift, moved)
@@ -174,7 +173,7 @@ def _held(frame: float, count: int) -> tuple[int, int]:
 @dataclass(frozen=True, eq=False)
 class _Scene:
     """What a touch is played with: the parts, each with the share (W,) of its shift per frame; the ball's path (T, 3)
-    and whether it is measured (T,); the side (3,) of the part on which the ball is; `origin`, the first of the body's W
+    and whether it is measured (T,); the side of the part on which the ball is; `origin`, the first of the body's W
     frames."""
 
     moment: _Moment
@@ -182,13 +181,26 @@ class _Scene:
     shares: tuple[np.ndarray, ...]
     ball: np.ndarray
     measured: np.ndarray
-    direction: np.ndarray
+    aim: Aim
     origin: int
 
     @property
     def at(self) -> int:
         """The moment among the body's frames."""
         return self.moment.frame - self.origin
+
+    def lines(self, body: Body, frame: int) -> np.ndarray:
+        """(P, 2, 3) m: both ends of every part's line."""
+        return np.array([body.line(part, frame - self.origin) for part in self.parts])
+
+    def ball_and_needs(self, lines: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Where the ball goes (3,) m at a frame, and what each part with lines (P, 2, 3) m then lacks (P, 3) m to touch
+        it."""
+        part, ball, room = self.parts[0], self.ball[frame], self.room(frame)
+        if len(lines) == 2:
+            return held_meeting(lines, part.radius, ball, room)
+        met = meetings(lines[0], part.radius, [self.aim], _RISE[part.part], ball, room)
+        return met.ball[0], met.need
 
     def room(self, frame: int) -> Room:
         """How far the ball may move; one on the ground stays there."""
@@ -209,12 +221,21 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
         path = lofted(path, moment.frame, float(height), ~height_known, fps)
     ahead = _direction(body, parts[0], moment, at, path, fps)
-    scene = _Scene(moment, parts, shares, path, measured, ahead, origin)
-    others = [p for p in surfaces(body.skeleton, {"foot"}) if p.side != parts[0].side]
-    avoid = [(body.line(other, at), other.radius) for other in others] if parts[0].part == "foot" else []
-    rise, ball = _RISE[parts[0].part], path[moment.frame]
-    best = best_meeting(line, radius, ahead, rise, ball, scene.room(moment.frame), avoid)
-    return replace(scene, direction=best.direction)
+    scene = _Scene(moment, parts, shares, path, measured, Aim(ahead), origin)
+    if parts[0].part == "hand":
+        return scene
+    rise, ball, room = _RISE[parts[0].part], path[moment.frame], scene.room(moment.frame)
+    avoid = _other_leg(body, parts[0], at) if parts[0].part == "foot" else []
+    return replace(
+        scene, aim=best_aim(line, radius, ahead, rise, ball, room, avoid, lambda need: _bounded(body, parts[0], at, need))
+    )
+
+
+def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
+    """Line and radius of the foot and the shin that do not strike."""
+    other = next(part for part in surfaces(body.skeleton, {"foot"}) if part.side != foot.side)
+    knee, ankle = body.places[at, list(_chain(body, other)[1:])]
+    return [(body.line(other, at), other.radius), ((knee, ankle), other.radius)]
 
 
 def _together(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:
@@ -294,65 +315,91 @@ def _unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
 def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
     """The body with its parts at the ball, as far as they reach, and how far they were moved, m.
 
-    What the parts lack and what the body makes of it are worked out in turns, since a nearly straight limb gives way
+    What is asked for and what the body makes of it are worked out in turns, since a nearly straight limb gives way
     softly and a spine bends on an arc.
     """
-    shifts, struck, limbs = [np.zeros(3) for _ in scene.parts], body, []
-    for turn in range(_ROUNDS):
-        _, needs = _ball_and_needs(scene, struck, scene.moment.frame)
+    own = scene.lines(body, scene.moment.frame)
+    if np.linalg.norm(scene.ball_and_needs(own, scene.moment.frame)[1]) < _CLOSE:
+        return body, 0.0
+    limbs, shifts, struck, lines = _carriers(body, scene.parts), np.zeros((len(scene.parts), 3)), body, own
+    for _ in range(_ROUNDS):
+        wished = _wished(scene, body, lines, shifts)
+        if np.linalg.norm(wished - shifts) < _CLOSE:
+            break
+        struck, shifts = _moved(scene, body, limbs, wished), wished
+        lines = scene.lines(struck, scene.moment.frame)
+    if np.linalg.norm(scene.ball_and_needs(lines, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
+        return body, 0.0
+    moved = np.linalg.norm(np.mean(lines, axis=1) - np.mean(own, axis=1), axis=1).max()
+    return _other_foot_kept(body, struck, scene.parts[0]), float(moved)
+
+
+def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+    """Shifts (P, 3) m that bring parts to the ball which are at `lines` (P, 2, 3) m by `shifts` (P, 3) m, as far as a body
+    can make them."""
+    wished = shifts
+    for _ in range(_ROUNDS):
+        _, needs = scene.ball_and_needs(lines + (wished - shifts)[:, None], scene.moment.frame)
         if np.linalg.norm(needs) < _CLOSE:
             break
-        limbs = limbs if turn else _carriers(body, scene.parts)
-        shifts = [_bounded(body, part, scene.at, s + need) for part, s, need in zip(scene.parts, shifts, needs)]
-        struck = _moved(scene, body, limbs, shifts)
-    if np.linalg.norm(_ball_and_needs(scene, struck, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
-        return body, 0.0
-    before, after = (np.array([np.mean(b.line(p, scene.at), axis=0) for p in scene.parts]) for b in (body, struck))
-    return _other_foot_kept(body, struck, scene.parts[0]), float(np.linalg.norm(after - before, axis=1).max())
-
-
-def _ball_and_needs(scene: _Scene, body: Body, frame: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ball goes (3,) m at a frame, and what each part then lacks (P, 3) m to touch it."""
-    lines = [body.line(part, frame - scene.origin) for part in scene.parts]
-    part, ball, room = scene.parts[0], scene.ball[frame], scene.room(frame)
-    if len(lines) == 2:
-        return held_meeting(lines, part.radius, ball, room)
-    met = meeting(lines[0], part.radius, scene.direction, _RISE[part.part], ball, room)
-    return met.ball, met.need[None]
+        pairs = zip(scene.parts, wished, needs)
+        wished = np.array([_bounded(body, part, scene.at, shift + need) for part, shift, need in pairs])
+    return wished
 
 
 def _bounded(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
-    """A shift (3,) m that a body can make: not too far, and a foot neither below the ground nor beyond its leg."""
+    """A shift (3,) m that a body can make: not too far, and a limb neither below the ground nor beyond its joints."""
     shift = shift * min(1.0, MOST_MOVED[part.part] / max(np.linalg.norm(shift), 1e-9))
-    if part.part != "foot":
-        return shift
-    start, end = body.line(part, at)
-    limb, pelvis = _limb(body, part), body.places[at, identify(body.skeleton).hips]
-    middle = 0.5 * (start + end)
+    if part.part == "foot":
+        shift = _above_ground(body, part, at, _beside_pelvis(body, part, at, shift))
+    if part.part in MOST_SWING and None not in _chain(body, part):
+        shift = swung(body, _chain(body, part), _swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
+    return shift
+
+
+def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
+    pelvis = body.places[at, identify(body.skeleton).hips]
+    middle = np.mean(body.line(part, at), axis=0)
     away = _flat(middle + shift - pelvis)
     own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
     ranged = np.clip(wanted, min(PELVIS_RANGE[0], own), max(PELVIS_RANGE[1], own))
-    shift = shift + away * (ranged / max(wanted, 1e-9) - 1.0)
-    lowest = min(start[2], end[2])
-    shift = np.array([*shift[:2], max(shift[2], min(_SOLE - lowest, 0.0))])
-    hip = body.places[at, limb.upper_leg] - [0.0, 0.0, _drop(body, limb, at, start + shift)]
-    reach = start + shift - hip
-    return shift + reach * (min(1.0, _FULL_REACH * _leg_length(body, limb) / np.linalg.norm(reach)) - 1.0)
+    return shift + away * (ranged / max(wanted, 1e-9) - 1.0)
+
+
+def _above_ground(body: Body, part: Surface, at, shift: np.ndarray) -> np.ndarray:
+    """Shifts (..., 3) m of a foot at frames `at` that does not go through the ground, but where it is there already."""
+    start, end = body.line(part, at)
+    lowest = np.minimum(start[..., 2], end[..., 2])
+    out = shift.copy()
+    least, wish = np.minimum(_SOLE - lowest, 0.0), shift[..., 2]
+    # a maximum without a corner: at its sharpest _ROUNDING is between the two, and nothing where nothing is moved
+    corner = _ROUNDING * np.minimum(1.0, np.linalg.norm(shift, axis=-1) / (2.0 * _ROUNDING))
+    out[..., 2] = 0.5 * (wish + least + np.hypot(wish - least, corner))
+    return out
+
+
+def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
+    """The limb's swing with which the part is moved by `shift` (3,) m; the pelvis sinks where its leg is too short."""
+    chain = _chain(body, part)
+    place = body.places[at, chain[2]] + shift
+    lowered = _drop(body, chain, at, place) if part.part == "foot" else 0.0
+    return swing_to(body, chain, at, place, MOST_SWING[part.part], lowered)
+
+
+def _chain(body: Body, part: Surface) -> tuple[int, int, int]:
+    return leg(_limb(body, part)) if part.part == "foot" else arm(_limb(body, part))
 
 
 def _limb(body: Body, part: Surface) -> Limb:
     return getattr(identify(body.skeleton), part.side)
 
 
-def _leg_length(body: Body, limb: Limb) -> float:
-    hip, knee, ankle = body.places[0, list(leg(limb))]
-    return float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
-
-
-def _drop(body: Body, limb: Limb, at: int, ankle: np.ndarray) -> float:
+def _drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.ndarray) -> float:
     """Metres, at most MOST_DROP, to lower the pelvis so that the leg reaches the place (3,) of its ankle."""
-    hip = body.places[at, limb.upper_leg]
-    length, level = _FULL_REACH * _leg_length(body, limb), np.linalg.norm(_flat(ankle - hip))
+    hip, knee, own = body.places[at, list(chain)]
+    upper, lower = np.linalg.norm(knee - hip), np.linalg.norm(own - knee)
+    length = np.sqrt(upper**2 + lower**2 - 2.0 * upper * lower * np.cos(MOST_ANGLE))
+    length, level = max(length, np.linalg.norm(own - hip)), np.linalg.norm(_flat(ankle - hip))
     return float(np.clip(hip[2] - ankle[2] - np.sqrt(max(length**2 - level**2, 0.0)), 0.0, MOST_DROP))
 
 
@@ -363,19 +410,15 @@ def _carriers(body: Body, parts: Sequence[Surface]) -> list[Resting]:
 
 
 def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: Sequence[np.ndarray]) -> Body:
-    """The body with each part moved by its shift (3,) m, blended by its share. A foot does not go through the ground,
-    and the pelvis sinks where its leg is too short."""
+    """The body with each part moved by its shift (3,) m, blended by its share."""
     part, root, rotations = scene.parts[0], body.root, body.rotations
     if not limbs:
         rotations = spine_bent(body, part, scene.at, shifts[0], scene.shares[0])
-    for limb, shift, share in zip(limbs, shifts, scene.shares):
-        moves = share[:, None] * shift
-        if part.part == "foot":
-            start, end = body.line(part, slice(None))
-            lowest = np.minimum(start[:, 2], end[:, 2])
-            moves[:, 2] = np.maximum(moves[:, 2], np.minimum(_SOLE - lowest, 0.0))
-            drop = _drop(body, _limb(body, part), scene.at, start[scene.at] + shift)
-            root = root - share[:, None] * [0.0, 0.0, drop]
+    for part, limb, shift, share in zip(scene.parts, limbs, shifts, scene.shares):
+        swing = _swing(body, part, scene.at, shift)
+        moves = swung(body, limb.chain, swing, share)
+        moves = _above_ground(body, part, slice(None), moves) if part.part == "foot" else moves
+        root = root - share[:, None] * [0.0, 0.0, swing.lowered]
         rotations = limb_carried(body, limb, moves, root, rotations)
     return Body.posed(body.skeleton, root, rotations)
 

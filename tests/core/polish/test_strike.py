@@ -109,6 +109,32 @@ def test_no_pop(kick):
     assert flight.max() < 35.0  # a shift of 0.3 m within 0.3 s
 
 
+def knee(motion, struck=None):
+    """(T,) degrees inside the right knee."""
+    places, limb = kinematics(motion, struck)[0], identify(motion.skeleton).right
+    up, down = (places[:, joint] - places[:, limb.lower_leg] for joint in (limb.upper_leg, limb.foot))
+    cosine = np.sum(up * down, axis=1) / np.linalg.norm(up, axis=1) / np.linalg.norm(down, axis=1)
+    return np.degrees(np.arccos(cosine))
+
+
+@pytest.mark.parametrize("off", [(0.6, 0.1, 0.0), (0.5, -0.3, 0.0), (-0.5, 0.1, 0.0), (0.4, 0.0, 0.5)])
+def test_the_knee_neither_locks_nor_snaps(kick, off):
+    struck = met(kick, natural_ball(kick) + off, touch(kick))
+    before, after = knee(kick.motion), knee(kick.motion, struck)
+    assert struck.moved[0] > 0.1
+    assert after.max() < max(170.0, before.max()) + 0.5 and after.min() > min(35.0, before.min()) - 0.5
+    assert np.abs(np.diff(after)).max() < 1.2 * np.abs(np.diff(before)).max()
+
+
+def test_a_ball_does_not_lie_in_the_other_leg(kick):
+    body, frame = identify(kick.motion.skeleton), int(round(kick.key * FPS))
+    ankle = kinematics(kick.motion)[0][frame, body.left.foot]
+    struck = met(kick, np.array([*ankle[:2], 0.11]), touch(kick))
+    pose = [values[frame] for values in kinematics(kick.motion, struck)]
+    left, _ = surfaces(kick.motion.skeleton, ("kick",))
+    assert struck.moved[0] > 0.0 and ball_gap(left.line(*pose), left.radius, struck.ball[frame]) > 0.0
+
+
 @pytest.mark.parametrize("off", [(2.0, 0.0), (-1.5, 1.0), (0.0, -3.0)])
 def test_a_ball_out_of_reach_is_told_and_the_body_plays_as_recorded(kick, off):
     struck = met(kick, natural_ball(kick) + [*off, 0.0], touch(kick))
