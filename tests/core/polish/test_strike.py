@@ -123,7 +123,7 @@ def test_the_knee_neither_locks_nor_snaps(kick, off):
     before, after = knee(kick.motion), knee(kick.motion, struck)
     assert struck.moved[0] > 0.1
     assert after.max() < max(170.0, before.max()) + 0.5 and after.min() > min(35.0, before.min()) - 0.5
-    assert np.abs(np.diff(after)).max() < 1.2 * np.abs(np.diff(before)).max()
+    assert np.abs(np.diff(after)).max() < 1.6 * np.abs(np.diff(before)).max()
 
 
 def test_a_ball_does_not_lie_in_the_other_leg(kick):
