@@ -37,8 +37,9 @@ HOLD = 1e6
 """Weight of a shift that is given: so much more than all else that it stays."""
 
 MOST_SHIFT = 0.25
-EASE, SPARE = 0.012, 0.004
-"""Metres below full length from which a leg eases, and which are left of it where it stands (`limb.soft_distance`)."""
+EASE, SPARE, SPARE_ALOFT = 0.012, 0.004, 0.02
+"""Metres below full length from which a leg eases (`limb.soft_distance`), and which are left of it where it stands and in
+the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may be so."""
 
 _EASED_ROUNDS, _SLIDES_FROM = 3, 0.004
 _BEHIND = 3  # frames at 30 per second by which a rise or drop is spread
@@ -279,9 +280,11 @@ def _short(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
 
 
 def _within_reach(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
-    """Goals (T, 3) with those of feet in the air brought as near as the leg is long."""
+    """Goals (T, 3) with those of feet in the air brought as near as the leg is long, or was in the recording."""
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip
     far = np.linalg.norm(reach, axis=1)
-    over = np.maximum(far - foot.length + SPARE, 0.0) * (1.0 - np.minimum(foot.carries, 1.0))
+    own = np.minimum(np.linalg.norm(foot.heel - foot.hip, axis=1), foot.length - SPARE)
+    longest = np.maximum(foot.length - SPARE_ALOFT, own)
+    over = np.maximum(far - longest, 0.0) * (1.0 - np.minimum(foot.carries, 1.0))
     return goal - reach * (over / far)[:, None]
