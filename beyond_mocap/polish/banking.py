@@ -1,8 +1,8 @@
 """Bodies lean into the curves that they run, as far as the recording does not do so yet.
 
-What carries a body round a curve of lateral acceleration a is its lean, a / g to the line from foot to hips; in recordings
-the legs lean by 0.7 to 0.8 of that and the trunk by a quarter. A piece that was recorded in a gentler curve than it plays
-in leans too little by the difference of the two accelerations.
+What carries a body round a curve of lateral acceleration a is its lean, a / g to the line from foot to hips; in
+recordings the legs lean by 0.7 to 0.8 of that and the trunk by a quarter. A piece that was recorded in a gentler curve
+than it plays in leans too little by the difference of the two accelerations.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ _SECONDS = 0.6
 def missing_lean(
     speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, seams: np.ndarray, fps: float
 ) -> np.ndarray:
-    """(T,) a / g, to the left, that the track asks for beyond what the recording had; softly limited so that legs get at
-    most MOST_LEAN, and nothing below SLOW.
+    """(T,) a / g, to the left, that the track asks for beyond what the recording had; softly limited so that legs get
+    at most MOST_LEAN, and nothing below SLOW.
 
-    speed (T,) m/s and direction (T,) in radians of travel on the track; velocity (T, 2) m/s of the recording in its facing
-    frame and turn (T,) radians since the frame before; seams (S,): frames across which a recording's direction says nothing.
+    speed (T,) m/s and direction (T,) in radians of travel on the track; velocity (T, 2) m/s of the recording in its
+    facing frame and turn (T,) radians since the frame before; seams (S,): frames across which a recording's direction
+    says nothing.
     """
     own_speed = np.linalg.norm(velocity, axis=1)
     own_turn = turn + np.diff(np.arctan2(velocity[:, 1], velocity[:, 0]), prepend=np.arctan2(*velocity[:1, ::-1].T))

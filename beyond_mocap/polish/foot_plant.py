@@ -1,12 +1,12 @@
 """Feet held where they stand: each stance's slide is taken out by moving the foot, and the leg follows by two-bone IK.
 
-Which frames are stance is known from the recording and carried along (../shared/metrics.md); here nothing is guessed from
-the motion itself. A stance is not pinned to one point and blended in and out; instead each foot's shift over the ground is
-one smooth curve D(t) that cancels the velocity of the point that carries the foot while it stands and may do anything
-gentle in between: the least squares problem of `shift`, one banded system for the whole motion.
+Which frames are stance is known from the recording and carried along (../shared/metrics.md); here nothing is guessed
+from the motion itself. A stance is not pinned to one point and blended in and out; instead each foot's shift over the
+ground is one smooth curve D(t) that cancels the velocity of the point that carries the foot while it stands and may do
+anything gentle in between: the least squares problem of `shift`, one banded system for the whole motion.
 
-A foot rolls: first the heel carries it, then the toe, on which the heel rises while it is still low and slow. Where a leg
-does not reach, people rise on their toes; so does the foot here, then the pelvis sinks, and then the foot slides.
+A foot rolls: first the heel carries it, then the toe, on which the heel rises while it is still low and slow. Where a
+leg does not reach, people rise on their toes; so does the foot here, then the pelvis sinks, and then the foot slides.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ HOLD = 1e6
 
 MOST_SHIFT = 0.25
 EASE, SPARE, SPARE_ALOFT = 0.012, 0.004, 0.02
-"""Metres below full length from which a leg eases (`limb.soft_distance`), and which are left of it where it stands and in
-the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may be so."""
+"""Metres below full length from which a leg eases (`limb.soft_distance`), and which are left of it where it stands and
+in the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may be so."""
 
 _EASED_ROUNDS, _SLIDES_FROM = 3, 0.004
 _BEHIND = 3  # frames at 30 per second by which a rise or drop is spread
@@ -82,18 +82,24 @@ class _Foot:
 
 
 def plant(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float, sinks: float = MOST_DROP
+    skeleton: Skeleton,
+    root: np.ndarray,
+    rotations: np.ndarray,
+    standing: np.ndarray,
+    fps: float,
+    sinks: float = MOST_DROP,
 ) -> Planted:
     """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn about
-    the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the pelvis is
-    lowered where that is not enough, by at most `sinks` metres.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn
+    about the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the
+    pelvis is lowered where that is not enough, by at most `sinks` metres.
     """
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
-    feet = [_turned(_laid(places, world, limb, standing[:, side]), scale) for side, limb in enumerate((body.left, body.right))]
+    limbs = (body.left, body.right)
+    feet = [_turned(_laid(places, world, limb, standing[:, side]), scale) for side, limb in enumerate(limbs)]
     lifts = [_lift(foot, sole_height(skeleton), scale) for foot in feet]
     firm = [foot.weight for foot in feet]
     for turn in range(_EASED_ROUNDS + 1):
@@ -126,7 +132,7 @@ def _laid(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray)
 
 
 def firmness(stands: np.ndarray) -> np.ndarray:
-    """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, when it is still arriving, else 0.
+    """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, while it arrives, else 0.
     The heel gives way to a toe that stands."""
     padded = np.pad(stands, ((1, 1), (0, 0)), mode="edge")
     inner = stands & padded[:-2] & padded[2:]
@@ -145,7 +151,9 @@ def _turned(foot: _Foot, scale: float) -> _Foot:
     return replace(foot, toe=toe, rotation=quaternion.multiply(spin, foot.rotation), left=left)
 
 
-def _goal(foot: _Foot, weight: np.ndarray, lift: np.ndarray, scale: float, spread: int) -> tuple[np.ndarray, np.ndarray]:
+def _goal(
+    foot: _Foot, weight: np.ndarray, lift: np.ndarray, scale: float, spread: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Where the ankle goes (T, 3) and the foot's world rotation (T, 4)."""
     ground, weight = _held(foot.moves, weight, scale)
     moved = np.column_stack([ground, lift])
@@ -156,7 +164,7 @@ def _goal(foot: _Foot, weight: np.ndarray, lift: np.ndarray, scale: float, sprea
 
 
 def _rise(foot: _Foot, moved: np.ndarray) -> np.ndarray:
-    """(T,) least radians, at most MOST_RISE, by which the heel turns up about the toe so that the leg reaches its ankle.
+    """(T,) least radians, at most MOST_RISE, by which a heel turns up about its toe so that the leg reaches its ankle.
 
     With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K.
     """
@@ -172,8 +180,9 @@ def _rise(foot: _Foot, moved: np.ndarray) -> np.ndarray:
 
 
 def _held(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than MOST_SHIFT are
-    held less firmly, since a foot that slides looks better than a leg torn after it (give-way order, ../shared/metrics.md)."""
+    """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than MOST_SHIFT
+    are held less firmly, since a foot that slides looks better than a leg torn after it (give-way order,
+    ../shared/metrics.md)."""
     ground = shift(velocity, weight, scale)
     for _ in range(4):
         far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
@@ -198,8 +207,8 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
 
     velocity (T - 1, P, K) or, for one point, (T - 1, K): movement per frame of P points; weight (T, P): how firmly each
     point stands. Minimizes sum w |D' + v|^2 + SMOOTH |D'''|^2 + PULL |D|^2 with differences per frame at 30 frames per
-    second; `scale` is 30 over the rate, which keeps the balance at other rates. kept: (T, K) shifts that are given, rows of
-    NaN where D is free.
+    second; `scale` is 30 over the rate, which keeps the balance at other rates. kept: (T, K) shifts that are given,
+    rows of NaN where D is free.
     """
     count = len(weight)
     if velocity.ndim == 2:
@@ -229,8 +238,8 @@ def _add_differences(band: np.ndarray, stencil: np.ndarray, weight: np.ndarray) 
 
 
 def _lift(foot: _Foot, sole: float, scale: float) -> np.ndarray:
-    """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes `sole` m above the ground,
-    and keeps both above it at all times."""
+    """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes `sole` m above the
+    ground, and keeps both above it at all times."""
     heel, toe, weight = foot.heel[:, 2] - sole, foot.toe[:, 2] - sole, np.ceil(foot.weight) * [HEEL_SHARE, 1.0]
     flat = weight.min(axis=1) > 0
     rest = float(np.median((heel - toe)[flat])) if np.any(flat) else float(np.percentile(heel, 5))

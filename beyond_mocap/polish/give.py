@@ -28,9 +28,9 @@ def give(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Metres (T, 2) by which the root moves on the ground, and radians (T,) by which the body turns about it.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; standing (T, 2, 2) bool: heels and toes. With f a point
-    that stands, a its arm from the root and J a quarter turn, minimizes sum GIVE w |r' + t' J a + f'|^2 + STIFF |r''', t'''|^2
-    + STAY |r, t|^2, differences per frame at 30 frames per second: one banded system.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; standing (T, 2, 2) bool: heels and toes. With f a
+    point that stands, a its arm from the root and J a quarter turn, minimizes sum GIVE w |r' + t' J a + f'|^2 + STIFF
+    |r''', t'''|^2 + STAY |r, t|^2, differences per frame at 30 frames per second: one banded system.
     """
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, root, rotations)
@@ -55,7 +55,9 @@ def give(
     return found[:, :2], found[:, _TURN]
 
 
-def _add(band: np.ndarray, right: np.ndarray, stencil: dict[int, np.ndarray], weight: np.ndarray, goal: np.ndarray) -> None:
+def _add(
+    band: np.ndarray, right: np.ndarray, stencil: dict[int, np.ndarray], weight: np.ndarray, goal: np.ndarray
+) -> None:
     """Adds sum_t weight_t (sum_i c_i,t x_{i + UNKNOWNS t} - goal_t)^2 to a symmetric system in lower banded form."""
     def at(row: int) -> slice:
         return slice(row, row + _UNKNOWNS * len(weight), _UNKNOWNS)

@@ -1,7 +1,7 @@
 """The frames of an edit list, fetched from their clips and taken off the ground: poses in their own facing frame.
 
-What is left of a clip's place in the world are differences: how the body sways about its path, how fast it goes in which
-direction as seen from its facing, and how it turns. Whoever lays the motion on the ground decides the rest.
+What is left of a clip's place in the world are differences: how the body sways about its path, how fast it goes in
+which direction as seen from its facing, and how it turns. Whoever lays the motion on the ground decides the rest.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _HELD = 2  # frames for which a clip's end may be held in a fade
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What T output frames show: clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's own
-    rate, piece (T,) of the edit list."""
+    """What T output frames show: clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's
+    own rate, piece (T,) of the edit list."""
 
     clip: np.ndarray
     frame: np.ndarray
@@ -40,9 +40,9 @@ class Footage(Shown):
     """T output frames with what they show.
 
     pose (T, J, 4) local rotations, the root's relative to its facing; height (T,) m of the root; sway (T, 2) m from the
-    clip's path to the root, in the facing frame; velocity (T, 2) m/s of the path as played, in the facing frame; turn (T,)
-    radians of facing since the frame before, 0 at a seam; standing (T, 2, 2) bool of heels and toes. ahead_*: the same for the frame that the
-    piece before would have shown at each seam, (S, ...).
+    clip's path to the root, in the facing frame; velocity (T, 2) m/s of the path as played, in the facing frame; turn
+    (T,) radians of facing since the frame before, 0 at a seam; standing (T, 2, 2) bool of heels and toes. ahead_*: the
+    same for the frame that the piece before would have shown at each seam, (S, ...).
     """
 
     pose: np.ndarray
@@ -87,9 +87,9 @@ def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> F
 class Overlap:
     """What the pieces on both sides of a seam show beyond it, R frames in all.
 
-    at (R,) output frame, no frame twice; through (R,) how far the window around the seam has come there, between 0 and 1;
-    after (R,) bool: behind the seam, where the other piece is the one that ends. pose (R, J, 4), height (R,) m, sway (R, 2)
-    m of the other piece.
+    at (R,) output frame, no frame twice; through (R,) how far the window around the seam has come there, between 0 and
+    1; after (R,) bool: behind the seam, where the other piece is the one that ends. pose (R, J, 4), height (R,) m, sway
+    (R, 2) m of the other piece.
     """
 
     at: np.ndarray
@@ -114,8 +114,8 @@ def overlap(library: Library, footage: Footage, reach: float) -> Overlap:
 
 
 def _around(library: Library, footage: Footage, edges: np.ndarray, reach: float):
-    """Output frames around the seam between two pieces, edges (3,), how far through, whether behind it, and clip and frame
-    that the other piece shows there."""
+    """Output frames around the seam between two pieces, edges (3,), how far through, whether behind it, and clip and
+    frame that the other piece shows there."""
     low, seam, high = (int(edge) for edge in edges)
     clip, frame, frames = footage.clip, footage.frame, library.frames
     ends, begins = clip[seam - 1], clip[seam]

@@ -27,7 +27,8 @@ def test_a_straight_recording_on_a_curve_lacks_all_of_it(radius):
     lean = missing_lean(*curve(5.0, radius), *footage(5.0, np.inf), NO_SEAM, FPS)
     asked = 5.0**2 / radius / 9.81
     limit = MOST_LEAN / LEGS
-    assert np.allclose(lean[15:-15], limit * np.tanh(asked / limit), rtol=0.02) and np.abs(lean).max() < 1.05 * abs(asked)
+    assert np.allclose(lean[15:-15], limit * np.tanh(asked / limit), rtol=0.02)
+    assert np.abs(lean).max() < 1.05 * abs(asked)
 
 
 def test_a_recording_of_the_same_curve_lacks_nothing():
@@ -61,7 +62,8 @@ def test_legs_lean_by_their_share_and_the_trunk_by_less(heading):
         return np.arctan2(up @ across, up[2])
 
     for side in (body.left, body.right):
-        assert tilt(after, side.foot, side.upper_leg) - tilt(places, side.foot, side.upper_leg) == pytest.approx(LEGS * 0.3, abs=0.01)
+        leg = side.foot, side.upper_leg
+        assert tilt(after, *leg) - tilt(places, *leg) == pytest.approx(LEGS * 0.3, abs=0.01)
     low = body.spine[0]
     assert tilt(after, low, body.neck) - tilt(places, low, body.neck) == pytest.approx(TRUNK * 0.3, abs=0.01)
 

@@ -48,7 +48,8 @@ def test_rotations_take_the_short_way_whatever_their_signs():
     for sign in (1.0, -1.0):
         out = faded_rotations(cut, AT, sign * other, WEIGHT)
         turned = np.linalg.norm(quaternion.to_rotation_vector(out[:, 0]), axis=1)
-        wanted = faded_values(np.where(np.arange(COUNT) < SEAM, *angles.T), AT, np.where(AT < SEAM, *angles[AT, ::-1].T), WEIGHT)
+        shown, beyond = np.where(np.arange(COUNT) < SEAM, *angles.T), np.where(AT < SEAM, *angles[AT, ::-1].T)
+        wanted = faded_values(shown, AT, beyond, WEIGHT)
         assert np.allclose(turned, np.abs(wanted), atol=1e-9)
 
 

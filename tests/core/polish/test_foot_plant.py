@@ -96,7 +96,7 @@ def test_a_heel_rises_before_the_pelvis_sinks(walk):
 
 
 def test_a_foot_in_the_air_need_not_be_reached(walk):
-    """Strides twice as long as the legs: no leg is missed while its foot is in the air, and no bone is asked to stretch."""
+    """Strides twice as long as the legs: no leg is missed while its foot is in the air."""
     motion, stands = walk
     _, out = planted(motion, stands, np.outer(np.arange(len(motion)) / 30.0, (2.5, 0.0, 0.0)))
     assert out.miss[~stands.any(axis=2)].max() < 0.005

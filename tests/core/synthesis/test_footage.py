@@ -31,7 +31,8 @@ def test_the_other_piece_goes_on_behind_the_seam_and_began_before_it(library):
     assert np.all(np.diff(over.through) > 0) and 0.0 < over.through[0] and over.through[-1] < 1.0
     for row, at in enumerate(over.at):
         clip, frame = (0, first[0] + 4 + at) if at >= 20 else (1, first[1] + 15 - 20 + at)
-        assert np.allclose(np.abs(np.sum(over.pose[row, 1:] * shown_elsewhere(library, clip, frame), axis=-1)), 1.0, atol=1e-9)
+        same = np.abs(np.sum(over.pose[row, 1:] * shown_elsewhere(library, clip, frame), axis=-1))
+        assert np.allclose(same, 1.0, atol=1e-9)
 
 
 def test_windows_end_in_the_middle_of_a_short_piece(library):
