@@ -171,10 +171,15 @@ class _Update:
         """Output frames (first, end) that are laid out anew: what was searched, where the track moved (T,), and the
         frames over which seams are spread otherwise than before."""
         touched = moved.copy()
-        for first, end in again:
-            touched |= (self.index > first - 1) & (self.index < end)
         old, new = (self._spread(seams) for seams in (self.before.seams, self.shown.seams))
-        for seam, reach in old ^ new:
+        spread = old ^ new
+        for first, end in again:
+            inside = (self.index > first - 1) & (self.index < end)
+            touched |= inside
+            # a seam at either end stays where it was, but what it joins is another
+            low, high = np.flatnonzero(inside)[[0, -1]]
+            spread |= {(seam, reach) for seam, reach in old | new if low <= seam <= high + 1}
+        for seam, reach in spread:
             touched[max(0, int(np.ceil(seam - reach))) : int(np.floor(seam + reach)) + 1] = True
         return stretches(touched, int(round((2 * HAND_OVER + 0.3) * self.plan.fps)))
 

@@ -144,6 +144,19 @@ def test_nothing_shows_where_old_and_new_meet(library, take):
             assert jerk < 1.3 * jerk_before + 200.0 and slide < slide_before + 0.03
 
 
+def test_feet_that_stand_are_on_the_ground(library, take):
+    """Also beside a seam at the end of a stretch, which joins another recording now."""
+    body = identify(library.skeleton)
+    toes = [body.left.toe_or_foot, body.right.toe_or_foot]
+
+    def highest(made):
+        return forward_kinematics(made.motion)[0][:, toes, 2][made.contacts].max()
+
+    for seam in take.seams[(take.seams > 200) & (take.seams < 450)][:4]:
+        plan = replace(take.plan, track=moved(take.plan.track, seam / 30.0 - 3.0, (0.6, 0.3)))
+        assert highest(resynthesize(library, plan, take)) < highest(take) + 0.02
+
+
 def test_the_same_edit_gives_the_same_bits(library, take):
     plan = replace(take.plan, track=moved(take.plan.track, 10.0, (0.3, 0.3)))
     assert not changed(resynthesize(library, plan, take), resynthesize(library, plan, take)).any()
