@@ -16,7 +16,7 @@ import numpy as np
 from . import quaternion
 from .gait_tables import GRAVITY, smooth_step
 from .humanoid import Humanoid, identify
-from .motion import Motion, concatenate, pose_kinematics, resample
+from .motion import Motion, at_frames, concatenate, pose_kinematics, resample
 from .neutral import neutral_stance
 from .resting import arms_above_ground, lowest_root, on_the_side, widened
 from .skeleton import Skeleton
@@ -33,6 +33,7 @@ _FASTEST_TURN = 6.0  # radians per second; faster ones are the end of a filter
 _MIDDLE = 0.25  # of the way from hips to neck: the body's middle, which falls freely
 _LONGEST_FALL = 1.5
 _SETTLING, _LYING_STILL = 0.4, 0.15  # seconds from touching the ground to turning, and from there to getting up
+_STARTING = 0.4  # seconds in which the way up gathers speed
 _FRICTION = 0.13  # seconds in which a sliding body loses two thirds of its speed
 _CUSHION = 0.05  # metres over which the ground takes the fall up
 _RATES = (11.0, 11.0, 7.0)  # per second: in the air, landing, turning over and getting up
@@ -88,11 +89,10 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     down = track.towards(lying, settle, _RATES[1])
     track = track.at(lying, float(settle[-1]), _RATES[1])
     way, up = _nearest_way(ways_up, down[-1], fps)
-    wait = int(_LYING_STILL * fps)
-    rise = np.arange(1, wait + len(up) + 1) / fps
-    shown = np.maximum(np.arange(len(rise)) - wait, 0)
+    wait, shown = int(_LYING_STILL * fps), _shown(len(up), fps)
     turned = _headed_as(up, down[-1])
-    over = track.towards(turned.rotations[shown], rise, _RATES[2])
+    goal = at_frames(turned, shown)
+    over = track.towards(goal[1], np.arange(1, len(shown) + 1) / fps, _RATES[2])
     rotations = np.concatenate([poses[: touched + 1], down, over])
     root = _root(motion, centre, rotations, touched + 1, len(down), turned, shown)
     rotations = arms_above_ground(skeleton, root, rotations, fps)
@@ -104,7 +104,7 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     start = first + 1 + len(down) + wait
     own = ways_up[way]
     begun = _begin(own)
-    frames = begun + np.arange(len(up)) * (_HASTE * own.fps / fps)
+    frames = begun + shown[wait:] * (_HASTE * own.fps / fps)
     return Landed(out, len(motion), first, start, way, np.clip(frames, 0, len(own) - 1))
 
 
@@ -165,6 +165,15 @@ class _Track:
         off = self._off(goal).faded(np.array([seconds]), rate)
         pose = quaternion.multiply(goal, quaternion.from_rotation_vector(off.place[0]))
         return _Track(None, pose, off.speed[0], off.acceleration[0])
+
+
+def _shown(count: int, fps: float) -> np.ndarray:
+    """Fractional frames (R,) of a way up of `count` frames as it is shown: its first for a while, then faster and faster
+    until it plays as it is."""
+    start = _STARTING * fps
+    played = np.arange(int(count + 0.5 * start)) / start
+    frames = start * np.where(played < 1.0, played**3 - 0.5 * played**4, played - 0.5)
+    return np.concatenate([np.zeros(int(_LYING_STILL * fps)), np.minimum(frames, count - 1)])
 
 
 def _trusted(motion: Motion) -> int:
@@ -257,8 +266,8 @@ def _headed_as(way: Motion, lying: np.ndarray) -> Motion:
 
 
 def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up: Motion, shown) -> np.ndarray:
-    """Root (N, 3) m behind the recording. flight, settling: frames of each; up: the way up and the frame of it shown
-    (R,) in what is left."""
+    """Root (N, 3) m behind the recording. flight, settling: frames of each; up: the way up, and the fractional frame of
+    it shown (R,) in what is left."""
     skeleton, body, fps = motion.skeleton, identify(motion.skeleton), motion.fps
     seconds = np.arange(1, len(rotations) + 1) / fps
     middle = _to_middle(skeleton, body, rotations)
@@ -268,10 +277,11 @@ def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up
     free = fall.height(np.minimum(seconds, (flight + settling) / fps)) - middle[:, 2]
     root[:, 2] = _cushioned(free, ground, smooth_step(seconds / 0.15))
     start = flight + settling
-    root[start:, :2] = _carried(root[start - 3 : start, :2], up.root_positions[shown, :2], fps)
+    goal, pose = at_frames(up, shown)
+    root[start:, :2] = _carried(root[start - 3 : start, :2], goal[:, :2], fps)
     way = np.arange(len(shown)) / fps
-    clear = np.maximum(up.root_positions[:, 2] - lowest_root(skeleton, up.rotations, arms=False), 0.0)
-    root[start:, 2] += smooth_step((way - _LYING_STILL) / 0.6) * clear[shown]
+    clear = np.maximum(goal[:, 2] - lowest_root(skeleton, pose, arms=False), 0.0)
+    root[start:, 2] += smooth_step((way - _LYING_STILL) / 0.6) * clear
     return root
 
 
