@@ -98,8 +98,9 @@ def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
 
 def kick_speed(frames: Frames, clips: Sequence, keys: Sequence) -> float:
     """m/s of the fastest approach of a kick among `keys`; infinite where there is none."""
+    speed = frames.speed  # worked out over all frames each time it is asked for
     found = [
-        frames.speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
+        speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
         for key in keys
         if "kick" in key.words and not clips[key.clip].made
     ]
