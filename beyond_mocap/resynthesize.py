@@ -30,6 +30,7 @@ from .polish.meeting import eased
 from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
 from .polish.foot_plant import Planted, plant
 from .polish.smoothing import reaches
+from .polish.strike import Touch
 from .synthesis.balance import balanced
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch, shown
@@ -38,8 +39,8 @@ from .synthesis.path_search import Between, PathSearch
 from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
-    Progress, faced, given, key_result, leaning, met, smoothed, sources_shown, synthesize, touches, with_made_gaits,
-    with_warnings, words_shown,
+    Progress, aimed, faced, given, key_result, leaning, met, smoothed, sources_shown, synthesize, touches, towards_ball,
+    with_made_gaits, with_warnings, words_shown,
 )
 from .take import BallPath, KeyResult, Take
 
@@ -265,10 +266,12 @@ class _Window:
         kept = quaternion.yaw(quaternion.multiply(rotation, quaternion.inverse(smooth.pose[:, 0])))
         kept[~stays] = np.nan
         firm = firmness(smooth.standing, smooth.height, plan.fps)
-        angle = facing(track.direction, track.speed, smooth.velocity, smooth.turn, kept, firm)
+        angle = facing(track.direction, track.speed, smooth.velocity, smooth.turn, kept, firm, aimed(track))
         direction = self._same_way_round(angle, np.unwrap(quaternion.yaw(rotation)))
         if direction is not None:
-            angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept, firm)
+            aim = aimed(replace(track, direction=direction))
+            angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept, firm, aim)
+        angle = angle + (1.0 - self.share) * towards_ball(update.library, track, smooth, angle, self._strikes())
         ground = self._pulled(root_with_sway(track.positions, smooth.sway, angle))
         root = np.concatenate([ground, smooth.height[:, None]], axis=1)
         pose = leaning(update.library, plan, track, smooth, faced(smooth.pose, angle))
@@ -309,10 +312,14 @@ class _Window:
     def met(self, planted: Planted) -> tuple[Planted, np.ndarray]:
         """The same with the ball met at the key moments in the window, and the ball's path (W, 3) m."""
         update = self.update
-        played = touches(update.library, update.plan, update.edit, update.keys)
-        here = [replace(t, frame=t.frame - self.low) for t in played if self.low <= round(t.frame) < self.high]
-        struck = met(update.library, update.plan, self.track, self.footage.standing, planted, here)
+        struck = met(update.library, update.plan, self.track, self.footage.standing, planted, self._strikes())
         return replace(planted, root=struck.root, rotations=struck.rotations), struck.ball
+
+    def _strikes(self) -> list[Touch]:
+        """The touches in the window, their frames counted from its first."""
+        update = self.update
+        played = touches(update.library, update.plan, update.edit, update.keys)
+        return [replace(t, frame=t.frame - self.low) for t in played if self.low <= round(t.frame) < self.high]
 
 
 def _ball_between(new: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -34,6 +34,7 @@ from .polish.cross_fade import faded_rotations, faded_values, share
 from .polish.foot_plant import Planted, plant
 from .polish.give import give
 from .polish.joining import chained_facing, chained_root, torso_corrections
+from .polish.face_ball import turned_to_ball
 from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
 from .polish.smoothing import spread_rotations, spread_values
 from .polish.strike import Struck, Touch, strike
@@ -41,6 +42,7 @@ from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.edit_list import EditList
+from .synthesis.gaze import wanted_offset
 from .synthesis.footage import Footage, Shown, fetch, overlap
 from .synthesis.locomotion import match_distance, travelled_distance
 from .synthesis.path_search import PathSearch
@@ -97,9 +99,10 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry
     keys = tuple(key_result(library, plan, order, edit, footage, number) for number in range(len(order.keys)))
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
-    planted = _polished(library, plan, track, footage, found, index)
+    strikes = touches(library, plan, edit, keys)
+    planted = _polished(library, plan, track, footage, found, index, strikes)
     if plan.method == "path":
-        struck = met(library, plan, track, footage.standing, planted, touches(library, plan, edit, keys))
+        struck = met(library, plan, track, footage.standing, planted, strikes)
         planted, track = replace(planted, root=struck.root, rotations=struck.rotations), replace(track, ball=struck.ball)
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     clock.append(time.perf_counter())
@@ -138,13 +141,13 @@ def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cance
     return Found(*warped_edit(search, match_distance(search, blocks, plan.delta), plan.catch_up))
 
 
-def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index) -> Planted:
+def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index, strikes) -> Planted:
     """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand."""
     smooth = smoothed(library, plan, footage)
     if plan.method == "blocks":
         angle, ground = _chained(library, footage, smooth, track, plan.fps)
     else:
-        angle, ground = _on_track(plan, track, smooth, found, index)
+        angle, ground = _on_track(library, plan, track, smooth, found, index, strikes)
     pose = faced(smooth.pose, angle)
     root = np.concatenate([ground, smooth.height[:, None]], axis=1)
     if plan.method == "path":
@@ -203,11 +206,12 @@ def faced(pose: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return out
 
 
-def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, index):
+def _on_track(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index, strikes):
     """Facing (T,) and root (T, 2): at the track's place at every time, or, by distance, where the track has come as far."""
     if found.travelled is None:
         firm = firmness(footage.standing, footage.height, plan.fps)
-        angle = facing(track.direction, track.speed, footage.velocity, footage.turn, firm=firm)
+        angle = facing(track.direction, track.speed, footage.velocity, footage.turn, firm=firm, aim=aimed(track))
+        angle = angle + towards_ball(library, track, footage, angle, strikes)
         root = root_with_sway(track.positions, footage.sway, angle)
         return angle, pulled_to_track(root, track.raw, plan.fps, plan.root_window)
     travelled = np.interp(index, np.arange(len(found.travelled)), found.travelled)
@@ -215,6 +219,18 @@ def _on_track(plan: Plan, track: SampledTrack, footage: Footage, found: Found, i
     speed = np.abs(np.gradient(travelled)) * plan.fps if len(travelled) > 1 else np.zeros(1)
     angle = facing(direction, speed, footage.velocity, footage.turn)
     return angle, root_with_sway(place, footage.sway, angle)
+
+
+def aimed(track: SampledTrack) -> np.ndarray:
+    """(T,) radians: where a body that stands or goes slowly turns to."""
+    return track.direction + wanted_offset(track)
+
+
+def towards_ball(library: Library, track: SampledTrack, footage: Footage, angle: np.ndarray, strikes: list[Touch]) -> np.ndarray:
+    """(T,) radians by which a body that faces `angle` (T,) turns so that what strikes points at the ball."""
+    ground = root_with_sway(track.positions, footage.sway, angle)
+    root = np.concatenate([ground, footage.height[:, None]], axis=1)
+    return turned_to_ball(library.skeleton, root, faced(footage.pose, angle), track.ball, strikes, track.fps)
 
 
 def touches(library: Library, plan: Plan, edit: EditList, keys: tuple[KeyResult, ...]) -> list[Touch]:

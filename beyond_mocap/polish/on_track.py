@@ -19,6 +19,12 @@ OFF_THE_FEET = 40.0
 _FLIGHT_SECONDS = 0.3  # without a foot on the ground; the flights of running are shorter
 _LOW = 0.6  # of the usual height of the hips
 
+STANDS = 0.3
+"""m/s; below it a direction of travel says nothing about facing."""
+
+FAINT, AIM = 1e-4, 0.004
+"""Weights of the pull to where a standing body would turn: at any speed, and at rest (half way within 1.3 s)."""
+
 HOLD = 1e6
 """Weight of a facing that is given: so much more than all else that it stays."""
 
@@ -26,8 +32,13 @@ ROOT_WINDOW = 1.5
 
 
 def facing(
-    direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, kept: np.ndarray | None = None,
+    direction: np.ndarray,
+    speed: np.ndarray,
+    velocity: np.ndarray,
+    turn: np.ndarray,
+    kept: np.ndarray | None = None,
     firm: np.ndarray | float = 1.0,
+    aim: np.ndarray | None = None,
 ) -> np.ndarray:
     """(T,) facing in radians, unwrapped: the least squares compromise between travel and the recording's own turning.
 
@@ -36,13 +47,14 @@ def facing(
     the direction of travel; where either stands still there is no such angle and the recording's turning decides alone.
     Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the facing has to be, NaN where
     it is free: what lies around a stretch that is made anew. firm (T,): how many times firmer than usual the recording's
-    own turning is followed (`firmness`).
+    own turning is followed (`firmness`). aim: (T,) radians that a body which stands slowly turns to.
     """
     count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
     offset = np.arctan2(velocity[:, 1], velocity[:, 0])
     goal = direction - offset
-    trust = np.minimum(1.0, speed) ** 2 * np.minimum(1.0, own_speed) ** 2 + 1e-4
+    trust = _moving(speed) ** 2 * _moving(own_speed) ** 2
+    goal, trust = _with_aim(goal, trust, speed, aim, turn)
     if kept is not None:
         goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
     goal = _unwrapped(goal, turn)
@@ -69,6 +81,21 @@ def firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray
         if last - first >= _FLIGHT_SECONDS * fps:
             out[first:last] = OFF_THE_FEET
     return out
+
+
+def _moving(speed: np.ndarray) -> np.ndarray:
+    """(T,) 0 for those who stand, 1 from 1 m/s on: how far a velocity tells where its owner goes."""
+    return np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0)
+
+
+def _with_aim(goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, aim: np.ndarray | None, turn: np.ndarray):
+    """Goals (T,) and their weights with the pull towards `aim`, felt only where little else is known."""
+    if aim is None:
+        return goal, trust + FAINT
+    pull = FAINT + AIM * np.clip(1.0 - speed, 0.0, 1.0) ** 2
+    goal, aim = _unwrapped(goal, turn), _unwrapped(aim, turn)
+    aim = aim + 2.0 * np.pi * np.round((goal - aim) / (2.0 * np.pi))
+    return (trust * goal + pull * aim) / (trust + pull), trust + pull
 
 
 def _unwrapped(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:

@@ -61,11 +61,13 @@ class Offer:
         return self._missing[words]
 
     def unasked(self, words: frozenset[str]) -> np.ndarray:
-        """(N,) bool: frames that show an action (a kick, a jump) nobody asked for, or nothing that is annotated."""
+        """(N,) bool: frames from which a slot shows an action (a kick, a jump) nobody asked for, or nothing that is
+        annotated."""
         if words not in self._other:
             names = self.frames.vocabulary
             actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
-            self._other[words] = self.frames.words[:, actions].any(axis=1) | ~self.frames.words.any(axis=1)
+            acts = maximum_filter1d(self.frames.words[:, actions].any(axis=1), SLOT + 1, origin=-(SLOT // 2), mode="nearest")
+            self._other[words] = acts | ~self.frames.words.any(axis=1)
         return self._other[words]
 
     def near_in_speed(self, speed: float, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -31,7 +31,7 @@ class Weights:
     turn: float = 0.5
     facing: float = 0.15
     words: float = 1.0
-    unasked: float = 0.5
+    unasked: float = 2.0
     made: float = 0.2
     rate: float = 0.24
     stretch: float = 4.0
