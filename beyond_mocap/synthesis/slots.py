@@ -18,6 +18,10 @@ from .wanted import Wanted, needed, pool_frame
 
 KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])
 SHORTEST = 6
+AROUND = 12
+"""Frames before and behind a key frame that its clip is played at least, however short its annotated row: who cuts nearer
+cuts into the swing itself."""
+
 _CROWDED = 3 * SLOT
 _TRIMMED = 2.5  # frames of an entry or exit that may go, so that a slot more is not bound for them
 
@@ -54,7 +58,7 @@ def slot_edges(library: Library, wanted: Wanted, first: int = 0, end: int | None
     fixed = np.unique(np.clip([first, *halfway, end], first, end))
     for key in served:
         entry, leave = np.min([needed(library, choice) for choice in key.choices], axis=0)
-        for edge in (round(key.frame - max(entry, SHORTEST)), round(key.frame + max(leave, SHORTEST))):
+        for edge in (round(key.frame - max(entry, AROUND)), round(key.frame + max(leave, AROUND))):
             if np.abs(fixed - edge).min() >= SHORTEST and first < edge < end:
                 fixed = np.sort(np.append(fixed, edge))
     parts = [np.linspace(a, b, max(1, round((b - a) / SLOT)) + 1)[:-1] for a, b in zip(fixed, fixed[1:])]
@@ -83,7 +87,7 @@ def _pieces_of(library: Library, wanted: Wanted, edges: np.ndarray, number: int,
     here = slot_of(edges, key.frame)
     rows = []
     for choice, option in enumerate(key.choices):
-        entry, leave = needed(library, option)
+        entry, leave = np.maximum(needed(library, option), AROUND)
         for rate in KEY_RATES:
             first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
