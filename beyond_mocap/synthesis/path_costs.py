@@ -21,7 +21,7 @@ class Weights:
     """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a walk;
     turn per radian and slot; facing per radian between the body and where it should face; words for lacking all of the asked
     ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made clip, which steps in
-    only where recordings miss the speed by more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch
+    only where recordings miss the speed by more, made_key at key moments, where a recording is worth more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch
     for any cut; pose per metre of joint distance; wild for cutting where the clips jerk by as much again as is usual;
     rate_change per unit; replay for a stretch shown less than 4 s ago; held per frame beyond a clip's end.
     """
@@ -33,6 +33,7 @@ class Weights:
     words: float = 1.0
     unasked: float = 2.0
     made: float = 0.2
+    made_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
     switch: float = 0.1
@@ -89,7 +90,7 @@ class PathCosts:
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
         cost += self.weights.rate * off + self.weights.stretch * np.maximum(off - 0.15, 0.0) + self.weights.held * held
-        cost += self.weights.made * self.offer.made[self.inside(start)]
+        cost += self.weights.made_key * self.offer.made[self.inside(start)]
         return cost * (length / SLOT)
 
     def _motion_misfit(self, first: int, end: int, speed, turn, frame) -> np.ndarray:
