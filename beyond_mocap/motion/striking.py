@@ -100,11 +100,15 @@ def ball_gap(line: tuple[np.ndarray, np.ndarray], radius: float, ball: np.ndarra
 
     line: the surface's two ends (..., 3) m, world; radius: the surface's, m; ball (..., 3): the ball's centre, m.
     """
+    return np.linalg.norm(ball - nearest_on(line, ball), axis=-1) - radius - BALL_RADIUS
+
+
+def nearest_on(line: tuple[np.ndarray, np.ndarray], place: np.ndarray) -> np.ndarray:
+    """The point (..., 3) m of a line from one end (..., 3) m to the other that is nearest to `place` (..., 3) m."""
     start, end = line
     along = end - start
-    share = np.sum((ball - start) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
-    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * along
-    return np.linalg.norm(ball - nearest, axis=-1) - radius - BALL_RADIUS
+    share = np.sum((place - start) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
+    return start + np.clip(share, 0.0, 1.0)[..., None] * along
 
 
 def contact_gap(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.striking import ball_gap
+from ..motion.striking import ball_gap, nearest_on
 from ..motion.track import BALL_RADIUS
 
 BALL_SECONDS = 0.3
@@ -19,7 +19,7 @@ _ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])
 _ALONG = (0.5, 0.2, 0.8)
 _ANGLE_COST = 0.08  # metres of moved foot that a radian off the part's own direction is worth,
 _ALONG_COST = 0.1  # that the other end of the foot is,
-_INSIDE_COST = 5.0  # a metre of ball within the other leg,
+_INSIDE_COST = 15.0  # a metre of ball within the other leg,
 _MISS_COST = 3.0  # and a metre that the part cannot be moved
 _GRAVITY = 9.81
 
@@ -68,7 +68,7 @@ def best_aim(
     lie in; possible: of a move (3,) m of the part, what the body can make of it.
     """
     aims = [Aim(_turned(direction, angle), along) for angle in _ANGLES for along in _ALONG[: 1 if rise else None]]
-    found = meetings(line, radius, aims, rise, ball, room)
+    found = meetings(line, radius, aims, rise, ball, room, avoid)
     least = np.linalg.norm(found.need, axis=1)
     least += _ANGLE_COST * np.abs(np.repeat(_ANGLES, len(aims) // len(_ANGLES)))
     least += _ALONG_COST * np.abs([aim.along - 0.5 for aim in aims])
@@ -84,8 +84,17 @@ def best_aim(
     return best
 
 
-def meetings(line: Line, radius: float, aims: Sequence[Aim], rise: float, ball: np.ndarray, room: Room) -> Meeting:
-    """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may, the part the rest."""
+def meetings(
+    line: Line,
+    radius: float,
+    aims: Sequence[Aim],
+    rise: float,
+    ball: np.ndarray,
+    room: Room,
+    avoid: Sequence[tuple[Line, float]] = (),
+) -> Meeting:
+    """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may and out of what it is to avoid, the
+    part the rest."""
     along = np.array([aim.along for aim in aims])[:, None]
     start = line[0] + along * (line[1] - line[0])
     above = rise * (radius + BALL_RADIUS)
@@ -98,9 +107,18 @@ def meetings(line: Line, radius: float, aims: Sequence[Aim], rise: float, ball: 
     touching = _touching(raised, radius, start, np.array([aim.direction for aim in aims]))
     level = np.sqrt(np.maximum(room.whole**2 - (height - ball[2]) ** 2, 0.0))
     away = touching[:, :2] - ball[:2]
-    way = away * np.minimum(1.0, level / np.maximum(np.linalg.norm(away, axis=1), 1e-12))[:, None]
-    places = np.concatenate([ball[:2] + way, height[:, None]], axis=1)
+    places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
+    for other, own in avoid:
+        out = (places - nearest_on(other, places))[:, :2]
+        out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+        places[:, :2] += np.maximum(-ball_gap(other, own, places), 0.0)[:, None] * out
+        places[:, :2] = ball[:2] + _within(places[:, :2] - ball[:2], level)
     return Meeting(places, places - touching + lift)
+
+
+def _within(way: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Ways (N, 2) m no longer than `most` (N,) m."""
+    return way * np.minimum(1.0, most / np.maximum(np.linalg.norm(way, axis=1), 1e-12))[:, None]
 
 
 def _touching(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..motion import quaternion
 from ..motion.humanoid import Limb, heading_from_positions, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
@@ -24,14 +25,14 @@ from .meeting import Aim, Room, best_aim, eased, held_meeting, lofted, meetings,
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from where it was measured, and where the feed has filled it in."""
 
-MOST_MOVED = {"foot": 0.35, "hand": 0.4, "head": 0.2, "chest": 0.12}
+MOST_MOVED = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}
 """Metres that a part may be moved from where the recording has it."""
 
 PELVIS_RANGE = (0.20, 0.64)
 """Metres on the ground from pelvis to striking foot in measured kicks; further out or in only where the recording
 is."""
 
-OUT_OF_REACH = 0.25
+OUT_OF_REACH = 0.15
 """Metres of gap that would be left, above which the body does not try, and plays as recorded."""
 
 MOST_DROP = 0.04
@@ -173,7 +174,7 @@ def _held(frame: float, count: int) -> tuple[int, int]:
 @dataclass(frozen=True, eq=False)
 class _Scene:
     """What a touch is played with: the parts, each with the share (W,) of its shift per frame; the ball's path (T, 3)
-    and whether it is measured (T,); the side of the part on which the ball is; `origin`, the first of the body's W
+    and whether it is measured (T,); the side of the part on which the ball is; what the ball avoids; `origin`, the first of the body's W
     frames."""
 
     moment: _Moment
@@ -182,6 +183,7 @@ class _Scene:
     ball: np.ndarray
     measured: np.ndarray
     aim: Aim
+    avoid: list[tuple]
     origin: int
 
     @property
@@ -199,7 +201,7 @@ class _Scene:
         part, ball, room = self.parts[0], self.ball[frame], self.room(frame)
         if len(lines) == 2:
             return held_meeting(lines, part.radius, ball, room)
-        met = meetings(lines[0], part.radius, [self.aim], _RISE[part.part], ball, room)
+        met = meetings(lines[0], part.radius, [self.aim], _RISE[part.part], ball, room, self.avoid)
         return met.ball[0], met.need
 
     def room(self, frame: int) -> Room:
@@ -221,11 +223,11 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
         path = lofted(path, moment.frame, float(height), ~height_known, fps)
     ahead = _direction(body, parts[0], moment, at, path, fps)
-    scene = _Scene(moment, parts, shares, path, measured, Aim(ahead), origin)
-    if parts[0].part == "hand":
+    avoid = _other_leg(body, parts[0], at) if parts[0].part == "foot" else []
+    scene = _Scene(moment, parts, shares, path, measured, Aim(ahead), avoid, origin)
+    if len(parts) == 2:
         return scene
     rise, ball, room = _RISE[parts[0].part], path[moment.frame], scene.room(moment.frame)
-    avoid = _other_leg(body, parts[0], at) if parts[0].part == "foot" else []
     return replace(
         scene, aim=best_aim(line, radius, ahead, rise, ball, room, avoid, lambda need: _bounded(body, parts[0], at, need))
     )
@@ -342,8 +344,10 @@ def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) ->
         _, needs = scene.ball_and_needs(lines + (wished - shifts)[:, None], scene.moment.frame)
         if np.linalg.norm(needs) < _CLOSE:
             break
-        pairs = zip(scene.parts, wished, needs)
+        pairs, before = zip(scene.parts, wished, needs), wished
         wished = np.array([_bounded(body, part, scene.at, shift + need) for part, shift, need in pairs])
+        if np.linalg.norm(wished - before) < _CLOSE:
+            break
     return wished
 
 
@@ -368,14 +372,21 @@ def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.
 
 def _above_ground(body: Body, part: Surface, at, shift: np.ndarray) -> np.ndarray:
     """Shifts (..., 3) m of a foot at frames `at` that does not go through the ground, but where it is there already."""
-    start, end = body.line(part, at)
-    lowest = np.minimum(start[..., 2], end[..., 2])
+    tip = _tip(body, part, at)
+    lowest = np.minimum(np.min(body.line(part, at), axis=0)[..., 2], tip[..., 2])
     out = shift.copy()
     least, wish = np.minimum(_SOLE - lowest, 0.0), shift[..., 2]
     # a maximum without a corner: at its sharpest _ROUNDING is between the two, and nothing where nothing is moved
     corner = _ROUNDING * np.minimum(1.0, np.linalg.norm(shift, axis=-1) / (2.0 * _ROUNDING))
     out[..., 2] = 0.5 * (wish + least + np.hypot(wish - least, corner))
     return out
+
+
+def _tip(body: Body, part: Surface, at) -> np.ndarray:
+    """(..., 3) m: the end of a foot at frames `at`."""
+    skeleton, toe = body.skeleton, _limb(body, part).toe_or_foot
+    offset = next((o for p, o in zip(skeleton.end_parents, skeleton.end_offsets) if p == toe), np.zeros(3))
+    return body.places[at, toe] + quaternion.rotate(body.world[at, toe], offset)
 
 
 def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:

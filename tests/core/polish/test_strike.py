@@ -132,7 +132,9 @@ def test_a_ball_does_not_lie_in_the_other_leg(kick):
     struck = met(kick, np.array([*ankle[:2], 0.11]), touch(kick))
     pose = [values[frame] for values in kinematics(kick.motion, struck)]
     left, _ = surfaces(kick.motion.skeleton, ("kick",))
-    assert struck.moved[0] > 0.0 and ball_gap(left.line(*pose), left.radius, struck.ball[frame]) > 0.0
+    shin = tuple(pose[0][joint] for joint in (body.left.lower_leg, body.left.foot))
+    assert struck.moved[0] > 0.0
+    assert min(ball_gap(line, left.radius, struck.ball[frame]) for line in (left.line(*pose), shin)) > -1e-6
 
 
 @pytest.mark.parametrize("off", [(2.0, 0.0), (-1.5, 1.0), (0.0, -3.0)])
