@@ -28,8 +28,9 @@ from .plan import Plan
 from .polish.hand_over import handed_over, old_share
 from .polish.meeting import eased
 from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
-from .polish.foot_plant import Planted, plant
+from .polish.foot_plant import Planted
 from .polish.smoothing import reaches
+from .polish.steps import Steps
 from .polish.strike import Touch
 from .synthesis.balance import balanced
 from .synthesis.edit_list import EditList
@@ -39,7 +40,7 @@ from .synthesis.path_search import Between, PathSearch
 from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
-    Progress, aimed, faced, given, key_result, leaning, met, smoothed, sources_shown, synthesize, touches, towards_ball,
+    Progress, aimed, faced, footed, key_result, leaning, met, smoothed, sources_shown, synthesize, touches, towards_ball,
     with_made_gaits, with_warnings, words_shown,
 )
 from .take import BallPath, KeyResult, Take
@@ -160,6 +161,8 @@ class _Update:
         self.root, self.rotations = before.motion.root_positions.copy(), before.motion.rotations.copy()
         kept = before.contacts, before.correction, before.ik_miss
         self.contacts, self.correction, self.miss = (values.copy() for values in kept)
+        none = np.zeros_like(self.contacts)
+        self.stepped = none if before.stepped is None else before.stepped.copy()
         self.ball = track.ball.copy() if before.ball is None else before.ball.positions.copy()
         self.anew = np.zeros(len(track), bool)
         self.keys = self._keys()
@@ -193,16 +196,16 @@ class _Update:
         hand, context = (int(round(seconds * self.plan.fps)) for seconds in (HAND_OVER, HAND_OVER + CONTEXT))
         low, high = max(0, stretch[0] - context), min(len(self.index), stretch[1] + context)
         window = _Window(self, low, high, (stretch[0] - low, stretch[1] - low), hand)
-        planted, ball = window.met(window.planted())
+        planted, taken = window.planted()
+        planted, ball = window.met(planted, taken.standing)
         made = slice(max(0, stretch[0] - hand - low), min(high, stretch[1] + hand) - low)
         at, share = slice(made.start + low, made.stop + low), window.share[made]
-        standing = window.footage.standing[made]
         new, old = (planted.root[made], planted.rotations[made]), (self.root[at], self.rotations[at])
         self.root[at], self.rotations[at] = handed_over(
-            self.library.skeleton, new, old, share, standing, self.plan.fps
+            self.library.skeleton, new, old, share, taken.standing[made], self.plan.fps
         )
         self.ball[at] = _ball_between(ball[made], self.ball[at], share)
-        self.contacts[at] = standing.all(axis=2)
+        self.contacts[at], self.stepped[at] = taken.contacts[made], taken.stepped[made]
         inside = np.arange(*stretch)
         self.correction[inside], self.miss[inside] = planted.correction[inside - low], planted.miss[inside - low]
         self.anew[at] = True
@@ -232,6 +235,7 @@ class _Update:
             ball=self._ball_path(),
             correction=self.correction,
             ik_miss=self.miss,
+            stepped=self.stepped,
             plan=self.plan,
             edit=self.edit,
         )
@@ -258,8 +262,8 @@ class _Window:
         self.footage: Footage = fetch(update.library, update.edit, update.index[low:high], update.plan.fps)
         self.share = old_share(high - low, stretch, hand)
 
-    def planted(self) -> Planted:
-        """The motion laid on the ground between what stays, feet planted."""
+    def planted(self) -> tuple[Planted, Steps]:
+        """The motion laid on the ground between what stays, feet planted, and the steps they take."""
         update, plan, track = self.update, self.update.plan, self.track
         smooth, stays = smoothed(update.library, plan, self.footage), self.share > 0.0
         rotation = update.rotations[self.low : self.high, 0]
@@ -275,8 +279,17 @@ class _Window:
         ground = self._pulled(root_with_sway(track.positions, smooth.sway, angle))
         root = np.concatenate([ground, smooth.height[:, None]], axis=1)
         pose = leaning(update.library, plan, track, smooth, faced(smooth.pose, angle))
-        root, pose = given(update.library, plan, track, root, pose, smooth.standing, 1.0 - self.share)
-        return plant(update.library.skeleton, root, pose, smooth.standing, plan.fps)
+        stepped = self._stepped()
+        return footed(update.library, plan, track, root, pose, smooth.standing, self._strikes(), self.share, stepped)
+
+    def _stepped(self) -> np.ndarray:
+        """(W, 2) bool: the steps of the old motion that are taken, in whole or in part, where it stays."""
+        old, stays = self.update.stepped[self.low : self.high], self.share > 0.0
+        kept = np.zeros_like(old)
+        for side in range(old.shape[1]):
+            number = np.cumsum(np.diff(old[:, side], prepend=False)) * old[:, side]
+            kept[:, side] = old[:, side] & np.isin(number, number[stays & old[:, side]])
+        return kept
 
     def _same_way_round(self, angle: np.ndarray, old: np.ndarray) -> np.ndarray | None:
         """The track's direction (W,) with which a body that now turns the other way round than it did, where it is so
@@ -309,10 +322,10 @@ class _Window:
         pulled = pulled_to_track(root, self.track.raw, plan.fps, plan.root_window)
         return pulled + self.share[:, None] * (old - pulled)
 
-    def met(self, planted: Planted) -> tuple[Planted, np.ndarray]:
-        """The same with the ball met at the key moments in the window, and the ball's path (W, 3) m."""
-        update = self.update
-        struck = met(update.library, update.plan, self.track, self.footage.standing, planted, self._strikes())
+    def met(self, planted: Planted, standing: np.ndarray) -> tuple[Planted, np.ndarray]:
+        """The same with the ball met at the key moments in the window, and the ball's path (W, 3) m; standing (W, 2, 2)
+        bool."""
+        struck = met(self.update.library, self.update.plan, self.track, standing, planted, self._strikes())
         return replace(planted, root=struck.root, rotations=struck.rotations), struck.ball
 
     def _strikes(self) -> list[Touch]:

@@ -37,6 +37,7 @@ from .polish.joining import chained_facing, chained_root, torso_corrections
 from .polish.face_ball import turned_to_ball
 from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
 from .polish.smoothing import spread_rotations, spread_values
+from .polish.steps import Steps, steps
 from .polish.strike import Struck, Touch, strike
 from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
@@ -100,15 +101,16 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
     strikes = touches(library, plan, edit, keys)
-    planted = _polished(library, plan, track, footage, found, index, strikes)
+    planted, taken = _polished(library, plan, track, footage, found, index, strikes)
     if plan.method == "path":
-        struck = met(library, plan, track, footage.standing, planted, strikes)
+        struck = met(library, plan, track, taken.standing, planted, strikes)
         planted, track = replace(planted, root=struck.root, rotations=struck.rotations), replace(track, ball=struck.ball)
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     clock.append(time.perf_counter())
     seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
     report(1.0, "Done")
     take = _take(library, plan, order, track, edit, footage, motion, keys, seconds)
+    take = replace(take, contacts=taken.contacts, stepped=taken.stepped)
     take = replace(take, correction=planted.correction, ik_miss=planted.miss)
     return with_warnings(take, recordings, order, found.hurried)
 
@@ -141,8 +143,10 @@ def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cance
     return Found(*warped_edit(search, match_distance(search, blocks, plan.delta), plan.catch_up))
 
 
-def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index, strikes) -> Planted:
-    """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand."""
+def _polished(
+    library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index, strikes: list[Touch]
+) -> tuple[Planted, Steps]:
+    """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand or stepping where they would slide."""
     smooth = smoothed(library, plan, footage)
     if plan.method == "blocks":
         angle, ground = _chained(library, footage, smooth, track, plan.fps)
@@ -152,10 +156,9 @@ def _polished(library: Library, plan: Plan, track: SampledTrack, footage: Footag
     root = np.concatenate([ground, smooth.height[:, None]], axis=1)
     if plan.method == "path":
         pose = leaning(library, plan, track, smooth, pose)
-        root, pose = given(library, plan, track, root, pose, footage.standing)
-        return plant(library.skeleton, root, pose, footage.standing, plan.fps)
+        return footed(library, plan, track, root, pose, footage.standing, strikes)
     none = np.zeros((len(root), 2))
-    return Planted(root, pose, none, none)
+    return Planted(root, pose, none, none), Steps.none(pose, footage.standing)
 
 
 def smoothed(library: Library, plan: Plan, footage: Footage) -> Footage:
@@ -197,6 +200,25 @@ def given(library: Library, plan: Plan, track: SampledTrack, root, pose, standin
     free = np.broadcast_to(free, len(root))
     ground = root[:, :2] + free[:, None] * (pulled - root[:, :2])
     return np.concatenate([ground, root[:, 2:]], axis=1), faced(pose, free * turn)
+
+
+def footed(
+    library: Library, plan: Plan, track: SampledTrack, root, pose, standing: np.ndarray, strikes: list[Touch],
+    share=0.0, stepped: np.ndarray | None = None,
+) -> tuple[Planted, Steps]:
+    """A body laid on its track with its feet held where they stand, or stepping where they would be dragged.
+
+    No steps are added where the ball may be met, nor where a share (T,) of the motion is given; stepped (T, 2) bool: those
+    that are taken there.
+    """
+    share, at = np.broadcast_to(share, len(root)), np.arange(len(root))
+    free = share == 0.0
+    for touch in strikes:
+        free &= (at < touch.frame - touch.entry) | (at > touch.frame + touch.leave)
+    taken = steps(library.skeleton, root, pose, standing, plan.fps, stepped, free)
+    root = root + np.column_stack([(1.0 - share)[:, None] * taken.sway, np.zeros(len(root))])
+    root, pose = given(library, plan, track, root, taken.rotations, taken.standing, 1.0 - share)
+    return plant(library.skeleton, root, pose, taken.standing, plan.fps, moves=taken.moves), taken
 
 
 def faced(pose: np.ndarray, angle: np.ndarray) -> np.ndarray:

@@ -48,7 +48,8 @@ class Take:
     clip's own rate, mirrored (T,) bool. words: per frame the source frame's words, sides after mirroring. contacts (T, 2)
     bool, left and right, carried from the source. seams: output frames that start a new piece of clip.
     correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it. ik_miss:
-    (T, 2) metres that each leg was short of where its foot should stand. plan, edit: what was asked and what the search chose
+    (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right, extra steps of
+    feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
     at the library's rate, for `resynthesize`.
     """
 
@@ -70,5 +71,6 @@ class Take:
     warnings: tuple[str, ...] = ()
     correction: np.ndarray | None = None
     ik_miss: np.ndarray | None = None
+    stepped: np.ndarray | None = None
     plan: Plan | None = None
     edit: EditList | None = None

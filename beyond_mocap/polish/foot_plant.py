@@ -75,6 +75,10 @@ class _Foot:
     def moves(self) -> np.ndarray:
         return np.stack([np.diff(self.heel[:, :2], axis=0), np.diff(self.toe[:, :2], axis=0)], axis=1)
 
+    def moved(self, by: np.ndarray) -> _Foot:
+        """The foot moved by (T, 3) m."""
+        return replace(self, heel=self.heel + by, toe=self.toe + by)
+
     @property
     def carries(self) -> np.ndarray:
         """(T,) how firmly the foot stands at all."""
@@ -88,22 +92,28 @@ def plant(
     standing: np.ndarray,
     fps: float,
     sinks: float = MOST_DROP,
+    moves: np.ndarray | None = None,
 ) -> Planted:
     """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn
-    about the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the
-    pelvis is lowered where that is not enough, by at most `sinks` metres.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn about
+    the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the pelvis is
+    lowered where that is not enough, by at most `sinks` metres. moves (T, 2, 4): metres by which each foot is moved before
+    that, and radians that its heel is turned up about its toe (`polish.steps`).
     """
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
-    limbs = (body.left, body.right)
-    feet = [_turned(_laid(places, world, limb, standing[:, side]), scale) for side, limb in enumerate(limbs)]
+    moves = np.zeros((len(root), 2, 4)) if moves is None else moves
+    feet = [_laid(places, world, limb, standing[:, side]) for side, limb in enumerate((body.left, body.right))]
+    feet = [_turned(foot.moved(moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
     lifts = [_lift(foot, sole_height(skeleton), scale) for foot in feet]
     firm = [foot.weight for foot in feet]
     for turn in range(_EASED_ROUNDS + 1):
-        goals = [_goal(foot, weight, lift, scale, spread) for foot, weight, lift in zip(feet, firm, lifts)]
+        goals = [
+            _goal(foot, weight, lift, tilt, scale, spread)
+            for foot, weight, lift, tilt in zip(feet, firm, lifts, np.moveaxis(moves[..., 3], 1, 0))
+        ]
         drop = _drop(feet, [goal for goal, _ in goals], spread, sinks)
         short = [_short(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
         if turn == _EASED_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
@@ -152,12 +162,12 @@ def _turned(foot: _Foot, scale: float) -> _Foot:
 
 
 def _goal(
-    foot: _Foot, weight: np.ndarray, lift: np.ndarray, scale: float, spread: int
+    foot: _Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4)."""
+    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m and tilt (T,) radians of the heel."""
     ground, weight = _held(foot.moves, weight, scale)
     moved = np.column_stack([ground, lift])
-    rise = _spread(_rise(foot, moved) * foot.weight[:, 1], spread)
+    rise = _spread(_rise(foot, moved) * foot.weight[:, 1], spread) + tilt
     roll = quaternion.about_axis(foot.left, rise)
     ankle = foot.toe + moved + quaternion.rotate(roll, foot.heel - foot.toe)
     return ankle, quaternion.multiply(roll, foot.rotation)
