@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -20,11 +21,33 @@ _USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0
 
 
+@dataclass(frozen=True, eq=False)
+class Traits:
+    """K pairs of a rate and a library frame. number (K,) of the rate; frame (K,); speed (K,) m/s and turn (K,) radians of a
+    slot that begins there; long_stance (K,) s that both feet stand longer than in a walk; offset (K,) radians from the
+    direction of travel to the body's; made (K,) bool; missing (K,) share of the asked words that it lacks; unasked (K,)
+    bool: it shows an action nobody asked for, or nothing that is annotated."""
+
+    number: np.ndarray
+    frame: np.ndarray
+    speed: np.ndarray
+    turn: np.ndarray
+    long_stance: np.ndarray
+    offset: np.ndarray
+    made: np.ndarray
+    missing: np.ndarray
+    unasked: np.ndarray
+
+    def part(self, low: int, high: int) -> "Traits":
+        """The pairs low .. high."""
+        return Traits(*(getattr(self, field.name)[low:high] for field in fields(self)))
+
+
 class Offer:
     """N library frames at R rates. speed (R, N) m/s, turn (R, N) radians and valid (R, N) of a slot that begins there;
-    by_speed (K,) the valid pairs (rate, frame), flat, in the order of speeds (K,); offset (N,) radians from the direction
-    of travel to the body's; long_stance (N,) s that both feet stand longer than in a walk; wild_before, wild_after (N,)
-    see `wildness`; made (N,) bool; bucket (N,) int: frames of one bucket look alike to whoever sees them twice.
+    by_speed (K,) the valid pairs (rate, frame), flat, in the order of speeds (K,); offset, long_stance, made (N,): see
+    `Traits`; wild_before, wild_after (N,): see `wildness`; bucket (N,) int: frames of one bucket look alike to whoever
+    sees them twice.
     """
 
     _kept: weakref.WeakKeyDictionary[Library, dict[bytes, "Offer"]] = weakref.WeakKeyDictionary()
@@ -43,39 +66,43 @@ class Offer:
         self.annotation = AnnotationCost(library.frames)
         self.made = np.array([clip.made for clip in library.clips])[library.frames.clip]
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
-        self.speed, self.turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
+        speed, turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
+        self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
         self.valid = lasts & allowed[library.frames.clip]
         usable = np.flatnonzero(self.valid)
         self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
         self.speeds = self.speed.ravel()[self.by_speed]
-        self.offset = -np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0])
-        self.long_stance = np.clip(library.stance_seconds - _USUAL_STANCE, 0.0, _LONGEST_STANCE)
+        self.offset = -np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
+        self.long_stance = np.clip(library.stance_seconds - _USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
         self.wild_before, self.wild_after = wildness(library)
-        self._missing: dict[frozenset[str], np.ndarray] = {}
-        self._other: dict[frozenset[str], np.ndarray] = {}
+        self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
+        self._sorted: dict[frozenset[str], Traits] = {}
 
-    def missing_share(self, words: frozenset[str]) -> np.ndarray:
-        """(N,) share of the words that each frame lacks."""
-        if words not in self._missing:
-            self._missing[words] = self.annotation.missing_share(words)
-        return self._missing[words]
+    def traits(self, number: np.ndarray, frame: np.ndarray, words: frozenset[str]) -> Traits:
+        """Of the pairs of RATES[number (K,)] and frame (K,), where `words` are asked (none: all will do)."""
+        missing, unasked = self._words(words)
+        own = (self.long_stance, self.offset, self.made, missing, unasked)
+        return Traits(number, frame, self.speed[number, frame], self.turn[number, frame], *(values[frame] for values in own))
 
-    def unasked(self, words: frozenset[str]) -> np.ndarray:
-        """(N,) bool: frames from which a slot shows an action (a kick, a jump) nobody asked for, or nothing that is
-        annotated."""
-        if words not in self._other:
-            names = self.frames.vocabulary
-            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
-            acts = maximum_filter1d(self.frames.words[:, actions].any(axis=1), SLOT + 1, origin=-(SLOT // 2), mode="nearest")
-            self._other[words] = acts | ~self.frames.words.any(axis=1)
-        return self._other[words]
-
-    def near_in_speed(self, speed: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) numbers of rates and (K,) frames of the `count` pairs nearest to a speed in m/s. The others' misfit in speed
-        alone would put them behind, and a large library is searched as fast as a small one."""
+    def near_in_speed(self, speed: float, count: int, words: frozenset[str]) -> Traits:
+        """Of the `count` pairs nearest to a speed in m/s. The others' misfit in speed alone would put them behind, and a
+        large library is searched as fast as a small one."""
+        if words not in self._sorted:
+            self._sorted[words] = self.traits(*np.divmod(self.by_speed, len(self.frames)), words)
         middle = int(np.searchsorted(self.speeds, speed))
         low = int(np.clip(middle - count // 2, 0, max(0, len(self.by_speed) - count)))
-        return np.divmod(self.by_speed[low : low + count], len(self.frames))
+        return self._sorted[words].part(low, low + count)
+
+    def _words(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+        """(N,) share of the words that each frame lacks; (N,) bool: a slot from there on shows an action (a kick, a jump)
+        that nobody asked for, or nothing that is annotated."""
+        if words not in self._by_words:
+            names, frames = self.frames.vocabulary, self.frames
+            missing = self.annotation.missing_share(words) if words else np.zeros(len(frames))
+            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
+            acts = maximum_filter1d(frames.words[:, actions].any(axis=1), SLOT + 1, origin=-(SLOT // 2), mode="nearest")
+            self._by_words[words] = missing.astype(np.float32), acts | ~frames.words.any(axis=1)
+        return self._by_words[words]
 
 
 def wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..library.library import Library
 from .gaze import wanted_offset
-from .offer import RATES, SLOT, Offer
+from .offer import RATES, SLOT, Offer, Traits
 from .wanted import Wanted
 
 
@@ -66,15 +66,28 @@ class PathCosts:
     def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
         """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end; inf
         where the clip ends before or may not be used."""
-        w, offer = self.weights, self.offer
-        turn = offer.turn[number, frame] * ((end - first) / SLOT)
-        cost = self._motion_misfit(first, end, offer.speed[number, frame], turn, frame)
-        cost += w.rate * np.abs(RATES[number] - 1.0)
-        words = self.wanted.asked[(first + end) // 2]
-        if words:
-            cost += w.words * offer.missing_share(words)[frame]
-        cost += w.unasked * offer.unasked(words or frozenset())[frame] + w.made * offer.made[frame]
-        return np.where(offer.valid[number, frame], cost, np.inf)
+        cost = self._misfit(first, end, self.offer.traits(number, frame, self._words(first, end)))
+        return np.where(self.offer.valid[number, frame], cost, np.inf)
+
+    def cheapest(self, first: int, end: int, looked_at: int, count: int):
+        """The `count` pairs of rate and library frame that cost least of the `looked_at` nearest in speed: number (K,),
+        frame (K,), misfit (K,)."""
+        near = self.offer.near_in_speed(self.asked(first, end)[0], looked_at, self._words(first, end))
+        cost = self._misfit(first, end, near)
+        best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
+        return near.number[best], near.frame[best], cost[best]
+
+    def _words(self, first: int, end: int) -> frozenset[str]:
+        return self.wanted.asked[(first + end) // 2] or frozenset()
+
+    def _misfit(self, first: int, end: int, what: Traits) -> np.ndarray:
+        w = self.weights
+        turn = what.turn * np.float32((end - first) / SLOT)
+        cost = self._motion_misfit(first, end, what.speed, turn, what.offset, what.long_stance)
+        cost += (w.rate * np.abs(RATES - 1.0)).astype(np.float32)[what.number]
+        cost += w.words * what.missing
+        cost += np.float32(w.unasked) * what.unasked
+        return cost + np.float32(w.made) * what.made
 
     def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held at
@@ -86,20 +99,21 @@ class PathCosts:
         path = [_between(self.frames.path, at, high) for at in (a, b)]
         turn = _between(self.frames.heading, b, high) - _between(self.frames.heading, a, high)
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
-        cost = self._motion_misfit(first, end, speed, turn, self.inside((a + b) / 2.0))
+        middle = self.inside((a + b) / 2.0)
+        cost = self._motion_misfit(first, end, speed, turn, self.offer.offset[middle], self.offer.long_stance[middle])
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
         cost += self.weights.rate * off + self.weights.stretch * np.maximum(off - 0.15, 0.0) + self.weights.held * held
         cost += self.weights.made_key * self.offer.made[self.inside(start)]
         return cost * (length / SLOT)
 
-    def _motion_misfit(self, first: int, end: int, speed, turn, frame) -> np.ndarray:
+    def _motion_misfit(self, first: int, end: int, speed, turn, offset, long_stance) -> np.ndarray:
         wanted_speed, wanted_turn = self.asked(first, end)
         w, moving = self.weights, min(1.0, wanted_speed)
-        cost = np.abs(speed - wanted_speed) * (w.speed + w.drag * self.offer.long_stance[frame])
+        cost = np.abs(speed - wanted_speed) * (w.speed + w.drag * long_stance)
         cost += w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
-        aside = self.offer.offset[frame] - self.wanted_offset[(first + end) // 2]
-        return cost + w.facing * moving * np.abs((aside + np.pi) % (2.0 * np.pi) - np.pi)
+        aside = np.abs(offset - float(self.wanted_offset[(first + end) // 2]))
+        return cost + w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
 
     def cut(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """(B, K) cost of a cut from library frames ends (B,) to start (K,): how far their poses are apart, and how wild the
@@ -107,8 +121,11 @@ class PathCosts:
         ends, start = self.inside(ends), self.inside(start)
         a, b = self.frames.features[ends], self.frames.features[start]
         square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
-        wild = self.weights.wild * (self.offer.wild_before[ends][:, None] + self.offer.wild_after[start])
-        return self.weights.switch + self.weights.pose * np.sqrt(np.maximum(square, 0.0)) + wild
+        cost = np.sqrt(np.maximum(square, 0.0, out=square), out=square)
+        cost *= np.float32(self.weights.pose)
+        cost += (self.weights.wild * self.offer.wild_before[ends]).astype(np.float32)[:, None]
+        cost += (self.weights.switch + self.weights.wild * self.offer.wild_after[start]).astype(np.float32)
+        return cost
 
 
 def _between(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray:

@@ -194,11 +194,7 @@ class PathSearch:
         return [np.concatenate(parts) for parts in zip(*offers)]
 
     def _candidates(self, low: int, high: int):
-        number, start = self.offer.near_in_speed(self.costs.asked(low, high)[0], self.width.looked_at)
-        cost = self.costs.misfit(low, high, number, start)
-        many = self.width.candidates
-        best = np.sort(np.argpartition(cost, many)[:many]) if len(cost) > many else np.arange(len(cost))
-        number, start, cost = number[best], start[best], cost[best]
+        number, start, cost = self.costs.cheapest(low, high, self.width.looked_at, self.width.candidates)
         return self.frames.clip[start], start.astype(float), RATES[number], cost, np.full(len(cost), -1)
 
     def _leading_in(self, slot: int):
@@ -241,10 +237,13 @@ class PathSearch:
         """(B, K) cost of coming by the states `free` (B,), which end at library frames `ends` (B,), to frames start (K,) of
         clips (K,) at a rate (K,): a cut, unless the clip shows that frame next anyway."""
         cut = self.costs.cut(ends, start)
-        cut += self.weights.replay * self._seen(before.recent[free])[:, self.offer.bucket[self.costs.inside(start)]]
-        goes_on = (before.clip[free][:, None] == clip) & (np.abs(ends[:, None] - start) < _SAME)
-        changed = self.weights.rate_change * np.abs(before.rate[free][:, None] - rate)
-        return np.where(goes_on, 0.0, cut) + changed + before.cost[free][:, None]
+        buckets = self.offer.bucket[self.costs.inside(start)]
+        cut += np.float32(self.weights.replay) * self._seen(before.recent[free])[:, buckets]
+        state, offer = _meeting(ends, start)
+        same = before.clip[free][state] == clip[offer]
+        cut[state[same], offer[same]] = 0.0
+        rates = [self.weights.rate_change * values.astype(np.float32) for values in (before.rate[free], rate)]
+        return cut + np.abs(rates[0][:, None] - rates[1]) + before.cost[free][:, None].astype(np.float32)
 
     def _seen(self, recent: np.ndarray) -> np.ndarray:
         """(B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
@@ -287,6 +286,15 @@ class PathSearch:
         if self.between:
             return replaced(self.between.edit, int(self.edges[0]), int(self.edges[-1]), clip, frame, keys)
         return EditList(clip, frame, find_seams(clip, frame), keys)
+
+
+def _meeting(ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices into ends (B,) and into start (K,) of all pairs that are the same but for rounding."""
+    order = np.argsort(start, kind="stable")
+    low, high = (np.searchsorted(start[order], ends + off) for off in (-_SAME, _SAME))
+    many = high - low
+    at = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many) + np.repeat(low, many)
+    return np.repeat(np.arange(len(ends)), many), order[at]
 
 
 def _steps(edit: EditList, at: np.ndarray) -> np.ndarray:
