@@ -24,8 +24,8 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 13
-_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "jerk", "features", "mean", "basis", "words")
+VERSION = 14
+_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean", "basis", "words")
 
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:

@@ -30,8 +30,9 @@ class Frames:
 
     clip (N,) clip index; source (N,) fractional frame in the clip's own rate; first, count (C,) each clip's place.
     root (N, 3) metres; heading (N,) facing, radians, unwrapped within a clip; path (N, 2) the root on the ground without
-    its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame (x forward, y left). jerk (N,)
-    m/s^3 of the joint that has most, from the third difference around each frame.
+    its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame (x forward, y left). feet (N, 4)
+    m: where the left and the right toe (ankle where there is none) lie on the ground, from the path, in the facing frame.
+    jerk (N,) m/s^3 of the joint that has most, from the third difference around each frame.
     features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words (N, V) bool, one
     column per word of `vocabulary`.
     """
@@ -44,6 +45,7 @@ class Frames:
     heading: np.ndarray
     path: np.ndarray
     velocity: np.ndarray
+    feet: np.ndarray
     jerk: np.ndarray
     features: np.ndarray
     mean: np.ndarray
@@ -118,7 +120,8 @@ def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np
 def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], fps: float, like: Frames | None = None) -> Frames:
     """Frames of all `clips` at `fps`. `words_of(clip, frames)` gives the (T, V) bool words at fractional clip frames.
     like: frames whose components are used, so that features of both can be compared; else those of the clips themselves."""
-    joints = feature_joints(skeleton)
+    joints, body = feature_joints(skeleton), identify(skeleton)
+    toes = [body.left.toe_or_foot, body.right.toe_or_foot]
     parts: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}
     counts = []
     for index, clip in enumerate(clips):
@@ -133,6 +136,7 @@ def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], f
             facing,
             path,
             quaternion.turned_level(_gradient(path, fps), -facing),
+            _feet(positions, toes, path, facing),
             most_jerk(positions, fps),
             raw_features(positions[:, joints], facing, fps).astype(np.float32),
             words_of(clip, source),
@@ -154,13 +158,19 @@ def joined(a: Frames, b: Frames) -> Frames:
         words[rows, [vocabulary.index(word) for word in frames.vocabulary]] = frames.words
     parts = {
         name: np.concatenate([getattr(a, name), getattr(b, name)])
-        for name in ("source", "count", "root", "heading", "path", "velocity", "jerk", "features")
+        for name in ("source", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features")
     }
     clip, first = np.append(a.clip, b.clip + len(a.first)), np.append(a.first, b.first + len(a))
     return Frames(clip=clip, first=first, mean=a.mean, basis=a.basis, words=words, vocabulary=vocabulary, **parts)
 
 
-_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "jerk", "features", "words")
+_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "jerk", "features", "words")
+
+
+def _feet(positions: np.ndarray, toes: list[int], path: np.ndarray, facing: np.ndarray) -> np.ndarray:
+    """(T, 4) m of `Frames.feet`: positions (T, J, 3) m, path (T, 2) m, facing (T,) radians."""
+    away = (quaternion.turned_level(positions[:, toe, :2] - path, -facing) for toe in toes)
+    return np.concatenate(list(away), axis=1).astype(np.float32)
 
 
 def most_jerk(positions: np.ndarray, fps: float) -> np.ndarray:

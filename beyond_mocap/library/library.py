@@ -138,6 +138,11 @@ class Library:
         the air. Whoever plays it faster or slower than the track drags that foot as long."""
         return np.concatenate([_stance_seconds(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
 
+    @cached_property
+    def feet_standing(self) -> np.ndarray:
+        """(N, 2) bool: left and right foot on the ground, heel or toe."""
+        return np.concatenate([_standing(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
+
     def _own_frames(self, clip: int) -> np.ndarray:
         first = self.frames.first[clip]
         return self.frames.source[first : first + self.frames.count[clip]]
@@ -337,6 +342,11 @@ def _described(clips, like: Frames | None = None) -> Frames:
     words_of = lambda clip, source: words_matrix(clip, source, vocabulary)  # noqa: E731
     with threadpool_limits(limits=1):  # with more, sums of products come out in another order
         return describe(clips[0].motion.skeleton, clips, words_of, vocabulary, FPS, like)
+
+
+def _standing(clip: Clip, source: np.ndarray) -> np.ndarray:
+    """(T, 2) of one clip at its frames `source` (T,)."""
+    return clip.standing.any(axis=2)[np.clip(np.round(source).astype(int), 0, len(clip.standing) - 1)]
 
 
 def _stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:

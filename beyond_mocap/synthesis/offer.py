@@ -74,6 +74,7 @@ class Offer:
         self.speeds = self.speed.ravel()[self.by_speed]
         self.offset = -np.arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
         self.long_stance = np.clip(library.stance_seconds - _USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
+        self.stands = library.feet_standing
         self.wild_before, self.wild_after = wildness(library)
         self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
         self._sorted: dict[frozenset[str], Traits] = {}

@@ -19,11 +19,13 @@ from .wanted import Wanted
 @dataclass(frozen=True)
 class Weights:
     """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a walk;
-    turn per radian and slot; facing per radian between the body and where it should face; words for lacking all of the asked
-    ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made clip, which steps in
-    only where recordings miss the speed by more, made_key at key moments, where a recording is worth more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch
-    for any cut; pose per metre of joint distance; wild for cutting where the clips jerk by as much again as is usual;
-    rate_change per unit; replay for a stretch shown less than 4 s ago; held per frame beyond a clip's end.
+    turn per radian and slot; facing per radian between the body and where it should face; words for lacking all of the
+    asked ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made clip, which
+    steps in only where recordings miss the speed by more, made_key at key moments, where a recording is worth more; rate
+    per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch for any cut; pose per metre of joint distance;
+    feet per metre that a foot which stands before and after a cut would jump; wild for cutting where the clips jerk by as
+    much again as is usual; rate_change per unit; replay for a stretch shown less than 4 s ago; held per frame beyond a
+    clip's end.
     """
 
     speed: float = 1.0
@@ -38,6 +40,7 @@ class Weights:
     stretch: float = 4.0
     switch: float = 0.1
     pose: float = 2.0
+    feet: float = 1.5
     wild: float = 0.3
     rate_change: float = 0.16
     replay: float = 1.5
@@ -123,9 +126,21 @@ class PathCosts:
         square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
         cost = np.sqrt(np.maximum(square, 0.0, out=square), out=square)
         cost *= np.float32(self.weights.pose)
+        cost += np.float32(self.weights.feet) * self._feet_apart(ends, start)
         cost += (self.weights.wild * self.offer.wild_before[ends]).astype(np.float32)[:, None]
         cost += (self.weights.switch + self.weights.wild * self.offer.wild_after[start]).astype(np.float32)
         return cost
+
+
+    def _feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """(B, K) m between the feet that stand before and after a cut."""
+        feet, stands = self.frames.feet, self.offer.stands
+        apart = np.zeros((len(ends), len(start)), np.float32)
+        for foot in (0, 1):
+            a, b = feet[ends, 2 * foot : 2 * foot + 2], feet[start, 2 * foot : 2 * foot + 2]
+            away = np.hypot(a[:, :1] - b[:, 0], a[:, 1:] - b[:, 1])
+            apart += away * (stands[ends, foot][:, None] & stands[start, foot])
+        return apart
 
 
 def _between(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray:

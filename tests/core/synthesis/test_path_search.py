@@ -63,12 +63,11 @@ def test_where_the_feed_creeps_no_standing_body_glides(library, order, track_of)
 
 
 def test_a_turning_track_is_played_by_clips_that_turn(library, order, track_of):
-    edit = found(library, order(track=track_of(1.4, turn=0.9)))
-    bows = [library.clips[c].path == "bows/turn.bvh" and not library.clips[c].mirrored for c in edit.clip]
-    assert np.mean(bows) > 0.5
-    edit = found(library, order(track=track_of(1.4, turn=-0.9)))
-    bows = [library.clips[c].path == "bows/turn.bvh" and library.clips[c].mirrored for c in edit.clip]
-    assert np.mean(bows) > 0.5
+    """Not all of the time: the one bow lasts 4 s, and is not shown again at once."""
+    for turn, mirrored in ((0.9, False), (-0.9, True)):
+        edit = found(library, order(track=track_of(1.4, turn=turn)))
+        bows = [library.clips[c].mirrored for c in edit.clip if library.clips[c].path == "bows/turn.bvh"]
+        assert len(bows) > 0.4 * len(edit) and set(bows) == {mirrored}
 
 
 def test_without_mirrors_none_is_used(library, order, track_of):
