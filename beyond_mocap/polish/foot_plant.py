@@ -93,13 +93,16 @@ def plant(
     fps: float,
     sinks: float = MOST_DROP,
     moves: np.ndarray | None = None,
+    levels: bool = True,
 ) -> Planted:
     """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn about
     the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the pelvis is
     lowered where that is not enough, by at most `sinks` metres. moves (T, 2, 4): metres by which each foot is moved before
-    that, and radians that its heel is turned up about its toe (`polish.steps`).
+    that, and radians that its heel is turned up about its toe (`polish.steps`). levels: standing feet are brought to the
+    height of the ground and none goes below it; without, all keep the heights they have (a recording's own floor is uneven
+    by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth).
     """
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
@@ -107,7 +110,7 @@ def plant(
     moves = np.zeros((len(root), 2, 4)) if moves is None else moves
     feet = [_laid(places, world, limb, standing[:, side]) for side, limb in enumerate((body.left, body.right))]
     feet = [_turned(foot.moved(moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
-    lifts = [_lift(foot, sole_height(skeleton), scale) for foot in feet]
+    lifts = [_lift(foot, sole_height(skeleton), scale) if levels else np.zeros(len(root)) for foot in feet]
     firm = [foot.weight for foot in feet]
     for turn in range(_EASED_ROUNDS + 1):
         goals = [

@@ -13,7 +13,7 @@ from beyond_mocap.motion import contacts, quaternion
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.gestures import strike
 from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import Motion, forward_kinematics
+from beyond_mocap.motion.motion import Motion, forward_kinematics, resample
 
 MOCAP = Path(__file__).resolve().parents[4] / "shared/data/mocap"
 
@@ -50,6 +50,41 @@ def test_a_good_recording_only_gets_its_floor(walk):
     assert np.array_equal(done.motion.rotations, walk.rotations)
     assert np.ptp(done.motion.root_positions - walk.root_positions, axis=0).max() < 1e-9
     assert abs(contacts.floor_height(done.motion)) < 1e-9
+
+
+def knee_jerk(motion: Motion) -> float:
+    """95th percentile of the third difference of both knees and ankles, m/s^3 at 30 frames per second."""
+    body = identify(motion.skeleton)
+    joints = [joint for limb in (body.left, body.right) for joint in (limb.lower_leg, limb.foot)]
+    places = forward_kinematics(resample(motion, 30.0))[0][:, joints]
+    return float(np.percentile(np.linalg.norm(np.diff(places, 3, axis=0), axis=-1).max(axis=1), 95)) * 30.0**3
+
+
+@pytest.mark.parametrize("speed, slid", [(0.0, True), (3.5, False), (9.0, False)])
+def test_the_faster_the_run_the_more_a_foot_may_creep(speed, slid):
+    motion = gait(max(speed, 1.2), 4.0, 120.0, seed=3)
+    standing = contacts.points(motion)
+    seconds = np.arange(len(motion)) / motion.fps
+    if speed == 0.0:  # on the spot: the travel taken away leaves feet that slide
+        motion = replace(motion, root_positions=motion.root_positions - np.outer(1.0 * seconds, [1.0, 0.0, 0.0]))
+    else:
+        motion = replace(motion, root_positions=motion.root_positions + np.outer(0.04 * speed * seconds, [1.0, 0.0, 0.0]))
+    assert repair.slides(motion, standing) == slid
+    done = repair.grounded(motion, standing)
+    assert done.slid == slid and np.array_equal(done.motion.rotations, motion.rotations) != slid
+
+
+@pytest.mark.parametrize("speed", [1.4, 3.0])
+def test_holding_feet_on_an_uneven_floor_adds_no_jerk(speed):
+    clean = gait(speed, 6.0, 120.0, seed=2)
+    seconds = np.arange(len(clean)) / clean.fps
+    bumps = 0.02 * np.sin(2.0 * np.pi * seconds / 0.9)
+    off = np.column_stack([0.3 * seconds, 0.06 * np.sin(3.0 * seconds), bumps])
+    sliding = replace(clean, root_positions=clean.root_positions + off)
+    standing = contacts.points(clean)
+    done = repair.grounded(sliding, standing)
+    assert done.slid and done.slide[1] < 0.4 * done.slide[0]
+    assert knee_jerk(done.motion) < 1.1 * knee_jerk(sliding)
 
 
 def test_a_drifting_floor_is_levelled(walk):
