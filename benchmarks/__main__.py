@@ -28,6 +28,7 @@ from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesize import synthesize  # noqa: E402
 
 from benchmarks import compare, effort, markdown, misses, paper  # noqa: E402
+from benchmarks.edit_time import edit_times  # noqa: E402
 from benchmarks.places import DATA, LIBRARIES, ROOT, library_folder, scenario  # noqa: E402
 
 METHODS = {
@@ -45,12 +46,13 @@ _QUIET = ("version", "seed", "fps", "method", "warnings")
 
 @dataclass
 class Results:
-    """All reports of one library. missed: what `path` misses in each scenario."""
+    """All reports of one library. missed: what `path` misses in each scenario; edits: how long edits take."""
 
     library: Library
     effort: list[str]
     reports: dict[str, dict[int, dict]] = field(default_factory=lambda: {name: {} for name in METHODS})
     missed: list[misses.Misses] = field(default_factory=list)
+    edits: list[str] = field(default_factory=list)
 
 
 def measured(name: str, scenarios: list[int], place: Path) -> Results:
@@ -68,6 +70,7 @@ def measured(name: str, scenarios: list[int], place: Path) -> Results:
             results.reports[method][number] = evaluate(take, track, library)
         view = View(played_from_take(take), track, take.timeline, library)
         results.missed.append(misses.counted(view, take.ik_miss))
+    results.edits = edit_times(library, [(f"scenario {number}", *scenario(number)) for number in scenarios])
     results.effort.append(effort.peak_memory(name, folder, cache))
     return results
 
@@ -83,7 +86,9 @@ def summary(results: dict[str, Results], scenarios: list[int]) -> list[str]:
             f"### Library {name}, method path", "",
             f"{min(took):.2f} to {max(took):.2f} s a scenario, {np.mean(per20):.2f} s for 20 s of motion (target 0.5); "
             f"fastest recording {found.library.fastest:.1f} m/s.", "",
-            *misses.summary(found.reports["path"], found.missed),
+            *misses.summary(found.reports["path"], found.missed), "",
+            "Edits of a take (every key moment moved by 0.2 s, stretches of track dragged by half a metre):", "",
+            *found.edits, "",
         ]
     return [*lines, "## Faustino's tables", "", *paper.tables(by_row, scenarios)]
 
