@@ -11,7 +11,7 @@ it is due.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -115,108 +115,99 @@ def steps(
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     heading = np.unwrap(quaternion.yaw(rotations[:, 0]))
-    feet = [_Foot.laid(places, world, limb, root, heading, standing[:, side]) for side, limb in enumerate((body.left, body.right))]
+    limbs = (body.left, body.right)
+    feet = [_Foot(limb, places, world, root, heading, standing[:, side]) for side, limb in enumerate(limbs)]
     upright = root[:, 2] > UPRIGHT * np.median(root[:, 2])
     speed = np.linalg.norm(np.gradient(zero_phase_hann(root[:, :2], fps, 1.0), axis=0), axis=1) * fps
     stepped = none.stepped if given is None else given
     plan = _Plan(feet, stepped, speed, fps, upright if free is None else free & upright)
     plan.run()
-    for foot in plan.feet:
+    for foot in feet:
         rotations = foot.held_down(skeleton, root, rotations)
-    stands = np.stack([standing[:, side] | foot.held[:, None] for side, foot in enumerate(plan.feet)], axis=1)
+    stands = np.stack([standing[:, side] | foot.held[:, None] for side, foot in enumerate(feet)], axis=1)
     stepped = stepped | plan.stepped
     swings = _swings(stepped, fps)
-    moves, sway = _shape(stepped, swings, root[:, :2], np.stack([foot.middle for foot in plan.feet], axis=1), fps)
-    across = (places[:, body.left.upper_leg] - places[:, body.right.upper_leg])[:, :2]
-    moves[..., :2] = _apart(plan, stepped, across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9))
+    moves, sway = _shape(stepped, swings, feet[_LEFT].root, [foot.middle for foot in feet], fps)
+    if stepped.any():
+        hips = places[:, body.left.upper_leg] - places[:, body.right.upper_leg]
+        left = hips[:, 0] + 1j * hips[:, 1]
+        moves[..., :2] = _apart(plan, stepped, left / np.maximum(np.abs(left), 1e-9))
     return Steps(rotations, stands & ~swings[:, :, None], none.contacts & ~stepped, stepped, moves, sway)
 
 
-@dataclass(frozen=True, eq=False)
 class _Foot:
-    """One foot where the motion has it. ankle (T, 3) m and toe (T, 3) m; world (T, 4) its rotation; yaw (T,) its direction,
-    radians, unwrapped; root (T, 3) m and heading (T,) of the body; stands, flat and held (T,) bool: on the ground, with heel
-    and toe, and kept there through a lift that is left out."""
+    """One foot where the motion has it, on the ground as complex numbers x + iy.
 
-    limb: Limb
-    ankle: np.ndarray
-    toe: np.ndarray
-    world: np.ndarray
-    yaw: np.ndarray
-    root: np.ndarray
-    heading: np.ndarray
-    stands: np.ndarray
-    flat: np.ndarray
-    held: np.ndarray
+    points (T, 2) m of ankle and toe, middle (T,) m between them, yaw (T,) its direction, radians, unwrapped; stands and flat
+    (T,) bool: on the ground, with heel and toe; before, behind (T,) frames and through (T,): where `held` (T,) bool, between
+    which of its places the foot is, and how far.
+    """
 
-    @classmethod
-    def laid(cls, places, world, limb: Limb, root, heading, standing) -> _Foot:
-        ankle, toe, turn = places[:, limb.foot], places[:, limb.toe_or_foot], world[:, limb.foot]
-        along = toe - ankle if limb.toe is not None else quaternion.rotate(turn, np.array([1.0, 0.0, 0.0]))
-        yaw = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
-        stands = standing.any(axis=1)
-        return cls(limb, ankle, toe, turn, yaw, root, heading, stands, standing.all(axis=1), np.zeros(len(stands), bool))
+    def __init__(self, limb: Limb, places, world, root, heading, standing: np.ndarray):
+        self.limb, self.places, self.world = limb, places[:, limb.foot], world[:, limb.foot]
+        toe = places[:, limb.toe_or_foot]
+        along = toe - self.places if limb.toe is not None else quaternion.rotate(self.world, np.array([1.0, 0.0, 0.0]))
+        self.yaw = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+        self.stands, self.flat = standing.any(axis=1), standing.all(axis=1)
+        self.held = np.zeros(len(root), bool)
+        self.before, self.behind, self.through = np.zeros(len(root), int), np.zeros(len(root), int), np.zeros(len(root))
+        self.heading, self.root = heading, root[:, 0] + 1j * root[:, 1]
+        self.points = np.stack([self.places[:, 0] + 1j * self.places[:, 1], toe[:, 0] + 1j * toe[:, 1]], axis=1)
+        self.middle = self.points.mean(axis=1)
 
-    @property
-    def middle(self) -> np.ndarray:
-        """(T, 2) m on the ground."""
-        return 0.5 * (self.ankle + self.toe)[:, :2]
-
-    @property
-    def points(self) -> np.ndarray:
-        """(T, 2, 2) m of ankle and toe on the ground."""
-        return np.stack([self.ankle, self.toe], axis=1)[..., :2]
-
-    def with_lift_left_out(self, first: int, end: int, reach: int) -> _Foot:
-        """The foot on the ground in frames first .. end too, carried along by the body from where it stood to where it will
-        stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands flat there."""
+    def leave_out_lift(self, first: int, end: int, reach: int) -> None:
+        """Keeps the foot on the ground in frames first .. end too, carried along by the body from where it stood to where it
+        will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands flat there."""
         first, end = self._flat_before(first, reach), self._flat_behind(end, reach)
-        at, through = np.arange(first, end), _through(first, end)
-        through = (through * through * (3.0 - 2.0 * through))[:, None]
-        edges = (first - 1, end if end < len(self.yaw) else first - 1)
-        new = {}
-        for name in ("ankle", "toe"):
-            a, b = (self._in_body(getattr(self, name), edge) for edge in edges)
-            way = a + through * (b - a)
-            new[name] = getattr(self, name).copy()
-            new[name][at] = quaternion.rotate(quaternion.about_up(self.heading[at]), way) + self.root[at] * [1.0, 1.0, 0.0]
-        a, b = (quaternion.multiply(quaternion.about_up(-self.heading[edge]), self.world[edge]) for edge in edges)
-        count = len(at)
-        between = quaternion.slerp(np.tile(a, (count, 1)), np.tile(b, (count, 1)), through[:, 0])
-        new["world"] = self.world.copy()
-        new["world"][at] = quaternion.multiply(quaternion.about_up(self.heading[at]), between)
-        own = (self.yaw - self.heading)[list(edges)]
+        at, before = slice(first, end), first - 1
+        behind = end if end < len(self.yaw) else before
+        through = _eased(_through(first, end))
+        self.held[at], self.before[at], self.behind[at], self.through[at] = True, before, behind, through
+        self.points[at] = self._between(self.points, at)
+        self.middle[at] = self.points[at].mean(axis=1)
+        own = self.yaw[[before, behind]] - self.heading[[before, behind]]
         change = (own[1] - own[0] + np.pi) % (2.0 * np.pi) - np.pi
-        new["yaw"] = self.yaw.copy()
-        new["yaw"][at] = self.heading[at] + own[0] + through[:, 0] * change
-        new["yaw"][end:] += own[0] + change - own[1]
-        for name in ("stands", "flat", "held"):
-            new[name] = getattr(self, name).copy()
-            new[name][at] = True
-        return replace(self, **new)
+        self.yaw[end:] += own[0] + change - own[1]
+        self.yaw[at] = self.heading[at] + own[0] + through * change
 
-    def _in_body(self, places: np.ndarray, frame: int) -> np.ndarray:
-        away = places[frame] - self.root[frame] * [1.0, 1.0, 0.0]
-        return quaternion.rotate(quaternion.about_up(-self.heading[frame]), away)
+    def _between(self, points: np.ndarray, at) -> np.ndarray:
+        """Held places (N, K) at frames `at`: straight from the one to the other as the body sees it."""
+        own = [
+            (points[edge[at]] - self.root[edge[at], None]) * np.exp(-1j * self.heading[edge[at], None])
+            for edge in (self.before, self.behind)
+        ]
+        way = own[0] + self.through[at, None] * (own[1] - own[0])
+        return way * np.exp(1j * self.heading[at, None]) + self.root[at, None]
 
     def _flat_before(self, first: int, reach: int) -> int:
         low = max(first - reach, 0)
-        flat = np.flatnonzero(self.flat[low:first] & self.stands[low:first])
+        stands = self.stands[low:first] & ~self.held[low:first]
+        low += int(np.flatnonzero(~stands)[-1]) + 1 if not stands.all() else 0
+        flat = np.flatnonzero(self.flat[low:first])
         return low + int(flat[-1]) + 1 if len(flat) else first
 
     def _flat_behind(self, end: int, reach: int) -> int:
-        flat = np.flatnonzero(self.flat[end : end + reach])
+        stands = self.stands[end : end + reach] & ~self.held[end : end + reach]
+        high = end + (len(stands) if stands.all() else int(np.argmin(stands)))
+        flat = np.flatnonzero(self.flat[end:high])
         return end + int(flat[0]) if len(flat) else end
 
     def held_down(self, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Local rotations (T, J, 4) with the leg bent so that the foot is here where it is held."""
+        """Local rotations (T, J, 4) with the leg bent so that the foot is down where it is held."""
         at = np.flatnonzero(self.held)
         if not len(at):
             return rotations
+        height = [self.places[edge[at], 2] for edge in (self.before, self.behind)]
+        level = self.points[at, 0]
+        target = np.stack([level.real, level.imag, height[0] + self.through[at] * (height[1] - height[0])], axis=1)
+        turn = [
+            quaternion.multiply(quaternion.about_up(self.heading[at] - self.heading[edge[at]]), self.world[edge[at]])
+            for edge in (self.before, self.behind)
+        ]
+        turned = quaternion.slerp(*turn, self.through[at])
         chain = (self.limb.upper_leg, self.limb.lower_leg, self.limb.foot)
-        reached = two_bone(skeleton, root[at], rotations[at], chain, self.ankle[at], end_rotation=self.world[at])
         out = rotations.copy()
-        out[at] = reached.rotations
+        out[at] = two_bone(skeleton, root[at], rotations[at], chain, target, end_rotation=turned).rotations
         return quaternion.continuous(out)
 
 
@@ -240,25 +231,22 @@ class _Plan:
         """(T,) m that a stride may be long without one foot coming nearer than APART to the other, to either side of which
         it is half a stride away as the body drifts."""
         left, right = (foot.middle for foot in self.feet)
-        width, drift = left - right, np.gradient(zero_phase_hann(0.5 * (left + right), self.fps, 1.0), axis=0)
-        drift /= np.maximum(np.linalg.norm(drift, axis=1, keepdims=True), 1e-9)
-        along = np.abs(np.sum(width * drift, axis=1))
-        across = np.abs(width[:, 0] * drift[:, 1] - width[:, 1] * drift[:, 0])
+        way = 0.5 * (left + right)
+        drift = np.gradient(zero_phase_hann(np.stack([way.real, way.imag], axis=1), self.fps, 1.0), axis=0)
+        width = (left - right) * (drift[:, 0] - 1j * drift[:, 1]) / np.maximum(np.linalg.norm(drift, axis=1), 1e-9)
+        along, across = np.abs(width.real), np.abs(width.imag)
         room = 2.0 * (along - np.sqrt(np.maximum(APART**2 - across**2, 0.0)))
         return np.where(across > APART, np.inf, np.maximum(room, STRIDE[0]))
 
     def _dragged(self, side: int, now: int) -> list[tuple[int, int]]:
         """Stances (first, end) from `now` on that drag too far, the first one first; notes how far each frame's foot lags."""
-        return [
-            (first, end)
-            for first, end in _runs(self.stands[:, side])
-            if self._drag(side, first, end) > SPARED and end > now
-        ]
+        runs = [run for run in _runs(self.stands[:, side]) if run[1] > now]
+        return [run for run in runs if self._drag(side, *run) > SPARED]
 
     def _drag(self, side: int, first: int, end: int) -> float:
         """How far the foot would lag at most in frames first .. end, 1 where a step is due."""
         at, foot = slice(first, end), self.feet[side]
-        away = np.hypot(*(foot.middle[at] - foot.middle[first]).T) / self.stride[at]
+        away = np.abs(foot.middle[at] - foot.middle[first]) / self.stride[at]
         self.lag[at, side] = np.hypot(away, (foot.yaw[at] - foot.yaw[first]) / self.turn[at])
         return float(self.lag[at, side].max(initial=0.0))
 
@@ -306,14 +294,21 @@ class _Plan:
         for up, down in _runs(~self.stands[:, other] & ~self.stepped[:, other]):
             inside = max(now, 1) <= up < end and down > first
             if inside and self._gentle(foot, up, down) and self.free_until[up] >= down:
-                self.feet[other] = foot.with_lift_left_out(up, down, min(reach, up - now))
+                foot.leave_out_lift(up, down, min(reach, up - now))
                 self.stands[up:down, other] = True
-                self.left[other] = self._dragged(other, now)
+                self._look_again(other, up)
                 return True
         return False
 
+    def _look_again(self, side: int, at: int) -> None:
+        """Finds out whether the stance around frame `at` drags too far."""
+        first = int(np.flatnonzero(~self.stands[:at, side])[-1]) + 1 if not self.stands[:at, side].all() else 0
+        end = int(_until(self.stands[:, side])[at])
+        left = [run for run in self.left[side] if run[1] <= first or run[0] >= end]
+        self.left[side] = sorted([*left, (first, end)] if self._drag(side, first, end) > SPARED else left)
+
     def _gentle(self, foot: _Foot, up: int, down: int) -> bool:
-        height, ends = foot.ankle[up:down, 2], foot.ankle[[up - 1, min(down, len(self.speed) - 1)], 2]
+        height, ends = foot.places[up:down, 2], foot.places[[up - 1, min(down, len(self.speed) - 1)], 2]
         return bool(
             down - up <= GENTLE_SECONDS * self.fps
             and self.speed[up:down].max() < GENTLE_SPEED
@@ -324,7 +319,7 @@ class _Plan:
         """How far the foot is behind the other as the body goes."""
         before, after = max(at - 8, 0), min(at + 8, len(self.speed) - 1)
         here, there = self.feet[side].middle, self.feet[1 - side].middle
-        return float((there[at] - here[at]) @ (here[after] + there[after] - here[before] - there[before]))
+        return float(((there[at] - here[at]) * np.conj(here[after] + there[after] - here[before] - there[before])).real)
 
     def _next(self, side: int, now: int) -> tuple[int, int] | None:
         """Frames in which the foot's next dragged stance is to be broken, and in which it stands again; None where there is
@@ -372,31 +367,31 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
     """(T, 2, 2) m by which feet that step are set down further apart, so that the left one stays to the left of the right
-    one; left (T, 2): that way. A stance's foot stands at the mean of where the body takes it (`foot_plant.shift`)."""
+    one; left (T,): that way, complex. A stance's foot stands at the mean of where the body takes it (`foot_plant.shift`)."""
     runs = [_runs(plan.stands[:, side]) for side in (_LEFT, _RIGHT)]
     near = np.pad(stepped, ((1, 1), (0, 0)))
     loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in runs[side]] for side in (_LEFT, _RIGHT)]
     place = [[foot.points[a:b].mean(axis=0) for a, b in runs[side]] for side, foot in enumerate(plan.feet)]
-    start = [[p.copy() for p in side] for side in place]
+    pushed = [[0.0j] * len(side) for side in place]
     pairs = [
-        (i, j, left[(max(a, c) + min(b, d)) // 2])
+        (i, j, complex(left[(max(a, c) + min(b, d)) // 2]))
         for i, (a, b) in enumerate(runs[_LEFT])
         for j, (c, d) in enumerate(runs[_RIGHT])
         if max(a, c) <= min(b, d) and (loose[_LEFT][i] or loose[_RIGHT][j])
     ]
     for _ in range(_ROUNDS):
         for i, j, way in pairs:
-            lacks = APART - float(((place[_LEFT][i] - place[_RIGHT][j]) @ way).min())
+            between = place[_LEFT][i] - place[_RIGHT][j] + pushed[_LEFT][i] - pushed[_RIGHT][j]
+            lacks = APART - float((between * way.conjugate()).real.min())
             if lacks > 0.0:
                 share = lacks / (loose[_LEFT][i] + loose[_RIGHT][j])
-                place[_LEFT][i] += share * loose[_LEFT][i] * way
-                place[_RIGHT][j] -= share * loose[_RIGHT][j] * way
+                pushed[_LEFT][i] += share * loose[_LEFT][i] * way
+                pushed[_RIGHT][j] -= share * loose[_RIGHT][j] * way
     out = np.zeros((len(stepped), 2, 2))
     for side in (_LEFT, _RIGHT):
-        at = [frame for a, b in runs[side] for frame in (a, b - 1)]
-        by = [p - q for p, q in zip(place[side], start[side]) for _ in range(2)]
-        for axis in (0, 1) if at else ():
-            out[:, side, axis] = np.interp(np.arange(len(out)), at, [value[0, axis] for value in by])
+        if any(pushed[side]):
+            by = np.interp(np.arange(len(out)), np.ravel(runs[side]) - [0, 1] * len(runs[side]), np.repeat(pushed[side], 2))
+            out[:, side] = np.stack([by.real, by.imag], axis=1)
     return out
 
 
@@ -410,26 +405,32 @@ def _swings(stepped: np.ndarray, fps: float) -> np.ndarray:
     return out
 
 
-def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: np.ndarray, fps: float):
+def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list[np.ndarray], fps: float):
     """How steps taken while `stepped` (T, 2) look, whose toes are up in `swings` (T, 2): `moves` and `sway` of Steps; root
-    (T, 2) m, feet (T, 2, 2) m."""
+    and both feet (T,) m, complex."""
     moves, sway = np.zeros((len(stepped), 2, 4)), np.zeros((len(stepped), 2))
     early = int(0.2 * fps)
     for side in (_LEFT, _RIGHT):
         for first, end in _runs(stepped[:, side]):
             moves[first:end, side, 3] = _tilt(_through(first, end))
             low, high, middle = max(first - early, 0), min(end + early, len(root)), (first + end) // 2
-            over = feet[middle, 1 - side] - root[middle]
-            sway[low:high] += SWAY * np.sin(np.pi * _through(low, high))[:, None] ** 2 * over / max(np.linalg.norm(over), 1e-9)
+            over = feet[1 - side][middle] - root[middle]
+            over = SWAY * np.array([over.real, over.imag]) / max(abs(over), 1e-9)
+            sway[low:high] += np.sin(np.pi * _through(low, high))[:, None] ** 2 * over
         for first, end in _runs(swings[:, side]):
             rising = np.clip(np.minimum(_through(first, end), 1.0 - _through(first, end)) / 0.45, 0.0, 1.0)
-            moves[first:end, side, 2] = LIFT * rising**2 * (3.0 - 2.0 * rising)
+            moves[first:end, side, 2] = LIFT * _eased(rising)
     return moves, sway
 
 
 def _through(first: int, end: int) -> np.ndarray:
     """How far each of frames first .. end is through them, between 0 and 1."""
     return (np.arange(first, end) - first + 1.0) / (end - first + 1.0)
+
+
+def _eased(x: np.ndarray) -> np.ndarray:
+    """From 0 to 1 with level ends."""
+    return x * x * (3.0 - 2.0 * x)
 
 
 def _tilt(through: np.ndarray) -> np.ndarray:
