@@ -1,12 +1,12 @@
 """Small extra steps: a foot that would be dragged along while it stands is lifted and set down anew instead.
 
-No player stands as still as a recording of standing: tracked ones creep at 0.1 to 0.5 m/s and turn after the ball. Laid on
-such a track, feet that stand would slide or turn on the spot, or the legs would lean further and further after a body on
-rails. Where that is more than STRIDE or TURN allow, the stance is broken: the foot is lifted for some tenths of a second
-while the other one stands, and `foot_plant` sets it down where the body will be in the middle of the stance that follows.
-Left and right take turns, since each step resets what its foot lags behind. Where nothing drags nothing is done. Where the
-other foot is in the air for too long to step, and only gently so, its own lift is left out: it stays down, and steps when
-it is due.
+No player stands as still as a recording of standing: tracked ones creep at 0.1 to 0.5 m/s and turn after the ball.
+Laid on such a track, feet that stand would slide or turn on the spot, or the legs would lean further and further
+after a body on rails. Where that is more than STRIDE or TURN allow, the stance is broken: the foot is lifted for
+some tenths of a second while the other one stands, and `foot_plant` sets it down where the body will be in the
+middle of the stance that follows. Left and right take turns, since each step resets what its foot lags behind. Where
+nothing drags nothing is done. Where the other foot is in the air for too long to step, and only gently so, its own
+lift is left out: it stays down, and steps when it is due.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ SPEED = np.array([0.05, 0.3, 0.8, 1.5])
 STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
 TURN = np.array([0.28, 0.35, 0.45, 0.60])
 SWING = np.array([0.45, 0.38, 0.32, 0.30])
-"""By the body's speed in m/s: metres that a foot is dragged, and radians that it is turned, from the beginning of a stance
-to its end before a step is taken, and the step's seconds. At 0.3 m/s that makes 1.5 steps a second."""
+"""By the body's speed in m/s: metres that a foot is dragged, and radians that it is turned, from the beginning of a
+stance to its end before a step is taken, and the step's seconds. At 0.3 m/s that makes 1.5 steps a second."""
 
 SPARED = 1.15
 """Times STRIDE and TURN that a stance is let drag before it is broken."""
@@ -62,7 +62,7 @@ HEEL_UP, TOE_UP = 0.22, 0.06
 SWAY = 0.012
 """Metres that the pelvis goes over to the foot that stands."""
 
-GENTLE_SPEED, GENTLE_HEIGHT, GENTLE_SECONDS = 0.6, 0.16, 1.5
+GENTLE_SPEED, GENTLE_HEIGHT, GENTLE_SECONDS = 0.6, 0.20, 1.5
 """m/s of the body up to which a lift may be left out, metres that the ankle rises in it, and its seconds."""
 
 UPRIGHT = 0.75
@@ -73,10 +73,10 @@ _LEFT, _RIGHT, _ROUNDS = 0, 1, 6
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """What plants and labels feet. rotations (T, J, 4) local, with lifts left out; standing (T, 2, 2) bool: heels and toes
-    that stand now; contacts (T, 2) bool: feet that stand flat, as they did in the source; stepped (T, 2) bool: feet in an
-    extra step, from heel to heel; moves (T, 2, 4): metres by which each foot is moved, and radians that its heel is up about its toe; sway
-    (T, 2) m of the pelvis."""
+    """What plants and labels feet. rotations (T, J, 4) local, with lifts left out; standing (T, 2, 2) bool: heels
+    and toes that stand now; contacts (T, 2) bool: feet that stand flat, as they did in the source; stepped (T, 2)
+    bool: feet in an extra step, from heel to heel; moves (T, 2, 4): metres by which each foot is moved, and radians
+    that its heel is up about its toe; sway (T, 2) m of the pelvis."""
 
     rotations: np.ndarray
     standing: np.ndarray
@@ -106,8 +106,8 @@ def steps(
 ) -> Steps:
     """The extra steps of a motion laid out on the ground.
 
-    root (T, 3) m and rotations (T, J, 4) local; standing (T, 2, 2) bool of heels and toes, left and right. given (T, 2) bool:
-    steps that are taken already, `free` (T,) bool: where others may be added (everywhere).
+    root (T, 3) m and rotations (T, J, 4) local; standing (T, 2, 2) bool of heels and toes, left and right. given (T,
+    2) bool: steps that are taken already, `free` (T,) bool: where others may be added (everywhere).
     """
     none = Steps.none(rotations, standing)
     if len(root) < 2:
@@ -138,9 +138,9 @@ def steps(
 class _Foot:
     """One foot where the motion has it, on the ground as complex numbers x + iy.
 
-    points (T, 2) m of ankle and toe, middle (T,) m between them, yaw (T,) its direction, radians, unwrapped; stands and flat
-    (T,) bool: on the ground, with heel and toe; before, behind (T,) frames and through (T,): where `held` (T,) bool, between
-    which of its places the foot is, and how far.
+    points (T, 2) m of ankle and toe, middle (T,) m between them, yaw (T,) its direction, radians, unwrapped; stands
+    and flat (T,) bool: on the ground, with heel and toe; before, behind (T,) frames and through (T,): where `held`
+    (T,) bool, between which of its places the foot is, and how far.
     """
 
     def __init__(self, limb: Limb, places, world, root, heading, standing: np.ndarray):
@@ -156,8 +156,9 @@ class _Foot:
         self.middle = self.points.mean(axis=1)
 
     def leave_out_lift(self, first: int, end: int, reach: int) -> None:
-        """Keeps the foot on the ground in frames first .. end too, carried along by the body from where it stood to where it
-        will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands flat there."""
+        """Keeps the foot on the ground in frames first .. end too, carried along by the body from where it stood to
+        where it will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it
+        stands flat there."""
         first, end = self._flat_before(first, reach), self._flat_behind(end, reach)
         at, before = slice(first, end), first - 1
         behind = end if end < len(self.yaw) else before
@@ -212,7 +213,8 @@ class _Foot:
 
 
 class _Plan:
-    """Steps chosen one after the other, always the earliest: `feet`, `stands` and `stepped` (T, 2) are what has come of it."""
+    """Steps chosen one after the other, always the earliest: `feet`, `stands` and `stepped` (T, 2) are what has come
+    of it."""
 
     def __init__(self, feet: list[_Foot], given: np.ndarray, speed: np.ndarray, fps: float, free: np.ndarray):
         self.feet, self.speed, self.fps = feet, speed, fps
@@ -225,11 +227,12 @@ class _Plan:
         )
         self.turn = np.interp(speed, SPEED, TURN)
         self.stride = np.minimum(np.interp(speed, SPEED, STRIDE), self._room())
+        self.last = None
         self.left = [self._dragged(side, 0) for side in (_LEFT, _RIGHT)]
 
     def _room(self) -> np.ndarray:
-        """(T,) m that a stride may be long without one foot coming nearer than APART to the other, to either side of which
-        it is half a stride away as the body drifts."""
+        """(T,) m that a stride may be long without one foot coming nearer than APART to the other, to either side of
+        which it is half a stride away as the body drifts."""
         left, right = (foot.middle for foot in self.feet)
         way = 0.5 * (left + right)
         drift = np.gradient(zero_phase_hann(np.stack([way.real, way.imag], axis=1), self.fps, 1.0), axis=0)
@@ -239,7 +242,8 @@ class _Plan:
         return np.where(across > APART, np.inf, np.maximum(room, STRIDE[0]))
 
     def _dragged(self, side: int, now: int) -> list[tuple[int, int]]:
-        """Stances (first, end) from `now` on that drag too far, the first one first; notes how far each frame's foot lags."""
+        """Stances (first, end) from `now` on that drag too far, the first one first; notes how far each frame's foot
+        lags."""
         runs = [run for run in _runs(self.stands[:, side]) if run[1] > now]
         return [run for run in runs if self._drag(side, *run) > SPARED]
 
@@ -266,8 +270,9 @@ class _Plan:
                 self._take(side, *chosen[side])
 
     def _first(self, chosen: list[tuple[int, int] | None]) -> int | None:
-        """The foot that steps first, None where none does: the one that is due sooner; but where there is no time for both
-        before, the one that lags clearly more by then, or else the one that is behind as the body goes."""
+        """The foot that steps first, None where none does: the one that is due sooner; but where there is no time
+        for both before, the one that lags clearly more by then, unless it stepped last; or else the one that is
+        behind as the body goes."""
         due = [side for side in (_LEFT, _RIGHT) if chosen[side]]
         if len(due) < 2:
             return due[0] if due else None
@@ -275,20 +280,22 @@ class _Plan:
         first = min(left, right)
         soon = min(first + int(self.swing[first]), len(self.speed) - 1)
         more = self.lag[soon, _LEFT] - self.lag[soon, _RIGHT]
-        if abs(left - right) < self.swing[first] and abs(more) > CLEARLY:
-            return _LEFT if more > 0.0 else _RIGHT
+        needier = _LEFT if more > 0.0 else _RIGHT
+        if abs(left - right) < self.swing[first] and abs(more) > CLEARLY and needier != self.last:
+            return needier
         if left == right:
             return _LEFT if self._behind(_LEFT, left) >= 0.0 else _RIGHT
         return _LEFT if left < right else _RIGHT
 
     def _take(self, side: int, at: int, down: int) -> None:
-        _, end = self.left[side].pop(0)
+        self.last, (_, end) = side, self.left[side].pop(0)
         self.stands[at:down, side], self.stepped[at:down, side], self.lag[at:down, side] = False, True, 0.0
         if down < end and self._drag(side, down, end) > SPARED:
             self.left[side].insert(0, (down, end))
 
     def _hold_other(self, side: int, now: int) -> bool:
-        """Leaves out the first gentle lift of the other foot during this foot's dragged stance; whether there is one."""
+        """Leaves out the first gentle lift of the other foot during this foot's dragged stance; whether there is
+        one."""
         other, (first, end) = 1 - side, self.left[side][0]
         foot, reach = self.feet[other], int(round(0.3 * self.fps))
         for up, down in _runs(~self.stands[:, other] & ~self.stepped[:, other]):
@@ -322,8 +329,8 @@ class _Plan:
         return float(((there[at] - here[at]) * np.conj(here[after] + there[after] - here[before] - there[before])).real)
 
     def _next(self, side: int, now: int) -> tuple[int, int] | None:
-        """Frames in which the foot's next dragged stance is to be broken, and in which it stands again; None where there is
-        none or it cannot be."""
+        """Frames in which the foot's next dragged stance is to be broken, and in which it stands again; None where
+        there is none or it cannot be."""
         if not self.left[side]:
             return None
         first, end = self.left[side][0]
@@ -341,7 +348,8 @@ class _Plan:
         return first + at, int(down[at])
 
     def _down(self, side: int, first: int, end: int, now: int) -> np.ndarray:
-        """(end - first,) frame in which a step that begins there would have to be over: the other foot stands firmly as long."""
+        """(end - first,) frame in which a step that begins there would have to be over: the other foot stands firmly
+        as long."""
         at = np.arange(first, end)
         other = self.stands[:, 1 - side]
         until = _until(other)[at]
@@ -366,8 +374,9 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """(T, 2, 2) m by which feet that step are set down further apart, so that the left one stays to the left of the right
-    one; left (T,): that way, complex. A stance's foot stands at the mean of where the body takes it (`foot_plant.shift`)."""
+    """(T, 2, 2) m by which feet that step are set down further apart, so that the left one stays to the left of the
+    right one; left (T,): that way, complex. A stance's foot stands at the mean of where the body takes it
+    (`foot_plant.shift`)."""
     runs = [_runs(plan.stands[:, side]) for side in (_LEFT, _RIGHT)]
     near = np.pad(stepped, ((1, 1), (0, 0)))
     loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in runs[side]] for side in (_LEFT, _RIGHT)]
@@ -390,7 +399,8 @@ def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
     out = np.zeros((len(stepped), 2, 2))
     for side in (_LEFT, _RIGHT):
         if any(pushed[side]):
-            by = np.interp(np.arange(len(out)), np.ravel(runs[side]) - [0, 1] * len(runs[side]), np.repeat(pushed[side], 2))
+            ends = np.ravel(runs[side]) - [0, 1] * len(runs[side])
+            by = np.interp(np.arange(len(out)), ends, np.repeat(pushed[side], 2))
             out[:, side] = np.stack([by.real, by.imag], axis=1)
     return out
 
@@ -406,8 +416,8 @@ def _swings(stepped: np.ndarray, fps: float) -> np.ndarray:
 
 
 def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list[np.ndarray], fps: float):
-    """How steps taken while `stepped` (T, 2) look, whose toes are up in `swings` (T, 2): `moves` and `sway` of Steps; root
-    and both feet (T,) m, complex."""
+    """How steps taken while `stepped` (T, 2) look, whose toes are up in `swings` (T, 2): `moves` and `sway` of
+    Steps; root and both feet (T,) m, complex."""
     moves, sway = np.zeros((len(stepped), 2, 4)), np.zeros((len(stepped), 2))
     early = int(0.2 * fps)
     for side in (_LEFT, _RIGHT):

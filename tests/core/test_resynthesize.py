@@ -157,6 +157,18 @@ def test_feet_that_stand_are_on_the_ground(library, take):
         assert highest(resynthesize(library, plan, take)) < highest(take) + 0.02
 
 
+def test_steps_stay_where_the_motion_stays(library, track_of):
+    """A player who creeps for ten seconds between two walks; his track is drawn aside where he creeps."""
+    track = track_of(lambda t: 0.25 + 0.9 * (t < 5.0) + 0.9 * (t > 15.0), seconds=20.0)
+    before = synthesize(library, Plan(track=track))
+    after = resynthesize(library, replace(before.plan, track=moved(track, 12.0, (0.1, -0.15))), before)
+    stays = ~changed(before, after)
+    assert stays[:150].all() and before.stepped[stays].any() and after.stepped[~stays].any()
+    assert np.array_equal(after.stepped[stays], before.stepped[stays])
+    assert np.array_equal(after.contacts[stays], before.contacts[stays])
+    assert not (after.contacts & after.stepped).any()
+
+
 def test_the_same_edit_gives_the_same_bits(library, take):
     plan = replace(take.plan, track=moved(take.plan.track, 10.0, (0.3, 0.3)))
     assert not changed(resynthesize(library, plan, take), resynthesize(library, plan, take)).any()

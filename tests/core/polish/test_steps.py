@@ -118,6 +118,19 @@ def test_a_slow_turn_on_the_spot_is_stepped(still):
     assert all(a != b for a, b in zip(sides[:-1], sides[1:]))
 
 
+def test_no_foot_waits_while_the_other_one_steps_again_and_again(still):
+    """The right foot's place moves on by itself, as where one recording fades into another: still the left one has its turn."""
+    skeleton, root, rotations = dragged(still, (0.3, 0.0))
+    legs = identify(skeleton)
+    rotations = rotations.copy()
+    swing = 0.3 * np.sin(np.arange(COUNT) / 9.0)
+    turn = np.stack([np.cos(swing / 2.0), np.zeros(COUNT), np.sin(swing / 2.0), np.zeros(COUNT)], axis=1)
+    rotations[:, legs.right.upper_leg] = quaternion.multiply(turn, rotations[:, legs.right.upper_leg])
+    taken = steps(skeleton, root, rotations, STANDING, FPS)
+    sides = [side for _, side in in_turn(taken)]
+    assert len(sides) > 12 and all(not a == b == c for a, b, c in zip(sides[:-2], sides[1:-1], sides[2:]))
+
+
 def test_a_walk_stays_as_it_is():
     from beyond_mocap.motion import contacts
 
@@ -130,7 +143,8 @@ def test_a_walk_stays_as_it_is():
 
 
 def test_a_gentle_lift_in_the_way_is_left_out(still):
-    """The right foot is off the ground for most of the time, 5 cm up, while the left one would be dragged by 30 cm a second."""
+    """The right foot is off the ground for most of the time, 5 cm up, while the left one would be dragged by 30 cm a
+    second."""
     skeleton, root, rotations = dragged(still, (0.3, 0.0))
     standing, up = STANDING.copy(), np.zeros((COUNT, 2, 4))
     for first in range(20, COUNT - 40, 60):
