@@ -171,7 +171,7 @@ def smoothed(library: Library, plan: Plan, footage: Footage) -> Footage:
     weight = share(over.through, over.after)
     return replace(
         footage,
-        pose=faded_rotations(footage.pose, over.at, over.pose, weight),
+        pose=faded_rotations(footage.pose, over.at, over.pose, over.through, over.after),
         height=faded_values(footage.height, over.at, over.height, weight),
         sway=faded_values(footage.sway, over.at, over.sway, weight),
     )

@@ -31,8 +31,33 @@ def faded_values(values: np.ndarray, at: np.ndarray, other: np.ndarray, weight: 
     return out
 
 
-def faded_rotations(rotations: np.ndarray, at: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The same for rotations (T, J, 4) and (R, J, 4), along the shorter arc."""
+def faded_rotations(
+    rotations: np.ndarray, at: np.ndarray, other: np.ndarray, through: np.ndarray, after: np.ndarray
+) -> np.ndarray:
+    """Rotations (T, J, 4) mixed at frames `at` (R,) with those of the other piece (R, J, 4) by their `share`.
+
+    A joint turns the same way round throughout a fade: two swinging arms may be half a turn apart, and the shorter arc of
+    each frame alone would change sides in the middle. Taken is the side that is shorter in the mean of the fade.
+    """
     out = np.array(rotations, dtype=float)
-    out[at] = quaternion.slerp(out[at], other, np.broadcast_to(weight[:, None], other.shape[:2]))
+    ends = np.where(after[:, None, None], other, out[at])
+    begins = np.where(after[:, None, None], out[at], other)
+    arc = _steady_arc(quaternion.multiply(quaternion.inverse(ends), begins), through)
+    part = np.where(after, -1.0, 1.0) * share(through, after)
+    out[at] = quaternion.multiply(out[at], quaternion.from_rotation_vector(part[:, None, None] * arc))
     return out
+
+
+def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
+    """Rotation vectors (R, J, 3) in radians, of up to a whole turn, that make rotations (R, J, 4) without changing sides
+    within a fade; `through` (R,) falls where the next fade begins."""
+    begins = np.diff(through, prepend=np.inf) <= 0.0
+    flips = np.sum(turn * np.roll(turn, 1, axis=0), axis=-1) < 0.0
+    turn = turn * np.where(np.cumsum(flips & ~begins[:, None], axis=0) % 2 == 1, -1.0, 1.0)[..., None]
+    fade = np.cumsum(begins) - 1
+    middle = np.zeros((begins.sum(), turn.shape[1]))
+    np.add.at(middle, fade, turn[..., 0])
+    turn = turn * np.where(middle < 0.0, -1.0, 1.0)[fade][..., None]
+    length = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(length, turn[..., :1])
+    return np.where(length > 1e-9, angle / np.maximum(length, 1e-9), 2.0) * turn[..., 1:]
