@@ -11,6 +11,7 @@ lift is left out: it stays down, and steps when it is due.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,6 +123,7 @@ def steps(
     stepped = none.stepped if given is None else given
     plan = _Plan(feet, stepped, speed, fps, upright if free is None else free & upright)
     plan.run()
+    feet = plan.feet
     for foot in feet:
         rotations = foot.held_down(skeleton, root, rotations)
     stands = np.stack([standing[:, side] | foot.held[:, None] for side, foot in enumerate(feet)], axis=1)
@@ -155,21 +157,25 @@ class _Foot:
         self.points = np.stack([self.places[:, 0] + 1j * self.places[:, 1], toe[:, 0] + 1j * toe[:, 1]], axis=1)
         self.middle = self.points.mean(axis=1)
 
-    def leave_out_lift(self, first: int, end: int, reach: int) -> None:
-        """Keeps the foot on the ground in frames first .. end too, carried along by the body from where it stood to
-        where it will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it
-        stands flat there."""
+    def with_lift_left_out(self, first: int, end: int, reach: int) -> _Foot:
+        """The foot kept on the ground in frames first .. end too, carried along by the body from where it stood to where
+        it will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands flat
+        there."""
+        new = copy.copy(self)
+        for name in ("held", "before", "behind", "through", "points", "middle", "yaw"):
+            setattr(new, name, getattr(self, name).copy())
         first, end = self._flat_before(first, reach), self._flat_behind(end, reach)
         at, before = slice(first, end), first - 1
         behind = end if end < len(self.yaw) else before
         through = _eased(_through(first, end))
-        self.held[at], self.before[at], self.behind[at], self.through[at] = True, before, behind, through
-        self.points[at] = self._between(self.points, at)
-        self.middle[at] = self.points[at].mean(axis=1)
+        new.held[at], new.before[at], new.behind[at], new.through[at] = True, before, behind, through
+        new.points[at] = new._between(self.points, at)
+        new.middle[at] = new.points[at].mean(axis=1)
         own = self.yaw[[before, behind]] - self.heading[[before, behind]]
         change = (own[1] - own[0] + np.pi) % (2.0 * np.pi) - np.pi
-        self.yaw[end:] += own[0] + change - own[1]
-        self.yaw[at] = self.heading[at] + own[0] + through * change
+        new.yaw[end:] += own[0] + change - own[1]
+        new.yaw[at] = self.heading[at] + own[0] + through * change
+        return new
 
     def _between(self, points: np.ndarray, at) -> np.ndarray:
         """Held places (N, K) at frames `at`: straight from the one to the other as the body sees it."""
@@ -294,17 +300,20 @@ class _Plan:
             self.left[side].insert(0, (down, end))
 
     def _hold_other(self, side: int, now: int) -> bool:
-        """Leaves out the first gentle lift of the other foot during this foot's dragged stance; whether there is
-        one."""
+        """Leaves out the first gentle lift of the other foot during this foot's dragged stance with which both can
+        step; whether there is one."""
         other, (first, end) = 1 - side, self.left[side][0]
         foot, reach = self.feet[other], int(round(0.3 * self.fps))
         for up, down in _runs(~self.stands[:, other] & ~self.stepped[:, other]):
             inside = max(now, 1) <= up < end and down > first
             if inside and self._gentle(foot, up, down) and self.free_until[up] >= down:
-                foot.leave_out_lift(up, down, min(reach, up - now))
+                kept = foot, self.stands.copy(), self.lag.copy(), self.left[other]
+                self.feet[other] = foot.with_lift_left_out(up, down, min(reach, up - now))
                 self.stands[up:down, other] = True
                 self._look_again(other, up)
-                return True
+                if all(self._next(one, now) or not self.left[one] for one in (side, other)):
+                    return True
+                self.feet[other], self.stands, self.lag, self.left[other] = kept
         return False
 
     def _look_again(self, side: int, at: int) -> None:
