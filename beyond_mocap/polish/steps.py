@@ -300,7 +300,7 @@ class _Plan:
             self.left[side].insert(0, (down, end))
 
     def _hold_other(self, side: int, now: int) -> bool:
-        """Leaves out the first gentle lift of the other foot during this foot's dragged stance with which both can
+        """Leaves out the first gentle lift of the other foot during this foot's dragged stance with which it can
         step; whether there is one."""
         other, (first, end) = 1 - side, self.left[side][0]
         foot, reach = self.feet[other], int(round(0.3 * self.fps))
@@ -311,7 +311,7 @@ class _Plan:
                 self.feet[other] = foot.with_lift_left_out(up, down, min(reach, up - now))
                 self.stands[up:down, other] = True
                 self._look_again(other, up)
-                if all(self._next(one, now) or not self.left[one] for one in (side, other)):
+                if self._next(side, now):
                     return True
                 self.feet[other], self.stands, self.lag, self.left[other] = kept
         return False
