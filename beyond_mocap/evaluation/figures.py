@@ -11,7 +11,7 @@ from ..annotation import Timeline, automatic_gaits, fill, words_per_frame
 from ..errors import InputError
 from ..library.keys import serving
 from ..motion.contacts import floor_height
-from ..motion.track import sample
+from ..motion.track import sample, zero_phase_hann
 from . import feet, jerk, pieces, realism, root, words
 from .give_way import give_way, jolts
 from .moments import Moment, ball_gap, ball_shift, met
@@ -40,11 +40,16 @@ def place(view: View) -> dict:
 
 
 def _surge(view: View) -> dict:
-    """Surge against the rms of the used recordings at the same speed."""
+    """Surge against the rms of the used recordings at the same speed; `track` is what the track itself asks for, behind the
+    window behind which the root is held to it."""
     ours = root.surge(view.played.pelvis, view.fps)
     own = root.class_rms(view.own("surge"), root.speed_class(view.own("speed")))[root.speed_class(view.speed)]
     rms, real = _rms(ours), _rms(own)
-    return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": {"mean": rms, "own": real}}
+    asked = None
+    if view.wanted is not None:
+        asked = _rms(root.surge(zero_phase_hann(view.wanted, view.fps, root.ROOT_WINDOW), view.fps))
+    surge = {"mean": rms, "own": real, "track": asked}
+    return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": surge}
 
 
 def keys(view: View) -> list[dict]:

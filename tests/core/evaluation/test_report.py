@@ -257,6 +257,7 @@ def test_a_standing_body_stays_still(cut, track_of, library):
     assert report["root_error_m"]["max"] < 1e-6
     assert report["skate"]["contact_cm_s"] == 0.0 and report["skate"]["stance_mm_median"] == 0.0
     assert report["skate"]["gmd_ratio"] == 0.0 and report["pelvis_surge_m_s"]["mean"] == 0.0
+    assert report["pelvis_surge_m_s"]["track"] == 0.0
     assert report["seam_jerk_ratio"]["rest_max"] == 0.0 and report["smoothness_m"]["max"] == 0.0
 
 
