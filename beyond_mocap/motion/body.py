@@ -8,7 +8,7 @@ any rest pose. Girths are those of a slim adult of 1.80 m, scaled with the skele
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from . import quaternion
 from .gait_tables import LEG
 from .humanoid import Humanoid, Limb, identify
 from .motion import Motion
-from .neutral import Neutral, neutral_stance
+from .neutral import Neutral, neutral_stance, rests_upright
 from .skeleton import Skeleton, frozen_array
 
 MATERIALS = ("skin", "shirt", "shorts", "socks", "boots", "hair")
@@ -42,9 +42,11 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
     """A player's body for `skeleton`; `height`: stature in metres that girths belong to, default by the legs' length.
 
     example: any recording on the skeleton; it tells how bones are twisted where the rest pose is no standing one,
-    without it feet and hands of such skeletons may sit turned (see `neutral.neutral_stance`). Raises InputError where
-    hips or legs cannot be found."""
+    without it feet and hands of such skeletons may sit turned (see `neutral.neutral_stance`). The face looks ahead as the
+    rest pose does, where that stands upright. Raises InputError where hips or legs cannot be found."""
     neutral = neutral_stance(skeleton, example)
+    if example is not None and rests_upright(skeleton):
+        neutral = _level_head(neutral, neutral_stance(skeleton))
     build = _Build(neutral, identify(skeleton), neutral.leg / LEG if height is None else height / 1.80)
     build.torso()
     build.head()
@@ -58,6 +60,22 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
     rest = _to_rest(neutral, vertices, joints, weights)
     arrays = (frozen_array(rest), tuple(build.faces), frozen_array(joints, int), frozen_array(weights))
     return BodyMesh(*arrays, frozen_array(build.material, int))
+
+
+def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
+    """The stance with its head as it rests, unless that would have the example's people look up: who kicks or walks looks
+    down at the ground ahead, but some suits rest with a bowed head."""
+    carrier = _head_carrier(identify(neutral.skeleton))
+    ahead = quaternion.multiply(neutral.rotations[carrier], quaternion.inverse(rest.rotations[carrier]))
+    if quaternion.rotate(ahead, np.array([1.0, 0.0, 0.0]))[2] > 0.0:
+        return neutral
+    rotations = np.array(neutral.rotations)
+    rotations[carrier] = rest.rotations[carrier]
+    return replace(neutral, rotations=rotations)
+
+
+def _head_carrier(body: Humanoid) -> int:
+    return next(j for j in (body.head, body.neck, body.chest) if j is not None)
 
 
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
@@ -219,7 +237,7 @@ class _Build:
         body, k = self.body, self.scale
         hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
         shoulder, _ = self._shoulders(hip)
-        carrier = next(j for j in (body.head, body.neck, body.chest) if j is not None)
+        carrier = _head_carrier(body)
         neck = body.neck if body.neck is not None else body.chest
         base = self.at(carrier) if body.head is not None else shoulder + k * np.array([0.03, 0.0, 0.15])
         low = shoulder + k * np.array([-0.012, 0.0, 0.03])

@@ -22,6 +22,8 @@ _DOWN = -_UP
 _COLLAR_TOLERANCE = np.radians(40.0)
 # a spine this near to upright, a toe this near to level is left as it is
 _NEARLY = np.radians(25.0)
+# legs that hang at least so steeply stand
+_SPLAYED = np.radians(40.0)
 # slope of the line ankle-ball of a flat foot, and of a foot joint that hangs on nothing
 _SOLE_SLOPE = np.radians(22.0)
 # height of the ball of the foot (the toe joint) above the ground, share of the leg's length
@@ -61,6 +63,16 @@ def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral
     local = _to_local(skeleton, world)
     positions, _ = pose_kinematics(skeleton, np.zeros((1, 3)), local[None])
     return _measure(skeleton, body, world, positions[0])
+
+
+def rests_upright(skeleton: Skeleton) -> bool:
+    """Whether the rest pose (no joint rotated) stands: its spine is upright and its legs hang, if splayed."""
+    body = identify(skeleton)
+    places, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
+    top = next(j for j in (body.neck, body.head, body.chest, body.hips) if j is not None)
+    bones = [(body.hips, top, _UP, _NEARLY)]
+    bones += [(leg.upper_leg, leg.foot, _DOWN, _SPLAYED) for leg in (body.left, body.right)]
+    return all(unit(places[0, low] - places[0, high], -way) @ way > np.cos(most) for high, low, way, most in bones)
 
 
 def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.ndarray:

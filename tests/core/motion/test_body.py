@@ -2,6 +2,7 @@
 
 import pathlib
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,3 +102,32 @@ def test_fits_recorded_skeletons(clip):
     leader = np.take_along_axis(body.joints, np.argmax(body.weights, axis=1)[:, None], axis=1)[:, 0]
     near = np.linalg.norm(posed - places[0][leader], axis=1)
     assert np.all(np.isfinite(posed)) and near.max() < 0.6
+
+
+def bowed(degrees: float):
+    """A walk of the adult skeleton whose head is bowed by `degrees` in every frame."""
+    motion = gait(1.3, 3.0, 30.0, adult_skeleton())
+    head = motion.skeleton.index("Head")
+    rotations = motion.rotations.copy()
+    turn = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), np.radians(degrees))
+    rotations[:, head] = quaternion.multiply(rotations[:, head], np.tile(turn, (len(motion), 1)))
+    return replace(motion, rotations=rotations)
+
+
+def face_pitch(body, motion) -> float:
+    """Degrees between the drawn face's gaze and that of a body drawn from the rest pose, in the first frame."""
+    head = motion.skeleton.index("Head")
+    mine = (body.joints[:, 0] == head) & (body.weights[:, 0] == 1.0)
+    places, world = forward_kinematics(motion)
+    shown = [deformed(one, motion.skeleton, places[0], world[0])[mine] for one in (body, low_poly_body(motion.skeleton))]
+    drawn, rest = (points - points.mean(axis=0) for points in shown)
+    u, _, v = np.linalg.svd(drawn.T @ rest)
+    forward = (u @ v) @ np.array([1.0, 0.0, 0.0])
+    return float(np.degrees(np.arcsin(np.clip(forward[2], -1.0, 1.0))))
+
+
+@pytest.mark.parametrize("degrees, least, most", [(28.0, 0.0, 1.0), (-25.0, 15.0, 30.0)])
+def test_a_face_that_looks_down_in_the_example_is_drawn_so(degrees, least, most):
+    """Kicks look down: the head's rest tells. Where the example looks up by its rest pose, the rest pose is bowed."""
+    motion = bowed(degrees)
+    assert least <= abs(face_pitch(low_poly_body(motion.skeleton, example=motion), motion)) <= most
