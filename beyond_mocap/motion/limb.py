@@ -11,11 +11,11 @@ import numpy as np
 from . import quaternion
 
 
-def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float) -> np.ndarray:
+def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray) -> np.ndarray:
     """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then it only nears
     it.
 
-    distance (...,) asked, longest (...,) upper plus lower bone; C1, so that a knee does not snap straight.
+    distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap straight.
     """
     start = longest - soft
     beyond = np.maximum(distance - start, 0.0)

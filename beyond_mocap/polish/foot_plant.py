@@ -41,6 +41,9 @@ EASE, SPARE, SPARE_ALOFT = 0.012, 0.004, 0.02
 """Metres below full length from which a leg eases (`limb.soft_distance`), and which are left of it where it stands and
 in the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may be so."""
 
+LEAST_EASE, LEAST_SPARE = 0.003, 0.002
+"""The same of legs that were straight in the recording."""
+
 _EASED_ROUNDS, _SLIDES_FROM = 3, 0.004
 _BEHIND = 3  # frames at 30 per second by which a rise or drop is spread
 
@@ -59,7 +62,8 @@ class Planted:
 @dataclass(frozen=True, eq=False)
 class _Foot:
     """One foot laid out: hip, heel (the ankle joint) and toe (T, 3) m, rotation (T, 4) in the world, left (T, 3) level
-    across it, weight (T, 2) of heel and toe, length (T,) m of its leg; `moves` (T - 1, 2, 2) m of heel and toe over the
+    across it, weight (T, 2) of heel and toe, length (T,) m of its leg and `own`,
+    what it was short of that in the pose that was given; `moves` (T - 1, 2, 2) m of heel and toe over the
     ground."""
 
     limb: Limb
@@ -70,6 +74,7 @@ class _Foot:
     left: np.ndarray
     weight: np.ndarray
     length: np.ndarray
+    own: np.ndarray
 
     @property
     def moves(self) -> np.ndarray:
@@ -78,6 +83,16 @@ class _Foot:
     def moved(self, by: np.ndarray) -> _Foot:
         """The foot moved by (T, 3) m."""
         return replace(self, heel=self.heel + by, toe=self.toe + by)
+
+    @property
+    def ease(self) -> np.ndarray:
+        """(T,) metres below full length from which the leg eases."""
+        return np.clip(self.own, LEAST_EASE, EASE)
+
+    @property
+    def longest(self) -> np.ndarray:
+        """(T,) metres that the leg is long at most where it stands."""
+        return self.length - np.clip(self.own, LEAST_SPARE, SPARE)
 
     @property
     def carries(self) -> np.ndarray:
@@ -128,7 +143,7 @@ def plant(
     for side, (foot, (target, turned)) in enumerate(zip(feet, goals)):
         target = _within_reach(foot, target, drop)
         chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        reached = two_bone(skeleton, root, out, chain, target, end_rotation=turned, soft=EASE)
+        reached = two_bone(skeleton, root, out, chain, target, end_rotation=turned, soft=foot.ease)
         out, miss[:, side] = reached.rotations, reached.miss
         correction[:, side] = np.linalg.norm(target - places[:, foot.limb.foot], axis=1)
     return Planted(root, out, correction, miss)
@@ -138,10 +153,11 @@ def _laid(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray)
     hip, knee, heel, toe = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
     weight = firmness(stands)
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
+    own = length - np.linalg.norm(heel - hip, axis=1)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
     yaw = np.arctan2(along[:, 1], along[:, 0])
     left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
-    return _Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length)
+    return _Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length, own)
 
 
 def firmness(stands: np.ndarray) -> np.ndarray:
@@ -185,7 +201,7 @@ def _rise(foot: _Foot, moved: np.ndarray) -> np.ndarray:
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
     even, odd = np.sum(u * level, axis=1), np.sum(u * quaternion.cross(n, level), axis=1)
-    length = foot.length - SPARE
+    length = foot.longest
     asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
     most = np.hypot(even, odd)
     rise = np.arctan2(odd, even) - np.arccos(np.clip(asked / np.maximum(most, 1e-9), -1.0, 1.0))
@@ -279,7 +295,7 @@ def _drop(feet: list[_Foot], goals: list[np.ndarray], spread: int, most: float) 
     """(T,) metres to lower the pelvis so that standing ankles can be reached, at most `most`, without a jerk."""
     need = np.zeros(len(goals[0]))
     for foot, goal in zip(feet, goals):
-        length = foot.length - SPARE
+        length = foot.longest
         level = np.linalg.norm(goal[:, :2] - foot.hip[:, :2], axis=1)
         highest = goal[:, 2] + np.sqrt(np.maximum(length**2 - level**2, 0.0))
         lacks = np.where(level < length, foot.hip[:, 2] - highest, most)
@@ -298,7 +314,7 @@ def _spread(need: np.ndarray, reach: int) -> np.ndarray:
 def _short(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
     """(T,) metres that a standing foot's leg lacks."""
     reach = goal - foot.hip + drop[:, None] * [0.0, 0.0, 1.0]
-    return np.where(foot.carries > 0, np.linalg.norm(reach, axis=1) - foot.length + SPARE, 0.0)
+    return np.where(foot.carries > 0, np.linalg.norm(reach, axis=1) - foot.longest, 0.0)
 
 
 def _within_reach(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
@@ -306,7 +322,7 @@ def _within_reach(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip
     far = np.linalg.norm(reach, axis=1)
-    own = np.minimum(np.linalg.norm(foot.heel - foot.hip, axis=1), foot.length - SPARE)
+    own = np.minimum(np.linalg.norm(foot.heel - foot.hip, axis=1), foot.longest)
     longest = np.maximum(foot.length - SPARE_ALOFT, own)
     over = np.maximum(far - longest, 0.0) * (1.0 - np.minimum(foot.carries, 1.0))
     return goal - reach * (over / far)[:, None]

@@ -37,7 +37,7 @@ def two_bone(
     end_rotation: np.ndarray | None = None,
     keep_end_rotation: bool = True,
     pole: np.ndarray | None = None,
-    soft: float = 0.01,
+    soft: float | np.ndarray = 0.01,
 ) -> Reached:
     """Local rotations with which a limb's end joint is at `target`.
 
@@ -45,7 +45,7 @@ def two_bone(
     shoulder, elbow, wrist), each below the one before, further joints between allowed; target (T, 3) metres, world.
     end_rotation (T, 4): world rotation that the end joint gets; without it the end joint keeps its own, or (with
     keep_end_rotation false) turns rigidly with the lower bone. pole (T, 3): world direction in which the middle joint
-    points; without it the pose's own. soft: metres below full extension from where the limb eases, see
+    points; without it the pose's own. soft, one or (T,): metres below full extension from where the limb eases, see
     `limb.soft_distance`: the miss is at most soft / e = 0.37 soft where the target is in reach.
 
     Bones are never stretched; a target out of reach is neared along the line from the upper joint.

@@ -7,9 +7,11 @@ import pytest
 
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.gait import gait
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.humanoid import identify, leg_length
 from beyond_mocap.motion.motion import place, pose_kinematics
+from beyond_mocap.motion.neutral import _to_local, neutral_stance
 from beyond_mocap.polish.foot_plant import MOST_DROP, plant, shift
+from beyond_mocap.polish.reach import two_bone
 
 
 @pytest.fixture(scope="module")
@@ -187,3 +189,36 @@ def test_a_given_shift_is_reached_and_kept_while_the_foot_stands():
     found = shift(np.zeros((59, 2)), weight, kept=kept)
     assert np.allclose(found[:25], [0.03, -0.01], atol=1e-6)
     assert np.abs(np.diff(found[25:40], axis=0)).max() < 5e-4 and np.abs(found[55:]).max() < 2e-3
+
+
+def knees_of(motion, root, rotations):
+    """Angle inside both knees (T, 2), degrees."""
+    body = identify(motion.skeleton)
+    places, _ = pose_kinematics(motion.skeleton, root, rotations)
+    out = []
+    for limb in (body.left, body.right):
+        up, down = (places[:, other] - places[:, limb.lower_leg] for other in (limb.upper_leg, limb.foot))
+        cosine = np.sum(up * down, axis=1) / (np.linalg.norm(up, axis=1) * np.linalg.norm(down, axis=1))
+        out.append(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    return np.stack(out, axis=1)
+
+
+@pytest.mark.parametrize("levels", [True, False])
+def test_a_leg_comes_as_straight_as_it_was(walk, levels):
+    """Whoever stands and goes up to straight knees, at 172 degrees, keeps them; nothing slides."""
+    motion, _ = walk
+    body = identify(motion.skeleton)
+    count, leg = 60, leg_length(motion.skeleton)
+    stance = neutral_stance(motion.skeleton)
+    rotations = np.tile(_to_local(motion.skeleton, stance.rotations), (count, 1, 1))
+    straight = pose_kinematics(motion.skeleton, np.zeros((1, 3)), rotations[:1])[0][0]
+    rise = -0.0025 * leg - 0.02 * (1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, count)))
+    root = np.outer(rise - straight[body.left.toe_or_foot, 2], [0.0, 0.0, 1.0])
+    for limb in (body.left, body.right):
+        target = np.tile(straight[limb.foot] - [0.0, 0.0, straight[body.left.toe_or_foot, 2]], (count, 1))
+        chain = (limb.upper_leg, limb.lower_leg, limb.foot)
+        rotations = two_bone(motion.skeleton, root, rotations, chain, target, soft=1e-6).rotations
+    given = knees_of(motion, root, rotations)
+    assert given.max() > 170.0
+    out = plant(motion.skeleton, root, rotations, np.ones((count, 2, 2), bool), 30.0, levels=levels)
+    assert np.abs(knees_of(motion, out.root, out.rotations) - given).max() < 2.0
