@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from .lay_out import aimed, faced, footed, leaning, met, smoothed, touches, towards_ball
 from .library.library import Library
 from .motion import quaternion
 from .motion.motion import Motion
@@ -40,8 +41,7 @@ from .synthesis.path_search import Between, PathSearch
 from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
-    Progress, aimed, faced, footed, key_result, leaning, met, smoothed, sources_shown, synthesize, touches, towards_ball,
-    with_made_gaits, with_warnings, words_shown,
+    Progress, key_result, sources_shown, synthesize, with_made_gaits, with_warnings, words_shown,
 )
 from .take import BallPath, KeyResult, Take
 
@@ -231,7 +231,7 @@ class _Update:
             contacts=self.contacts,
             seams=self.shown.seams,
             timeline=self.order.timeline,
-            keys=tuple(self._as_before(key) for key in self.keys),
+            keys=self._keys_as_before(),
             ball=self._ball_path(),
             correction=self.correction,
             ik_miss=self.miss,
@@ -245,11 +245,17 @@ class _Update:
             return None
         return BallPath(self.track.times, self.ball, self.track.ball_measured)
 
-    def _as_before(self, key: KeyResult) -> KeyResult:
-        """The old result of a key moment whose frame has not been touched, under the line in which it is asked now."""
-        near = int(np.clip(round(key.frame), 0, len(self.anew) - 1))
-        old = [result for result in self.before.keys if result.asked == key.asked]
-        return replace(old[0], asked=key.asked) if old and not self.anew[near] else key
+    def _keys_as_before(self) -> tuple[KeyResult, ...]:
+        """The results; of a key moment whose frame has not been touched the old one, under the line in which it is asked
+        now."""
+        out, left = [], list(self.before.keys)
+        for key in self.keys:
+            near = int(np.clip(round(key.frame), 0, len(self.anew) - 1))
+            old = next((result for result in left if result.asked == key.asked), None)
+            if old is not None:
+                left.remove(old)
+            out.append(key if old is None or self.anew[near] else replace(old, asked=key.asked))
+        return tuple(out)
 
 
 class _Window:

@@ -8,7 +8,7 @@ from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.motion.striking import surfaces
 from beyond_mocap.polish.face_ball import MOST, turned_to_ball
 from beyond_mocap.polish.strike import Touch
-from beyond_mocap.synthesize import faced
+from beyond_mocap.lay_out import faced
 
 KICK = made_strike("kick low inside", fps=60.0)
 WORDS = frozenset({"kick", "low", "inside", "right"})
