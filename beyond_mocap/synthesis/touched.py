@@ -49,13 +49,15 @@ def kept_keys(edit: EditList, before: Wanted, after: Wanted) -> tuple[PlacedKey,
 
 
 def _same_keys(before: Wanted, after: Wanted) -> dict[int, int]:
-    """Number in the old order -> number in the new one of the key moments that are asked as they were."""
-    found = {}
+    """Number in the old order -> number in the new one of the key moments that are asked as they were; of those asked
+    twice, the first answers to the first."""
+    found: dict[int, int] = {}
     for number, key in enumerate(after.keys):
         at = int(np.clip(round(key.frame), 0, len(after) - 1))
         ball = np.linalg.norm(before.track.ball[at] - after.track.ball[at])
-        if key in before.keys and not ball > BALL:  # NaN where there is none
-            found[before.keys.index(key)] = number
+        old = next((n for n, other in enumerate(before.keys) if other == key and n not in found), None)
+        if old is not None and not ball > BALL:  # NaN where there is none
+            found[old] = number
     return found
 
 

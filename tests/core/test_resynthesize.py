@@ -67,6 +67,12 @@ def test_nothing_touched_nothing_changed(library, take):
     assert again.keys == take.keys and again.warnings == take.warnings
 
 
+def test_a_key_moment_asked_twice_stays(library, track, timeline_of):
+    before = synthesize(library, Plan(track=track, timeline=timeline_of((5.0, "kick right"), (5.0, "kick right"))))
+    again = resynthesize(library, before.plan, before)
+    assert not changed(before, again).any() and again.keys == before.keys and again.warnings == before.warnings
+
+
 @pytest.mark.parametrize("time", [4.8, 5.2, 6.0])
 def test_a_key_moment_is_moved(library, take, time):
     kick, other = take.plan.timeline.keys

@@ -56,6 +56,12 @@ def test_the_kept_keys_have_their_new_numbers(order, searched, long):
     assert kept.wanted == 0 and kept.key == edit.keys[1].key
 
 
+def test_a_key_moment_asked_twice_is_as_it_was(library, searched):
+    asked, edit = searched((10.0, "kick right"), (10.0, "kick right"))
+    assert len(edit.keys) == 1
+    assert to_search(library, edit, asked, asked, SLOT) == [] and kept_keys(edit, asked, asked) == edit.keys
+
+
 def test_faster_is_another_thing_to_ask_for_and_elsewhere_is_not(order, long, track_of):
     before = order(track=long)
     aside = type(long)(long.times, long.positions + [0.0, 0.5])
