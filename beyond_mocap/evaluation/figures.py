@@ -14,7 +14,7 @@ from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
 from . import feet, jerk, pieces, realism, root, words
 from .give_way import give_way, jolts
-from .moments import Moment, ball_gap, ball_shift, met
+from .moments import Moment, ball_gap, ball_shift, met, with_made
 from .reference import source_poses
 from .view import View
 
@@ -205,16 +205,17 @@ def asked_words(
 
 
 def filled_timeline(view: View) -> Timeline:
-    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet (Faustino
-    §3.1.1)."""
-    if view.library is None or view.track is None:
+    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet (Faustino §3.1.1);
+    made clips count where one is shown."""
+    library = with_made(view.library, view.played)
+    if library is None or view.track is None:
         return view.timeline
     try:
-        gaits = view.library.gaits
+        gaits = library.gaits
     except InputError:
         return view.timeline
-    sampled = sample(view.track, view.library.fps)
-    thresholds = view.library.gait_thresholds
+    sampled = sample(view.track, library.fps)
+    thresholds = library.gait_thresholds
     chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
     return fill(view.timeline, sampled.times, [gaits[index].words for index in chosen])
 

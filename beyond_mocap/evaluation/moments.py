@@ -42,12 +42,12 @@ def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, lib
     starts = pieces.seams(played.clip, played.mirrored, played.clip_frame, stride)
     number = pieces.runs(len(played.clip), starts)
     told = {result.asked: result for result in played.keys}
-    library = _with_made(library, played)
+    library = with_made(library, played)
     return [_moment(played, key, number, told.get(key), library) for key in keys]
 
 
-def _with_made(library: Library | None, played: Played) -> Library | None:
-    """The library whose key moments were played: with its made clips where one of them is shown."""
+def with_made(library: Library | None, played: Played) -> Library | None:
+    """The library whose gaits and key moments were played: with its made clips where one of them is shown."""
     if library is None or not any(path.startswith(MADE_FOLDER) for path in played.clips):
         return library
     return library.extended

@@ -3,14 +3,18 @@ moment."""
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import KeyMoment, Span, Timeline
+from beyond_mocap.annotation import KeyMoment, Span, Timeline, words_per_frame
 from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation import evaluate, evaluate_played, played_from_tables, played_from_take, table
+from beyond_mocap.evaluation.figures import filled_timeline
 from beyond_mocap.files import bvh, tables
+from beyond_mocap.library.library import Gait
+from beyond_mocap.library.made import MADE_FOLDER
 from beyond_mocap.motion.motion import at_frames
 from beyond_mocap.motion.track import Track
 
@@ -199,6 +203,19 @@ def test_similarity_counts_asked_words_and_leaves_entry_and_exit_out(cut, track_
 def test_automatic_locomotion_is_asked_by_speed(cut, track_of, library):
     take = cut(("run.bvh", 60, 200))
     assert evaluate(take, track_of(take), library)["annotation_similarity"]["all"] == -1.0
+
+
+@pytest.mark.parametrize("shows, word", [("jog.bvh", "walking"), (MADE_FOLDER + "slow_3.0.bvh", "jogging")])
+def test_automatic_words_come_from_made_clips_too_where_one_is_shown(shows, word):
+    """At 2.4 m/s the recordings' walk is asked, but a jog that was made is nearer."""
+    walk, jog = Gait("walking", ("walking", "front"), 1.4), Gait("jogging", ("jogging", "front"), 2.6)
+    more = SimpleNamespace(fps=FPS, gaits=(walk, jog), gait_thresholds=np.array([2.0]))
+    library = SimpleNamespace(fps=FPS, gaits=(walk,), gait_thresholds=np.zeros(0), extended=more)
+    times = np.arange(0.0, 4.0, 0.04)
+    track = Track(times, np.column_stack([2.4 * times, np.zeros_like(times)]))
+    view = SimpleNamespace(library=library, track=track, timeline=Timeline(), played=SimpleNamespace(clips=(shows,)))
+    asked = words_per_frame(filled_timeline(view), np.array([1.0, 2.0, 3.0]))
+    assert all(word in found for found in asked)
 
 
 def test_files_score_as_the_take_in_memory(cut, track_of, still_ball, library, tmp_path):
