@@ -24,7 +24,7 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 16
+VERSION = 22
 _FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean", "basis", "words")
 
 

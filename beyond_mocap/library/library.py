@@ -264,12 +264,14 @@ def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancell
         read.append(bvh.read(path, unit))
     notes += _unit_notes(read)
     unpopped = [repair.without_pops(source.motion) for source in read]
-    carried = one_skeleton.bring(paths, [motion for motion, _ in unpopped], _chosen(chosen, unit), notes)
+    level = [repair.without_drift(motion) for motion, _ in unpopped]
+    carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
     mended, rows = [], []
     for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
         _check(cancelled)
         report(0.4 + 0.3 * number / len(paths), f"Mending and mirroring {path.name}")
-        mended.append(repair.grounded(motion, standing, moved))
+        one = repair.grounded(motion, standing, moved)
+        mended.append(replace(one, drift=one.drift + level[number][1]))
         rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
     notes += repair.told([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
     originals = _landed([path.relative_to(folder).as_posix() for path in paths], mended, rows, notes)

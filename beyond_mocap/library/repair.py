@@ -20,10 +20,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solveh_banded
+from scipy.ndimage import minimum_filter1d
 
 from ..motion import contacts, quaternion
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
+from ..motion.track import zero_phase_hann
 from ..polish.foot_plant import plant
 
 # a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
@@ -34,6 +36,7 @@ _POP_SECONDS = 0.04  # longer than a pop
 # optical recordings have 0.01 to 0.1 where they stand or walk and up to 0.067 v in runs, suits 0.12 to 0.25 at any speed
 _SLIDES, _SLIDES_SHARE = 0.13, 0.065
 # stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
+_LOW_SECONDS, _DRIFT = 1.5, 0.13
 _FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2
 _FLOOR_MOST = 0.02  # metres of drift that are left alone: no floor is that even, and soles lie a little differently
 _KEEP_SPEED = 0.005
@@ -73,6 +76,23 @@ def without_pops(motion: Motion) -> tuple[Motion, int]:
                 rotations[frame + step, joint] = quaternion.slerp(before, after, (step + 1.0) / (width + 1.0))
         count += int(here.sum()) * width
     return (replace(motion, rotations=rotations), count) if count else (motion, 0)
+
+
+def without_drift(motion: Motion) -> tuple[Motion, float]:
+    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres while it lasts, and by how much it did.
+
+    The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can rise by
+    half a metre in five seconds; no foot would be seen to stand there before that is taken out.
+    """
+    low = forward_kinematics(motion)[0][..., 2].min(axis=1)
+    width = max(1, int(round(_LOW_SECONDS * motion.fps)))
+    floor = np.zeros((len(low), 1))
+    for _ in range(3):  # on a slope the lowest within a window lies at its end: what is left is smaller each time
+        floor += zero_phase_hann(minimum_filter1d(low[:, None] - floor, width, axis=0), motion.fps, _LOW_SECONDS)
+    drift = float(np.ptp(floor))
+    if drift < _DRIFT:
+        return motion, 0.0
+    return replace(motion, root_positions=motion.root_positions - floor * [0.0, 0.0, 1.0]), drift
 
 
 def _popped(rotations: np.ndarray, width: int) -> np.ndarray:
