@@ -82,7 +82,7 @@ def without_drift(motion: Motion) -> tuple[Motion, float]:
     """The motion on a floor that neither rises nor sinks by more than _DRIFT metres while it lasts, and by how much it did.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can rise by
-    half a metre in five seconds; no foot would be seen to stand there before that is taken out.
+    half a metre in five seconds, and `_levelled` knows only feet that are seen to stand.
     """
     low = forward_kinematics(motion)[0][..., 2].min(axis=1)
     width = max(1, int(round(_LOW_SECONDS * motion.fps)))
