@@ -1,7 +1,8 @@
 """What a library's uncut recordings score themselves, worked out once per library and output rate.
 
 Measured are the recordings as they are used: brought to the library's skeleton and mended (`library.repair`), which leaves
-their jerk as it was (on four libraries at most 3 % more in any speed class).
+their jerk as it was: the 95th percentile moves by 1 % at most where clips keep their speed class, by 4 to 9 % on a library of
+five bodies whose clips nearly all get other feet.
 
 Every recording is resampled to the output's rate and measured frame by frame; a take's own score is then a look-up of
 the frames it used. Twins are not measured again: all figures here are the same for left and right.
