@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .annotation.gaze import wanted_offset
 from .library.library import Library
 from .motion import quaternion
 from .motion.humanoid import identify
@@ -27,7 +28,6 @@ from .polish.steps import Steps, steps
 from .polish.strike import Struck, Touch, strike
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, overlap
-from .synthesis.gaze import wanted_offset
 from .synthesis.locomotion import travelled_distance
 from .synthesis.wanted import needed
 from .take import KeyResult

@@ -5,6 +5,7 @@
 - `text`        the text form of timelines (§4.2.2)
 - `clips`       what the library's clips are annotated with
 - `gaits`       which gait a speed asks for (§3.1.1)
+- `gaze`        which way a body faces while it goes
 
     timeline = read_timeline("player.txt", fps=30)
     validate(timeline, known_words=library_words, start=track.times[0], end=track.times[-1], where="player.txt")

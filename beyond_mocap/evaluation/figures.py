@@ -9,6 +9,7 @@ import numpy as np
 
 from ..annotation import Timeline, automatic_gaits, fill, words_per_frame
 from ..errors import InputError
+from ..library.automatic import automatic_words
 from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
@@ -217,7 +218,7 @@ def filled_timeline(view: View) -> Timeline:
     sampled = sample(view.track, library.fps)
     thresholds = library.gait_thresholds
     chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
-    return fill(view.timeline, sampled.times, [gaits[index].words for index in chosen])
+    return fill(view.timeline, sampled.times, automatic_words(library, chosen, sampled))
 
 
 def annotation_similarity(view: View) -> dict:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..annotation.gaze import wanted_offset
 from ..library.library import Library
-from .gaze import wanted_offset
 from .offer import RATES, SLOT, Offer, Traits
 from .wanted import Wanted
 

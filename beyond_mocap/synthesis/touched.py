@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..annotation.gaze import wanted_offset
 from ..library.library import Library
 from .edit_list import EditList, PlacedKey
-from .gaze import wanted_offset
 from .wanted import Wanted, WantedKey, needed
 
 RUN_UP = 1.0

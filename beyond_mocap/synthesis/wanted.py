@@ -8,11 +8,11 @@ import numpy as np
 
 from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, gait_thresholds, spoken, words_per_frame
 from ..errors import NotInLibrary
+from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
 from ..motion.track import SampledTrack, sample
 from ..plan import Plan
-from .gaze import direction_words, wanted_offset
 
 PAPERS_OMEGA = 4.0
 
@@ -57,7 +57,7 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     labelled = plan.method == "path" and not plan.omega
     thresholds = library.gait_thresholds if labelled else gait_thresholds(speeds, plan.omega or PAPERS_OMEGA)
     gait = automatic_gaits(track.speed, library.fps, speeds, thresholds)
-    timeline = fill(plan.timeline, track.times, _automatic_words(library, gait, track))
+    timeline = fill(plan.timeline, track.times, automatic_words(library, gait, track))
     allowed = np.array([plan.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
     keys = tuple(_key(library, moment, track, gait, allowed, plan.nearest, warnings) for moment in timeline.keys)
@@ -67,18 +67,6 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
     warnings += _lacking(library, plan.timeline)
     return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings))
-
-
-def _automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> list[tuple[str, ...]]:
-    """(T,) the words of each frame's gait; where the library also has it in the direction in which a body that faces the
-    ball would go (`gaze.wanted_offset`), in that direction."""
-    recorded = {row.words for clip in library.clips for row in clip.annotations}
-    words: list[tuple[str, ...]] = []
-    for number, direction in zip(gait, direction_words(wanted_offset(track), track.fps)):
-        own = library.gaits[number].words
-        turned = tuple(direction if word == "front" else word for word in own)
-        words.append(turned if turned in recorded else own)
-    return words
 
 
 def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:

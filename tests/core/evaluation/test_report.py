@@ -209,8 +209,8 @@ def test_automatic_locomotion_is_asked_by_speed(cut, track_of, library):
 def test_automatic_words_come_from_made_clips_too_where_one_is_shown(shows, word):
     """At 2.4 m/s the recordings' walk is asked, but a jog that was made is nearer."""
     walk, jog = Gait("walking", ("walking", "front"), 1.4), Gait("jogging", ("jogging", "front"), 2.6)
-    more = SimpleNamespace(fps=FPS, gaits=(walk, jog), gait_thresholds=np.array([2.0]))
-    library = SimpleNamespace(fps=FPS, gaits=(walk,), gait_thresholds=np.zeros(0), extended=more)
+    more = SimpleNamespace(fps=FPS, gaits=(walk, jog), gait_thresholds=np.array([2.0]), clips=())
+    library = SimpleNamespace(fps=FPS, gaits=(walk,), gait_thresholds=np.zeros(0), clips=(), extended=more)
     times = np.arange(0.0, 4.0, 0.04)
     track = Track(times, np.column_stack([2.4 * times, np.zeros_like(times)]))
     view = SimpleNamespace(library=library, track=track, timeline=Timeline(), played=SimpleNamespace(clips=(shows,)))

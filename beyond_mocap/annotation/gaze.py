@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..annotation.gaits import without_short_runs
 from ..motion.track import SampledTrack, zero_phase_hann
+from .gaits import without_short_runs
 
 _SPEEDS = np.array([0.8, 1.5, 2.5, 4.0, 6.0])
 _MOST_TURNED = np.array([np.pi, 1.3, 0.6, 0.2, 0.0])
