@@ -159,6 +159,8 @@ class Library:
             if self.kept:
                 _keep_made(self.kept[0], made.clips)
                 cache.save(*self.kept, made, "made")
+        else:
+            _keep_made(self.kept[0], made.clips, missing_only=True)
         if not made.clips:
             return self
         frames = joined(self.frames, made.frames)
@@ -217,11 +219,12 @@ def build(
         report(0.0, "Reading the cache")
         found = cache.load(place, key)
         if found is not None:
+            _keep_made(place, _completed(found.clips), missing_only=True)
             return replace(found, folder=str(folder), kept=(place, key))
     notes: list[str] = [where] if where else []
     clips = _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled)
     built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
-    _keep_made(place, [clip for clip in built.clips if clip.recorded is not None])
+    _keep_made(place, _completed(built.clips))
     if not cache.save(place, key, built):
         told = f"{place} cannot be written: the library is worked out anew each time; give --cache a folder of yours"
         built = replace(built, notes=(*built.notes, told))
@@ -242,13 +245,19 @@ def _made(library: Library) -> Library:
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
 
 
-def _keep_made(place: Path, made: Iterable[Clip]) -> None:
+def _completed(clips: Iterable[Clip]) -> list[Clip]:
+    """Those that go on behind their recording's end."""
+    return [clip for clip in clips if clip.recorded is not None]
+
+
+def _keep_made(place: Path, made: Iterable[Clip], missing_only: bool = False) -> None:
     """Writes clips that are made, or end so, as BVH beside the cache, so that whoever follows a take's provenance finds
-    them; a place that cannot be written is left alone."""
+    them; a place that cannot be written is left alone. missing_only: those that are not there, as when someone has
+    tidied up."""
     try:
         for clip in made:
-            if not clip.mirrored:
-                file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)
+            file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)
+            if not clip.mirrored and not (missing_only and file.exists()):
                 file.parent.mkdir(parents=True, exist_ok=True)
                 bvh.write(file, clip.motion)
     except OSError:

@@ -83,6 +83,14 @@ def test_kept_beside_the_cache_and_read_back_the_same(library, more):
     assert all(np.array_equal(a.standing, b.standing) for a, b in zip(again.clips, more.clips))
 
 
+def test_made_files_that_were_tidied_away_are_written_again(library, more):
+    place = library.kept[0]
+    before = {file.name: file.read_bytes() for file in (place / "made-gait").glob("*.bvh")}
+    next((place / "made-gait").glob("*.bvh")).unlink()
+    assert len(build(library.folder, cache_dir=place).extended.clips) == len(more.clips)
+    assert {file.name: file.read_bytes() for file in (place / "made-gait").glob("*.bvh")} == before
+
+
 def test_a_track_at_a_recorded_speed_uses_recordings_only(library):
     take = synthesize(library, Plan(track=straight(1.4)))
     assert not any(name.startswith(MADE_FOLDER) for name in take.clips)
