@@ -240,7 +240,11 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     if options.report:
         write_report(options.report, report)
     told.end()
-    for line in (*take.warnings, *(f"{options.track}: {line}" for line in data.lines)):
+    if library.notes:
+        command = f"'beyond-mocap library {options.library}'"
+        told.note(f"{options.library}: {len(library.notes)} notes on how its recordings were read; {command} tells them")
+    of_take = [line for line in take.warnings if line not in library.notes]
+    for line in (*of_take, *(f"{options.track}: {line}" for line in data.lines)):
         told.note(line)
     if options.ball and take.ball is None:
         told.note(f"{options.track} has no ball, so {options.ball} was not written")

@@ -387,6 +387,14 @@ def test_json_lines_can_be_read_by_machines(run, synthesize, tmp_path, clip_file
     assert status == 2 and "none.csv" in error[-1]
 
 
+def test_what_a_library_says_of_itself_is_one_line_to_who_synthesizes(run, synthesize, clips_folder):
+    status, out, _ = run("library", clips_folder)
+    own = [line for line in out.splitlines() if line.startswith("unit ")]
+    status, _, error = synthesize()
+    assert status == 0 and own and not any(note in line for note in own for line in error)
+    assert sum("'beyond-mocap library " in line for line in error) == 1
+
+
 def test_no_progress_where_nobody_looks(run, clip_file, tmp_path):
     clip_file(tmp_path / "walk.bvh", 1.4, 1.5)
     assert run("library", tmp_path)[2] == []
