@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ..beyond_mocap.annotation import validate
-from ..beyond_mocap.errors import Cancelled
+from ..beyond_mocap.errors import Cancelled, NotInLibrary
 from ..beyond_mocap.plan import Plan
 from ..beyond_mocap.take import Take
 from ..scene import plans, session
@@ -113,6 +113,8 @@ class SynthesisVerb(BackgroundVerb):
                     take = synthesize(clips, plan, report, cancelled, hurry)
                 else:
                     take = resynthesize(clips, plan, before, report, cancelled, hurry)
+            except NotInLibrary as error:
+                raise NotInLibrary(f"{where}: {error}", error.nearest) from None
             except Cancelled:
                 if not made or cancelled():
                     raise
@@ -139,10 +141,10 @@ class SynthesisVerb(BackgroundVerb):
             player.warnings = "\n".join(line for line in told if line not in result.library.notes)
         if lost:
             self.report({"WARNING"}, f"not in the list any more, so their takes are dropped: {', '.join(lost)}")
-        if len(result.made) < result.asked:
-            told = f"ended early: {len(result.made)} of {result.asked} players, the others are as before"
-            self.report({"WARNING"}, told)
-        self.report({"INFO"}, f"players synthesized: {len(result.made) - len(lost)}; press Bake to see them")
+        told = f"players synthesized: {len(result.made) - len(lost)}; press Bake to see them"
+        if len(result.made) < result.asked:  # in the same line, since the status bar shows the last one
+            told = f"ended early, {result.asked - len(result.made)} left as before; {told}"
+        self.report({"WARNING" if len(result.made) < result.asked else "INFO"}, told)
 
 
 class BEYOND_MOCAP_OT_synthesize(SynthesisVerb, bpy.types.Operator):

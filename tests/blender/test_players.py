@@ -189,8 +189,15 @@ def test_in_a_hurry_players_that_are_not_begun_stay_as_they_are(extension, ready
         in_a_hurry = lambda: max(told, default=0.0) >= fraction_of_hurry  # noqa: E731
         return module.SynthesisVerb.work(order, lambda fraction, text: told.append(fraction), lambda: False, in_a_hurry)
 
+    class Verb(module.SynthesisVerb):
+        def report(self, kind, text):
+            said.append((kind, text))
+
+    said = []
     result = work(0.2)
     assert (len(result.made), result.asked) == (1, 2)
+    Verb().apply(bpy.context.scene, result)
+    assert said == [({"WARNING"}, "ended early, 1 left as before; players synthesized: 1; press Bake to see them")]
     assert "cut short" in "".join(result.made[0][2].warnings)
     assert len(work(2.0).made) == 2
     with pytest.raises(core("errors").Cancelled):
@@ -280,7 +287,7 @@ def test_bad_tracking(tmp_path, content, found):
 
 def test_words_that_the_library_lacks(ready, match):
     (match / "player1.txt").write_text("6.0 header\n")
-    refused(bpy.ops.beyond_mocap.synthesize, "header")
+    refused(bpy.ops.beyond_mocap.synthesize, r"player1\.txt: line 1, 6 s: .*header")
     ready.nearest = True
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     assert ready.players[0].moments.startswith("6.0 s  header, shown as ")
