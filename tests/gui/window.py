@@ -154,12 +154,18 @@ class Stand:
 
 
 def unfold(panel):
-    """Draw a panel class with all its collapsible sections open; return what undoes it."""
+    """Draw a panel class with all its collapsible sections open, those within sections too; return what undoes it."""
     folded = panel.draw
 
+    def opened(layout):
+        def section(name, **_):
+            header, body = layout.panel(name + "_unfolded")
+            return header, opened(body)
+
+        return Stand(layout, panel=section)
+
     def draw(self, context):
-        layout = Stand(self.layout, panel=lambda name, **_: self.layout.panel(name + "_unfolded"))
-        folded(Stand(self, layout=layout), context)
+        folded(Stand(self, layout=opened(self.layout)), context)
 
     panel.draw = draw
     return lambda: setattr(panel, "draw", folded)
