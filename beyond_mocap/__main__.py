@@ -292,7 +292,7 @@ def run_retarget(options, told: "Told", writers: Mapping[str, Writer]) -> None:
 
 def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     """`evaluate`: the report of a motion that was written before. `--unit` is the library's where there is one."""
-    from .annotation import read_timeline
+    from .annotation import read_timeline, validate
     from .evaluation.html import html_report
     from .evaluation.played import played_from_tables
     from .evaluation.plots import require_matplotlib
@@ -314,6 +314,8 @@ def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     ball = read_ball(options.ball) if options.ball else None
     played = played_from_tables(motion, provenance, ball, start, str(options.provenance))
     library = _library(options, told) if options.library else None
+    if timeline is not None and track is not None and library is not None:  # else some words or times are not known
+        validate(timeline, library.words, start, float(track.times[-1]), str(options.annotations))
     report = evaluate_played(played, track=track, timeline=timeline, library=library)
     write_report(options.report, report)
     if options.html:
@@ -323,7 +325,18 @@ def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
             html_report(played, report, track=track, timeline=timeline, library=library, title=title),
         )
     told.end()
+    if library is not None and (strangers := _strangers(played.clips, library)):
+        first, count = strangers[0], len(strangers)
+        told.note(f"{options.provenance}: {count} clips, such as {first}, are not in {options.library}: nothing to compare with")
     print(options.report)
+
+
+def _strangers(clips: tuple[str, ...], library) -> list[str]:
+    """Those paths of a provenance that are neither recordings of the library nor made beside its cache."""
+    from .library.scan import CACHE_FOLDER
+
+    own = {clip.path for clip in library.clips}
+    return [clip for clip in clips if clip and clip not in own and not clip.startswith(CACHE_FOLDER)]
 
 
 def _library(options, told: "Told", rebuild: bool = False, seed: int = 0):

@@ -155,6 +155,19 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
     assert again["frames"] == mine["frames"]
 
 
+def test_what_does_not_belong_together_is_told_by_evaluate(synthesize, run, match, clips_folder, tmp_path):
+    assert synthesize(provenance=tmp_path / "p.csv")[0] == 0
+    (tmp_path / "late.txt").write_text("99 kick right\n")
+    (tmp_path / "other.csv").write_text((tmp_path / "p.csv").read_text().replace(".bvh", "_x.bvh"))
+    both = ("evaluate", tmp_path / "out.bvh", "--library", clips_folder, "--report", tmp_path / "e.json")
+    late = run(*both, "--track", match / "track.csv", "--annotations", tmp_path / "late.txt")
+    assert_told(late, 2, "late.txt:1", "99 s")
+    assert not (tmp_path / "e.json").exists()
+    status, _, error = run(*both, "--provenance", tmp_path / "other.csv")
+    assert status == 0 and "_x.bvh" in error[-1] and "not in" in error[-1]
+    assert run(*both, "--provenance", tmp_path / "p.csv")[2] == []
+
+
 def test_same_seed_same_file(synthesize, tmp_path):
     contents = []
     for name in ("a.bvh", "b.bvh"):
