@@ -133,7 +133,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         description="Where the library lacks a key moment's words, go on with the nearest that it has, and say so",
     )
     seed: IntProperty(
-        name="Seed", default=0, min=0, description="Kept in the report; nothing is chosen at random today"
+        name="Seed", default=0, min=0, description="Of the clustering that Blocks and Distance search in; On the path does not draw lots"
     )
     rate: FloatProperty(
         name="Frame Rate", default=30.0, min=10.0, max=240.0,
