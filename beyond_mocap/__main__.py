@@ -187,13 +187,13 @@ def summarize(library) -> dict:
         f"{len(library.skeleton)} joints",
         "words: " + " ".join(words),
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
-        f"fastest: {library.frames.speed.max():.1f} m/s",
+        f"fastest: {library.fastest:.1f} m/s",
         "key moments: " + (", ".join(keys) if keys else "none"),
         *library.notes,
     ]
     return {
         "version": __version__, "clips": len(own), "minutes": library.minutes, "words": words, "gaits": gaits,
-        "fastest_m_s": float(library.frames.speed.max()), "keys": keys, "notes": list(library.notes), "lines": lines,
+        "fastest_m_s": library.fastest, "keys": keys, "notes": list(library.notes), "lines": lines,
     }
 
 

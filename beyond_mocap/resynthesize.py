@@ -121,7 +121,7 @@ def _updated(library: Library, plan: Plan, before: Take, report: Progress, cance
 
 
 def _library_of_both(library: Library, plan: Plan, before: Take, report: Progress) -> Library:
-    """The library with made running where the new plan or the old take needs it."""
+    """The library with made clips where the new plan or the old take needs them."""
     for which in (plan, before.plan):
         suited = with_made_gaits(library, which, report)
         if len(suited.clips) > len(library.clips):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..motion import quaternion
 from ..motion.track import SampledTrack, zero_phase_hann
 from .gaits import without_short_runs
 
@@ -29,7 +30,7 @@ def wanted_offset(track: SampledTrack) -> np.ndarray:
     distance = np.linalg.norm(np.where(known[:, None], away, 1.0), axis=1)
     share = np.where(known, np.clip((distance - _AT_FEET[0]) / (_AT_FEET[1] - _AT_FEET[0]), 0.0, 1.0), 0.0)
     to_ball = np.arctan2(away[:, 1], away[:, 0])
-    offset = np.where(known, _wrapped(to_ball - track.direction), 0.0) * share
+    offset = np.where(known, quaternion.wrapped(to_ball - track.direction), 0.0) * share
     most = np.interp(track.speed, _SPEEDS, _MOST_TURNED)
     offset = np.clip(offset, -most, most)
     steady = zero_phase_hann(np.stack([np.cos(offset), np.sin(offset)], axis=1), track.fps, _WINDOW)
@@ -39,9 +40,5 @@ def wanted_offset(track: SampledTrack) -> np.ndarray:
 def direction_words(offset: np.ndarray, fps: float) -> list[str]:
     """The words for walking that way at each of `offset` (T,) radians (`wanted_offset`): front, back, or to a side, none
     for less than _SHORTEST seconds. Facing to the left of one's way is walking to the right."""
-    quarter = np.round(_wrapped(offset) / (np.pi / 2.0)).astype(int) % 4
+    quarter = np.round(quaternion.wrapped(offset) / (np.pi / 2.0)).astype(int) % 4
     return [("front", "right", "back", "left")[number] for number in without_short_runs(quarter, int(_SHORTEST * fps))]
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -17,7 +17,6 @@ import numpy as np
 from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds, swap_sides
 from ..errors import Cancelled, InputError
 from ..files import bvh
-from ..motion import contacts as foot_contacts
 from ..motion.landing import ends_in_flight
 from ..motion.mirror import mirror
 from ..motion.motion import Motion

@@ -110,7 +110,7 @@ def identify_posed(motion: Motion) -> Humanoid:
     """
     skeleton = motion.skeleton
     parts = [side_and_part(name) for name in skeleton.names]
-    roles = _named(parts, skeleton.parents)
+    roles = _named(parts)
     if not _has_legs(roles):
         frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
         roles = _found(skeleton, motion.root_positions[frames], motion.rotations[frames]) or roles
@@ -119,7 +119,7 @@ def identify_posed(motion: Motion) -> Humanoid:
 
 @lru_cache(maxsize=256)
 def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: tuple) -> Humanoid:
-    roles = _named([side_and_part(name) for name in names], parents)
+    roles = _named([side_and_part(name) for name in names])
     if not _has_legs(roles):
         ends = np.frombuffer(tips[1]).reshape(-1, 3)
         skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3), tips[0], ends)
@@ -183,15 +183,15 @@ def _has_legs(roles: Mapping[str, int]) -> bool:
     return all(role in roles for role in _LEG_ROLES)
 
 
-def _named(parts, parents) -> dict[str, int]:
+def _named(parts) -> dict[str, int]:
     """Roles that names tell."""
     roles: dict[str, int | None] = {centre: _centre(parts, centre) for centre in _CENTRE_NAMES}
     for side in ("left", "right"):
-        roles.update({f"{side} {part}": joint for part, joint in _limb(parts, parents, side).items()})
+        roles.update({f"{side} {part}": joint for part, joint in _limb(parts, side).items()})
     return {role: joint for role, joint in roles.items() if joint is not None}
 
 
-def _limb(parts, parents, side: str) -> dict[str, int | None]:
+def _limb(parts, side: str) -> dict[str, int | None]:
     places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if s == side}
     found = {part: next((places[o] for o in names if o in places), None) for part, names in _LIMB_NAMES.items()}
     if found["upper_arm"] is None and "shoulder" in places:  # collar, shoulder, elbow, wrist: the joints' own names

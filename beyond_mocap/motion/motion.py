@@ -101,6 +101,14 @@ def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     )
 
 
+def world_rotation(skeleton: Skeleton, local: np.ndarray, joint: int) -> np.ndarray:
+    """World rotation (T, 4) of one joint, from local rotations (T, J, 4)."""
+    world = local[:, joint]
+    while (joint := skeleton.parents[joint]) >= 0:
+        world = quaternion.multiply(local[:, joint], world)
+    return world
+
+
 def end_positions(motion: Motion) -> np.ndarray:
     """World positions (T, E, 3) in metres of the skeleton's tips (BVH End Sites)."""
     positions, rotations = forward_kinematics(motion)

@@ -66,7 +66,7 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
     ease = envelope(times, -1.1, -0.8, 0.9, 1.4)
     pitch = np.radians(62) * envelope(times, -air - 0.14, -air, air, air + 0.12)
     hips, ankles, feet, toes = posture.hips.copy(), posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
-    rise, tuck = _jump(times, air, hips[:, 2], neutral, pitch)
+    rise, tuck = _jump(times, air, hips[:, 2], neutral)
     hips[:, 2] = rise
     for side in (LEFT, RIGHT):
         ankles[:, side], feet[:, side, 1], toes[:, side] = _jumping_foot(
@@ -84,7 +84,7 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
     return Gesture(to_motion(posture.frames(course.asked), neutral), key, key - 0.9, key + 0.9)
 
 
-def _jump(times, air: float, standing: np.ndarray, neutral: Neutral, pitch) -> tuple[np.ndarray, np.ndarray]:
+def _jump(times, air: float, standing: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
     """Height of the hips (N,) metres, free fall in the air, and how far (N,) the ankles are drawn up and back there."""
     scale = neutral.leg / tables.LEG
     take_off = np.mean(standing) + 0.085 * scale  # on the toes, legs stretched

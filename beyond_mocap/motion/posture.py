@@ -164,8 +164,7 @@ def knee_pole(posture: Posture, top: np.ndarray, side: int) -> np.ndarray:
     """Where the knee points (T, 3): between pelvis and foot, carried along as the leg swings off the pelvis's own down."""
     pelvis = pelvis_rotation(posture)
     sign = 1.0 if side == 0 else -1.0
-    yaw = posture.feet[:, side, 2] - quaternion.yaw(pelvis)
-    yaw = (yaw + np.pi) % (2.0 * np.pi) - np.pi
+    yaw = quaternion.wrapped(posture.feet[:, side, 2] - quaternion.yaw(pelvis))
     turned = np.clip(0.5 * yaw, -0.7, 0.7) + sign * posture.knees[:, side]
     down = quaternion.rotate(pelvis, -_Z)
     ahead = quaternion.rotate(pelvis, np.stack([np.cos(turned), np.sin(turned), np.zeros_like(turned)], axis=-1))

@@ -197,6 +197,11 @@ def continuous(q: np.ndarray) -> np.ndarray:
     return out
 
 
+def signed_like(q: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """The same rotations (..., 4) with the signs that lie nearer to `like` (..., 4)."""
+    return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)
+
+
 def slerp(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Spherical interpolation on the short way (Faustino eq. 8): (..., 4), (..., 4), (...,) -> (..., 4)."""
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
@@ -215,3 +220,8 @@ def yaw(q: np.ndarray) -> np.ndarray:
     """The turn about Z that is nearest to the rotation (its twist): (..., 4) -> (...,) radians."""
     q = np.asarray(q)
     return 2.0 * np.arctan2(q[..., 3], q[..., 0])
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """Angles (...) in radians without their full turns: from -pi up to pi."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..motion import quaternion
 from ..motion.humanoid import identify
+from ..motion.motion import world_rotation
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 
@@ -40,17 +41,12 @@ def missing_lean(
     own_speed = np.linalg.norm(velocity, axis=1)
     own_turn = turn + np.diff(np.arctan2(velocity[:, 1], velocity[:, 0]), prepend=np.arctan2(*velocity[:1, ::-1].T))
     own_turn[seams] = own_turn[np.minimum(seams + 1, len(turn) - 1)]
-    asked = speed * _wrapped(np.diff(direction, prepend=direction[:1]))
+    asked = speed * quaternion.wrapped(np.diff(direction, prepend=direction[:1]))
     fast = np.clip((np.minimum(speed, own_speed) - SLOW[0]) / (SLOW[1] - SLOW[0]), 0.0, 1.0)
-    turns = asked - own_speed * _wrapped(own_turn)
+    turns = asked - own_speed * quaternion.wrapped(own_turn)
     lean = zero_phase_hann((fast * np.clip(turns * fps / GRAVITY, -1.0, 1.0))[:, None], fps, _SECONDS)[:, 0]
     most = MOST_LEAN / LEGS
     return most * np.tanh(lean / most)
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
-
 
 def banked(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, lean: np.ndarray) -> np.ndarray:
     """Local rotations (T, J, 4) of a body that leans to the left of its direction of travel (T,) by lean (T,) as a / g.
@@ -62,16 +58,8 @@ def banked(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, lea
     out[:, 0] = quaternion.multiply(quaternion.about_axis(axis, -LEGS * lean), rotations[:, 0])
     spine = identify(skeleton).spine
     if spine:
-        above = _world(skeleton, rotations, skeleton.parents[spine[0]])
+        above = world_rotation(skeleton, rotations, skeleton.parents[spine[0]])
         back = quaternion.rotate(quaternion.inverse(above), axis)
         turn = quaternion.about_axis(back, (LEGS - TRUNK) * lean)
         out[:, spine[0]] = quaternion.multiply(turn, rotations[:, spine[0]])
     return out
-
-
-def _world(skeleton: Skeleton, rotations: np.ndarray, joint: int) -> np.ndarray:
-    """World rotation (T, 4) of one joint."""
-    world = rotations[:, joint]
-    while (joint := skeleton.parents[joint]) >= 0:
-        world = quaternion.multiply(rotations[:, joint], world)
-    return world

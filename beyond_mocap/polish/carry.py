@@ -145,7 +145,7 @@ def limb_carried(
         change = quaternion.multiply(turned, quaternion.inverse(limb.world[joint]))
         world = quaternion.multiply(change, body.world[:, joint])
         local = quaternion.multiply(quaternion.inverse(above), world)
-        out[:, joint] = _same_sign(local, body.rotations[:, joint])
+        out[:, joint] = quaternion.signed_like(local, body.rotations[:, joint])
         above = world
     return out
 
@@ -196,8 +196,3 @@ def _path(skeleton: Skeleton, high: int, low: int) -> list[int]:
     while chain[-1] != high:
         chain.append(skeleton.parents[chain[-1]])
     return chain[::-1]
-
-
-def _same_sign(q: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """The same rotations (W, 4) with the signs of those they come from."""
-    return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..motion import quaternion
 from ..motion.humanoid import identify
-from ..motion.motion import pose_kinematics
+from ..motion.motion import pose_kinematics, world_rotation
 from ..motion.skeleton import Skeleton
 from .carry import Body, Resting, leg, limb_carried
 from .foot_plant import shift
@@ -45,9 +45,9 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
         chain = leg(limb)
         away = fresh[0][:, limb.foot] + moved - body.places[:, limb.foot]
         rotations = limb_carried(body, Resting.of(body, chain), away, rotations=rotations)
-        above = quaternion.inverse(_world(skeleton, rotations, skeleton.parents[limb.foot]))
+        above = quaternion.inverse(world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
         foot = quaternion.multiply(above, quaternion.multiply(turned, fresh[1][:, limb.foot]))
-        rotations[:, limb.foot] = _nearest_sign(foot, rotations[:, limb.foot])
+        rotations[:, limb.foot] = quaternion.signed_like(foot, rotations[:, limb.foot])
     return root, rotations
 
 
@@ -63,14 +63,6 @@ def _offsets(feet: list[np.ndarray], share: np.ndarray, carries: np.ndarray, fps
     return found[:, :3], quaternion.from_rotation_vector(found[:, 3:])
 
 
-def _world(skeleton: Skeleton, rotations: np.ndarray, joint: int) -> np.ndarray:
-    """World rotation (T, 4) of one joint."""
-    world = rotations[:, joint]
-    while (joint := skeleton.parents[joint]) >= 0:
-        world = quaternion.multiply(rotations[:, joint], world)
-    return world
-
-
 def _signed_like(rotations: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Sign-continuous rotations (T, J, 4) whose signs are the old ones' where these begin to count."""
     rotations = quaternion.continuous(rotations)
@@ -79,7 +71,3 @@ def _signed_like(rotations: np.ndarray, old: np.ndarray, share: np.ndarray) -> n
         return rotations
     at = known[0]
     return rotations * np.where(np.sum(rotations[at] * old[at], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-
-
-def _nearest_sign(q: np.ndarray, like: np.ndarray) -> np.ndarray:
-    return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)

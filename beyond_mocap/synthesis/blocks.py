@@ -132,7 +132,7 @@ class BlockSearch:
         count = len(clusters.medoid)
         usable = self.wanted.allowed[self.frames.clip[clusters.start]] if count else np.zeros(0, bool)
         if not np.any(usable):
-            return [self._anything(length) for _ in range(self.slots(length))]
+            return [self._anything() for _ in range(self.slots(length))]
         size = length // 2
         medoid = clusters.start[clusters.medoid]
         clip = self.frames.clip[medoid]
@@ -163,7 +163,7 @@ class BlockSearch:
         start = clusters.start[usable & (clusters.label == label)]
         return Candidates(self.frames.clip[start], start)
 
-    def _anything(self, length: int) -> Candidates:
+    def _anything(self) -> Candidates:
         """Candidates of a library whose clips are all shorter than the longest block: the start of every usable clip."""
         clip = np.flatnonzero(self.wanted.allowed)
         return Candidates(clip, self.frames.first[clip])

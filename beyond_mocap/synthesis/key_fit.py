@@ -109,6 +109,6 @@ def misfit(found: Strikes, ball: Ball) -> np.ndarray:
     cost = np.nan_to_num(cost)
     cost += np.nan_to_num(HEIGHT_COST * np.maximum(np.abs(found.height - ball.height) - _NOISE, 0.0))
     turned = np.arctan2(*found.velocity.T[::-1]) - np.arctan2(ball.leaving[1], ball.leaving[0])
-    turned = np.abs((turned + np.pi) % (2.0 * np.pi) - np.pi)
+    turned = np.abs(quaternion.wrapped(turned))
     fast = (np.linalg.norm(found.velocity, axis=1) > _FAST_PART) & (np.linalg.norm(ball.leaving) > _FAST_BALL)
     return cost + ANGLE_COST * np.where(fast, turned, 0.0)

@@ -131,7 +131,6 @@ class PathCosts:
         cost += (self.weights.switch + self.weights.wild * self.offer.wild_after[start]).astype(np.float32)
         return cost
 
-
     def _feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """(B, K) m between the feet that stand before and after a cut."""
         feet, stands = self.frames.feet, self.offer.stands

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..annotation.gaze import wanted_offset
 from ..library.library import Library
+from ..motion import quaternion
 from .edit_list import EditList, PlacedKey
 from .wanted import Wanted, WantedKey, needed
 
@@ -28,7 +29,7 @@ def lies_elsewhere(before: Wanted, after: Wanted) -> np.ndarray:
     old, new = before.track, after.track
     off = np.linalg.norm(old.positions - new.positions, axis=1) > PLACE
     off |= np.linalg.norm(old.raw - new.raw, axis=1) > PLACE
-    off |= np.abs(_wrapped(new.direction - old.direction)) * np.minimum(1.0, new.speed) > TURN
+    off |= np.abs(quaternion.wrapped(new.direction - old.direction)) * np.minimum(1.0, new.speed) > TURN
     ball = ~np.isclose(old.ball, new.ball, rtol=0.0, atol=PLACE, equal_nan=True).all(axis=1)
     return off | ball | (old.ball_measured != new.ball_measured)
 
@@ -37,8 +38,8 @@ def asked_otherwise(before: Wanted, after: Wanted, slot: int) -> np.ndarray:
     """(T,) bool: frames of which other words, another speed or another turning over `slot` frames is asked."""
     old, new = before.track, after.track
     words = np.array([a != b for a, b in zip(before.asked, after.asked)])
-    turn = np.abs(_wrapped(_turn(new.direction, slot) - _turn(old.direction, slot))) * np.minimum(1.0, new.speed)
-    facing = np.abs(_wrapped(wanted_offset(new) - wanted_offset(old))) * np.minimum(1.0, new.speed)
+    turn = np.abs(quaternion.wrapped(_turn(new.direction, slot) - _turn(old.direction, slot))) * np.minimum(1.0, new.speed)
+    facing = np.abs(quaternion.wrapped(wanted_offset(new) - wanted_offset(old))) * np.minimum(1.0, new.speed)
     return words | (np.abs(new.speed - old.speed) > SPEED) | (turn > TURN) | (facing > FACING)
 
 
@@ -123,7 +124,3 @@ def _widened(core: Stretch, run_up: int, stays: list[Stretch], edit: EditList) -
 def _turn(direction: np.ndarray, slot: int) -> np.ndarray:
     padded = np.pad(direction, slot // 2, mode="edge")
     return padded[2 * (slot // 2) :] - padded[: len(direction)]
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi

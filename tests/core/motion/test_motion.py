@@ -14,6 +14,7 @@ from beyond_mocap.motion.motion import (
     forward_kinematics,
     place,
     resample,
+    world_rotation,
 )
 from beyond_mocap.motion.skeleton import Skeleton
 
@@ -106,3 +107,9 @@ def test_what_does_not_fit_is_refused():
         Motion(TREE, np.zeros((5, 3)), quaternion.identity(5, 3), 30.0)
     with pytest.raises(InputError, match="rate"):
         Motion(TREE, np.zeros((5, 3)), quaternion.identity(5, 4), 0.0)
+
+
+def test_one_joint_turns_in_the_world_as_all_do(motion):
+    _, world = forward_kinematics(motion)
+    for joint in range(len(motion.skeleton)):
+        assert np.allclose(world_rotation(motion.skeleton, motion.rotations, joint), world[:, joint])

@@ -108,6 +108,19 @@ def test_continuous_changes_signs_only_and_keeps_neighbours_close(values):
     assert np.all(np.sum(out[1:] * out[:-1], axis=-1) >= 0)
 
 
+def test_wrapped_angles_lie_within_half_a_turn_and_mean_the_same():
+    angles = np.linspace(-20.0, 20.0, 401)
+    wrapped = quaternion.wrapped(angles)
+    assert np.all((wrapped >= -np.pi) & (wrapped < np.pi))
+    assert np.allclose(np.exp(1j * wrapped), np.exp(1j * angles))
+
+
+def test_a_sign_is_taken_from_what_a_rotation_comes_from():
+    q = quaternion.about_up(np.array([0.3, 0.3]))
+    like = quaternion.about_up(np.array([0.4, 0.4])) * [[1.0], [-1.0]]
+    assert np.array_equal(quaternion.signed_like(q, like), q * [[1.0], [-1.0]])
+
+
 def test_slerp_goes_the_short_way_at_constant_speed():
     weights = np.linspace(0, 1, 11)
     path = quaternion.slerp(A[:, None], -B[:, None], weights)
