@@ -1,4 +1,5 @@
-"""What was compared once, so that it need not be argued again: each section measures two ways and says which is kept."""
+"""What was compared once, so that it need not be argued again: each section measures two ways and says which is
+kept."""
 
 from __future__ import annotations
 
@@ -57,9 +58,9 @@ def _plan(library: Library, number: int, **options) -> Plan:
 
 
 class SquaredDifference(AnnotationCost):
-    """Faustino §3.2.2's alternative: the squared difference of the vectors of +1 and -1, that is four times the number of
-    words that only one of the two has. Scaled by the mean number of words of a recorded frame, so that -1 is all alike and
-    1 is what other words in the usual number cost, as with eq. 18; but it has no end above."""
+    """Faustino §3.2.2's alternative: the squared difference of the vectors of +1 and -1, that is four times the number
+    of words that only one of the two has. Scaled by the mean number of words of a recorded frame, so that -1 is all
+    alike and 1 is what other words in the usual number cost, as with eq. 18; but it has no end above."""
 
     def of_blocks(self, start, asked):
         """(M,) the cost of blocks that start at frames `start` (M,), for the asked words of each of their frames."""

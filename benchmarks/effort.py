@@ -40,7 +40,8 @@ def on_one_core() -> None:
 
 
 def blas_speed() -> str:
-    """What numpy's products are worth here: official Blenders have no fast BLAS, and everything that multiplies is slower."""
+    """What numpy's products are worth here: official Blenders have no fast BLAS, and everything that multiplies is
+    slower."""
     random = np.random.default_rng(0)
     a, b = (random.normal(size=(2000, 27)).astype(np.float32) for _ in range(2))
     took, _ = seconds(lambda: [a @ b.T for _ in range(10)])

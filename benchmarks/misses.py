@@ -1,4 +1,5 @@
-"""Which targets `path` misses, and where in the takes: at key moments, in made running, beyond the recordings' speed."""
+"""Which targets `path` misses, and where in the takes: at key moments, in made running, beyond the recordings'
+speed."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ from beyond_mocap.library.made import MADE_FOLDER
 from . import markdown
 
 KINDS = ("key moments", "made running", "beyond the recordings", "below 1 m/s", "elsewhere")
-"""What a frame is counted as, the first that holds: within a key moment's entry and exit or 0.5 s of it; made running; the
-track above the fastest recording x 1.15; the track below 1 m/s."""
+"""What a frame is counted as, the first that holds: within a key moment's entry and exit or 0.5 s of it; made running;
+the track above the fastest recording x 1.15; the track below 1 m/s."""
 
 SLOW = 1.0
 KEY_SECONDS = 0.5
@@ -85,9 +86,9 @@ def _at(count: int, frames: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Misses:
-    """One take's. frames: figure -> offending frames of each kind, (len(KINDS),), "" -> all frames. asked, lacking: frames
-    that ask for words, and those of them that ask for one which no clip carries. key_speeds: (K, 2) m/s asked at each key
-    moment and recorded in the clip that is played there."""
+    """One take's. frames: figure -> offending frames of each kind, (len(KINDS),), "" -> all frames. asked, lacking:
+    frames that ask for words, and those of them that ask for one which no clip carries. key_speeds: (K, 2) m/s asked at
+    each key moment and recorded in the clip that is played there."""
 
     frames: dict[str, np.ndarray]
     asked: int

@@ -92,7 +92,11 @@ def _add_settings(verb) -> None:
     for name, unit, meaning in (
         ("alpha", "SHARE", "words against continuity"),
         ("delta", "METRES", "travelled distance that may stay wrong ('distance')"),
-        ("omega", "NUMBER", "between two gaits' speeds the faster gait begins at 1/omega of the way up; 0: as the recordings are labelled ('path'), else 4"),
+        (
+            "omega", "NUMBER",
+            "between two gaits' speeds the faster gait begins at 1/omega of the way up; 0: as the recordings are "
+            "labelled ('path'), else 4",
+        ),
         ("seam-window", "SECONDS", "over which the jump at a cut is spread"),
         ("track-window", "SECONDS", "of the window that takes the jitter out of the track"),
         ("root-window", "SECONDS", "of the window behind which the body is on the track ('path')"),
@@ -138,7 +142,7 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--library", type=Path)
     _add_library_options(verb)
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
-    verb.add_argument("--html", type=Path, metavar="R.html", help="the report as a page with pictures; needs matplotlib")
+    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with pictures; needs matplotlib")
     verb.set_defaults(run=run_evaluate)
     return verb
 
@@ -378,7 +382,8 @@ def _check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> 
         if not os.access(folder, os.W_OK | os.X_OK):
             raise InputError(path, "its folder cannot be written to", "a folder of yours", "choose another folder")
         if path.resolve() in taken:
-            raise InputError(path, "named for an output and for something else", "a file for each", "rename one of them")
+            what = "named for an output and for something else"
+            raise InputError(path, what, "a file for each", "rename one of them")
         taken.add(path.resolve())
 
 
@@ -448,7 +453,8 @@ def main(argv: list[str] | None = None, writers: Mapping[str, Writer] | None = N
 
 
 class _interrupts:
-    """While it lasts, Ctrl-C asks the work to stop instead of breaking it off; outside the main thread nothing is done."""
+    """While it lasts, Ctrl-C asks the work to stop instead of breaking it off; outside the main thread nothing is
+    done."""
 
     def __init__(self, told: Told):
         self._told, self._before = told, None

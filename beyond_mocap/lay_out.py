@@ -1,6 +1,7 @@
 """Footage laid on the ground, step by step: seams, facing and root, leaning, feet, and the ball met.
 
-What `synthesize` does with a whole take and `resynthesize` with a stretch of one; how each step is done stands in `polish`.
+What `synthesize` does with a whole take and `resynthesize` with a stretch of one; how each step is done stands in
+`polish`.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ from .take import KeyResult
 
 
 def smoothed(library: Library, plan: Plan, footage: Footage) -> Footage:
-    """The footage without jumps at its seams: faded over by what both recordings show or, by Faustino's methods, spread as
-    he does. A fade is half as long as his window."""
+    """The footage without jumps at its seams: faded over by what both recordings show or, by Faustino's methods, spread
+    as he does. A fade is half as long as his window."""
     reach = 0.5 * plan.seam_window * plan.fps
     if plan.method != "path":
         return _spread(footage, reach)
@@ -74,7 +75,9 @@ def aimed(track: SampledTrack) -> np.ndarray:
     return track.direction + wanted_offset(track)
 
 
-def towards_ball(library: Library, track: SampledTrack, footage: Footage, angle: np.ndarray, strikes: list[Touch]) -> np.ndarray:
+def towards_ball(
+    library: Library, track: SampledTrack, footage: Footage, angle: np.ndarray, strikes: list[Touch]
+) -> np.ndarray:
     """(T,) radians by which a body that faces `angle` (T,) turns so that what strikes points at the ball."""
     ground = root_with_sway(track.positions, footage.sway, angle)
     root = np.concatenate([ground, footage.height[:, None]], axis=1)
@@ -90,11 +93,12 @@ def as_far(track: SampledTrack, footage: Footage, travelled: np.ndarray) -> tupl
 
 
 def along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (T, 2) on the track's path after `travelled` (T,) metres, and the direction (T,) of the path there in radians.
+    """Places (T, 2) on the track's path after `travelled` (T,) metres, and the direction (T,) of the path there in
+    radians.
 
-    Faustino eq. 29 steps from the present place towards the track's place at the next travelled distance; since both lie on
-    the same path, the steps add up to the path itself. (As printed the difference points backwards.) Beyond the track's end
-    the last direction is kept.
+    Faustino eq. 29 steps from the present place towards the track's place at the next travelled distance; since both
+    lie on the same path, the steps add up to the path itself. (As printed the difference points backwards.) Beyond the
+    track's end the last direction is kept.
     """
     way = travelled_distance(track) + 1e-6 * np.arange(len(track.times))
     place = np.stack([np.interp(travelled, way, track.positions[:, axis]) for axis in (0, 1)], axis=1)
@@ -143,8 +147,8 @@ def footed(
 ) -> tuple[Planted, Steps]:
     """A body laid on its track with its feet held where they stand, or stepping where they would be dragged.
 
-    No steps are added where the ball may be met, nor where a share (T,) of the motion is given; stepped (T, 2) bool: those
-    that are taken there.
+    No steps are added where the ball may be met, nor where a share (T,) of the motion is given; stepped (T, 2) bool:
+    those that are taken there.
     """
     share, at = np.broadcast_to(share, len(root)), np.arange(len(root))
     free = share == 0.0
@@ -157,8 +161,8 @@ def footed(
 
 
 def given(library: Library, plan: Plan, track: SampledTrack, root, pose, standing: np.ndarray, free=1.0):
-    """Root (T, 3) m and local rotations (T, J, 4) of a body laid on its track that gives where its feet would slide, where
-    it is `free` (T,) to: 1, or nothing at 0."""
+    """Root (T, 3) m and local rotations (T, J, 4) of a body laid on its track that gives where its feet would slide,
+    where it is `free` (T,) to: 1, or nothing at 0."""
     move, turn = give(library.skeleton, root, pose, standing, plan.fps)
     pulled = pulled_to_track(root[:, :2] + move, track.raw, plan.fps, plan.root_window)
     free = np.broadcast_to(free, len(root))

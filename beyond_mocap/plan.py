@@ -25,19 +25,20 @@ LIMITS = {
 class Plan:
     """One player's order.
 
-    track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it. timeline: the asked
-    annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. method: one of METHODS.
-    catch_up: Faustino's logistic catch-up of §3.3.2 (method "distance" only). fps: output frames per second.
+    track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it. timeline: the
+    asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. method: one of
+    METHODS. catch_up: Faustino's logistic catch-up of §3.3.2 (method "distance" only). fps: output frames per second.
     alpha: weight of annotation against continuity (Faustino eq. 13; for "path" `synthesis.balance`). mirror: whether
     mirrored clips may be used.
     nearest: go on with the nearest words where the library lacks a key moment. seed: of every random choice.
-    delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1), 1 or more; 0:
-    by "path" where the recordings' own labels change, else the paper's 4.
+    delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1), 1 or
+    more; 0: by "path" where the recordings' own labels change, else the paper's 4.
     made: whether made clips may stand in where recordings lack a speed (method "path" only; `library.made`).
     seam_window: seconds over which a jump at a seam is spread (eq. 25, twice its s; "path" fades over half of it).
-    track_window: seconds of the window that takes the feed's jitter out (`motion.track.smoothed`). root_window: seconds of
-    the window behind which the root is pulled onto the track (method "path" only; the root error is measured with 1.5).
-    gaits: (gait word, clip) pairs, which clip stands for which gait (§3.1.1); other gaits are found among all clips.
+    track_window: seconds of the window that takes the feed's jitter out (`motion.track.smoothed`). root_window: seconds
+    of the window behind which the root is pulled onto the track (method "path" only; the root error is measured with
+    1.5). gaits: (gait word, clip) pairs, which clip stands for which gait (§3.1.1); other gaits are found among all
+    clips.
 
     InputError for a number outside LIMITS.
     """
@@ -69,8 +70,8 @@ class Plan:
 
 
 def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
-    """(gait word, clip) of each text "WORD=CLIP", blanks around either left out; InputError for any other text and for a
-    word that comes twice."""
+    """(gait word, clip) of each text "WORD=CLIP", blanks around either left out; InputError for any other text and for
+    a word that comes twice."""
     pairs = []
     for text in texts:
         word, _, clip = (part.strip() for part in text.partition("="))

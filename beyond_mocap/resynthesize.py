@@ -246,8 +246,8 @@ class _Update:
         return BallPath(self.track.times, self.ball, self.track.ball_measured)
 
     def _keys_as_before(self) -> tuple[KeyResult, ...]:
-        """The results; of a key moment whose frame has not been touched the old one, under the line in which it is asked
-        now."""
+        """The results; of a key moment whose frame has not been touched the old one, under the line in which it is
+        asked now."""
         out, left = [], list(self.before.keys)
         for key in self.keys:
             near = int(np.clip(round(key.frame), 0, len(self.anew) - 1))

@@ -45,8 +45,8 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends in: the edit list at the library's rate, (T,) metres travelled where the method decides it, and the
-    frame from which on it was searched in a hurry, if it was."""
+    """What a search ends in: the edit list at the library's rate, (T,) metres travelled where the method decides it,
+    and the frame from which on it was searched in a hurry, if it was."""
 
     edit: EditList
     travelled: np.ndarray | None = None
@@ -63,10 +63,10 @@ def synthesize(
     """A player's motion for `plan` out of `library`.
 
     progress(fraction, text) is called now and then. Raises NotInLibrary for a key moment that no clip can serve (unless
-    plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so, method
-    "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on; before
-    anything is found, and by the other methods, that is Cancelled too. The same library, plan and numpy give the same bits:
-    linear algebra is held to one thread, since more add up in another order.
+    plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so,
+    method "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on;
+    before anything is found, and by the other methods, that is Cancelled too. The same library, plan and numpy give the
+    same bits: linear algebra is held to one thread, since more add up in another order.
     """
     if plan.method not in METHODS:
         raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
@@ -94,7 +94,8 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry
     planted, taken = _polished(library, plan, track, footage, found, index, strikes)
     if plan.method == "path":
         struck = met(library, plan, track, taken.standing, planted, strikes)
-        planted, track = replace(planted, root=struck.root, rotations=struck.rotations), replace(track, ball=struck.ball)
+        planted = replace(planted, root=struck.root, rotations=struck.rotations)
+        track = replace(track, ball=struck.ball)
     take = _take(library, plan, order, track, edit, footage, keys, planted, taken)
     clock.append(time.perf_counter())
     report(1.0, "Done")
@@ -103,8 +104,8 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry
 
 
 def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
-    """The library that a plan is made from: with made clips, where recordings lack what its track asks for, and with the
-    chosen gaits."""
+    """The library that a plan is made from: with made clips, where recordings lack what its track asks for, and with
+    the chosen gaits."""
     if plan.method == "path" and plan.made and _lacks(library, plan):
         report(0.0, "Making what the recordings lack")
         library = library.extended
@@ -133,7 +134,8 @@ def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cance
 def _polished(
     library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index, strikes: list[Touch]
 ) -> tuple[Planted, Steps]:
-    """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand or stepping where they would slide."""
+    """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand or stepping where they would
+    slide."""
     smooth = smoothed(library, plan, footage)
     if plan.method == "blocks":
         angle, ground = chained(library, footage, smooth, track)
@@ -210,7 +212,8 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
     """One warning per key moment that clips could serve, but not so close to another one."""
     placed = {key.wanted for key in edit.keys}
     return [
-        f"{key.asked.time:g} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, it is not played"
+        f"{key.asked.time:g} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, "
+        "it is not played"
         for number, key in enumerate(order.keys)
         if key.choices and number not in placed
     ]

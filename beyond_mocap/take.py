@@ -14,7 +14,8 @@ from .synthesis.edit_list import EditList
 
 @dataclass(frozen=True, eq=False)
 class BallPath:
-    """The ball at the output's rate: times (T,) s on the track's clock, positions (T, 3) m of its centre, measured (T,) bool."""
+    """The ball at the output's rate: times (T,) s on the track's clock, positions (T, 3) m of its centre, measured (T,)
+    bool."""
 
     times: np.ndarray
     positions: np.ndarray
@@ -25,9 +26,9 @@ class BallPath:
 class KeyResult:
     """How one key moment was served.
 
-    asked: the line of the timeline. frame: output frame (fractional) where the clip's key frame is played. clip (path below
-    the library), clip_frame (in the clip's own rate), mirrored. words: what the clip carries there, sides after mirroring.
-    used_instead: the words used where the asked ones were not to be had, else None.
+    asked: the line of the timeline. frame: output frame (fractional) where the clip's key frame is played. clip
+    (path below the library), clip_frame (in the clip's own rate), mirrored. words: what the clip carries there, sides
+    after mirroring. used_instead: the words used where the asked ones were not to be had, else None.
     """
 
     asked: KeyMoment
@@ -44,12 +45,12 @@ class Take:
     """A synthesized player.
 
     motion: T frames at the output's rate on the pitch (metres, Z up); frame 0 is at `start_time` seconds on the track's
-    clock. clips: table of clip paths below the library; clip (T,) index into it, clip_frame (T,) fractional frame in that
-    clip's own rate, mirrored (T,) bool. words: per frame the source frame's words, sides after mirroring. contacts (T, 2)
-    bool, left and right, carried from the source. seams: output frames that start a new piece of clip.
-    correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it. ik_miss:
-    (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right, extra steps of
-    feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
+    clock. clips: table of clip paths below the library; clip (T,) index into it, clip_frame (T,) fractional frame in
+    that clip's own rate, mirrored (T,) bool. words: per frame the source frame's words, sides after mirroring. contacts
+    (T, 2) bool, left and right, carried from the source. seams: output frames that start a new piece of clip.
+    correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it.
+    ik_miss: (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right,
+    extra steps of feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
     at the library's rate, for `resynthesize`.
     """
 

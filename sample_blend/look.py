@@ -1,6 +1,7 @@
 """A quick look at a take without Blender: its body, shadow and ball, frame by frame, in one picture.
 
-    python sample_blend/look.py TAKE.bvh --out sheet.png --ball ball.csv --provenance p.csv --from 8.5 --to 10 --every 0.1
+    python sample_blend/look.py TAKE.bvh --out sheet.png --ball ball.csv --provenance p.csv --from 8.5 --to 10 --every
+    0.1
 
 The lines on the grass are half a metre apart and stay where they are, so a foot that slides is seen to slide; what is
 more than 1 cm below the grass is drawn in magenta. `--camera follow` stays beside the player, `fixed` stands still and
@@ -32,7 +33,8 @@ BALL_RADIUS = 0.11
 
 @dataclass(frozen=True)
 class View:
-    """A camera at `eye` (3,) m that looks at `at` (3,) m, `size` pixels square, `wide` metres across at that distance."""
+    """A camera at `eye` (3,) m that looks at `at` (3,) m, `size` pixels square, `wide` metres across at that
+    distance."""
 
     eye: np.ndarray
     at: np.ndarray

@@ -98,7 +98,8 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     delta: FloatProperty(
         name="Distance Slack", default=0.5, min=0.0, max=100.0, unit="LENGTH", subtype="DISTANCE",
-        description="Of Distance: travelled distance of a stretch that may stay wrong before steps are added or left out",
+        description="Of Distance: travelled distance of a stretch that may stay wrong before steps are added or left "
+        "out",
     )
     omega: FloatProperty(
         name="Gait Threshold", default=0.0, min=0.0, max=100.0, precision=1,
@@ -115,15 +116,17 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     root_window: FloatProperty(
         name="Sway Window", default=1.5, min=0.2, max=5.0, precision=2, unit="TIME_ABSOLUTE",
-        description="Of On the path: the body is on the track when both are seen through this window; shorter keeps less sway",
+        description="Of On the path: the body is on the track when both are seen through this window; shorter keeps "
+        "less sway",
     )
     gaits: StringProperty(
         name="Gait Clips",
-        description="Which clip stands for which gait, where you choose: walking=folder/walk.bvh; jogging=folder/jog.bvh",
+        description="Which clip stands for which gait, where you choose: walking=folder/walk.bvh; "
+        "jogging=folder/jog.bvh",
     )
     made: BoolProperty(
-        name="Made Running", default=True,
-        description="Of On the path: make running where the track is faster than any recording",
+        name="Made Clips", default=True,
+        description="Of On the path: make or blend clips where recordings lack a speed, and kicks on the run",
     )
     mirror: BoolProperty(
         name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged"

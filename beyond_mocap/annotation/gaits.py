@@ -12,8 +12,8 @@ LOCOMOTION = ("standing", "walking", "jogging", "running", "sprinting")
 LOCOMOTION_WORDS = frozenset((*LOCOMOTION, "dribble"))
 
 STANDING_SPEED = 0.3
-"""m/s of a smoothed track; below it a player stands. (Raw tracking noise alone looks like that; a smoothed track that creeps
-faster is a player who shuffles: a standing body would have to glide.)"""
+"""m/s of a smoothed track; below it a player stands. (Raw tracking noise alone looks like that; a smoothed track that
+creeps faster is a player who shuffles: a standing body would have to glide.)"""
 
 
 def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
@@ -36,12 +36,13 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
 
 
 def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray) -> np.ndarray:
-    """(G-1,) m/s, where a library's own annotations change from each gait to the next: the speed with fewest frames of the
-    slower one above it and of the faster one below it.
+    """(G-1,) m/s, where a library's own annotations change from each gait to the next: the speed with fewest frames of
+    the slower one above it and of the faster one below it.
 
-    speeds (G,) m/s, ascending, the gaits' averages; speed (N,) m/s and gait (N,) index of annotated frames. Between gaits
-    that do not overlap it is half way; the step up from standing is STANDING_SPEED, since a body that stands cannot travel. Faustino's omega asks
-    for the faster gait already a quarter of the way up, which no recording of that speed is then called.
+    speeds (G,) m/s, ascending, the gaits' averages; speed (N,) m/s and gait (N,) index of annotated frames. Between
+    gaits that do not overlap it is half way; the step up from standing is STANDING_SPEED, since a body that stands
+    cannot travel. Faustino's omega asks for the faster gait already a quarter of the way up, which no recording of that
+    speed is then called.
     """
     found = []
     for slow, (low, high) in enumerate(zip(speeds, speeds[1:])):

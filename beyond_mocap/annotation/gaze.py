@@ -1,7 +1,7 @@
 """Which way a player's body is turned while he moves: towards the ball when slow, along his way when fast.
 
-Facing is not the direction of travel (../shared/metrics.md: torso and travel are 77 degrees apart in the median at 0.5 to
-1 m/s, 47 at 1 to 2, about 31 above); what turns it away is mostly the ball.
+Facing is not the direction of travel (../shared/metrics.md: torso and travel are 77 degrees apart in the median at 0.5
+to 1 m/s, 47 at 1 to 2, about 31 above); what turns it away is mostly the ball.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def wanted_offset(track: SampledTrack) -> np.ndarray:
 
 
 def direction_words(offset: np.ndarray, fps: float) -> list[str]:
-    """The words for walking that way at each of `offset` (T,) radians (`wanted_offset`): front, back, or to a side, none
-    for less than _SHORTEST seconds. Facing to the left of one's way is walking to the right."""
+    """The words for walking that way at each of `offset` (T,) radians (`wanted_offset`): front, back, or to a side,
+    none for less than _SHORTEST seconds. Facing to the left of one's way is walking to the right."""
     quarter = np.round(quaternion.wrapped(offset) / (np.pi / 2.0)).astype(int) % 4
     return [("front", "right", "back", "left")[number] for number in without_short_runs(quarter, int(_SHORTEST * fps))]

@@ -41,8 +41,8 @@ def place(view: View) -> dict:
 
 
 def _surge(view: View) -> dict:
-    """Surge against the rms of the used recordings at the same speed; `track` is what the track itself asks for, behind the
-    window behind which the root is held to it."""
+    """Surge against the rms of the used recordings at the same speed; `track` is what the track itself asks for, behind
+    the window behind which the root is held to it."""
     ours = root.surge(view.played.pelvis, view.fps)
     own = root.class_rms(view.own("surge"), root.speed_class(view.own("speed")))[root.speed_class(view.speed)]
     rms, real = _rms(ours), _rms(own)
@@ -222,8 +222,8 @@ def filled_timeline(view: View) -> Timeline:
 
 
 def annotation_similarity(view: View) -> dict:
-    """Similarity over all frames, at the key moments, and at those that the library has, over asked words; the first two
-    as printed too (Faustino eq. 18)."""
+    """Similarity over all frames, at the key moments, and at those that the library has, over asked words; the first
+    two as printed too (Faustino eq. 18)."""
     played = view.played
     if view.timeline is None or played.words is None:
         return dict.fromkeys(("all", "keys", "had_keys", "eq18_all", "eq18_keys"))

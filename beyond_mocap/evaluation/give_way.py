@@ -1,8 +1,9 @@
-"""What gave way in a take, and at which seconds: the lines that `warnings` tells (../shared/metrics.md, "Where they cannot
-all hold": seconds, seam jerk, warp rate, skate, root error, key time, words, bones and ground).
+"""What gave way in a take, and at which seconds: the lines that `warnings` tells (../shared/metrics.md, "Where they
+cannot all hold": seconds, seam jerk, warp rate, skate, root error, key time, words, bones and ground).
 
 Every line is about one kind of thing and names its stretches. It is read off what was played, without the library's own
-figures, so that it costs a synthesis a few milliseconds; jolts at seams need those and are told by `jolts`, with the report.
+figures, so that it costs a synthesis a few milliseconds; jolts at seams need those and are told by `jolts`, with the
+report.
 """
 
 from __future__ import annotations
@@ -79,7 +80,8 @@ def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> str | No
     for start in starts[hard]:
         flags[max(start - jerk.REACH // 2, 0) : start + jerk.REACH // 2] = True
     told = stretches(times, flags)
-    return f"{told}: cuts jolt up to {ratios[hard].max():.2f} times as hard as recordings of that speed ({most:g} wanted)"
+    hardest = ratios[hard].max()
+    return f"{told}: cuts jolt up to {hardest:.2f} times as hard as recordings of that speed ({most:g} wanted)"
 
 
 def stretches(times: np.ndarray, flags: np.ndarray) -> str:
@@ -130,8 +132,8 @@ def _made_landing(played: Played) -> str | None:
     made = _whose(played, LANDING_FOLDER)
     if not np.any(made):
         return None
-    seconds = np.sum(made) / played.motion.fps
-    return f"{stretches(played.times, made)} ({seconds:.1f} s in all): made landing and getting up, since the recording ends in flight"
+    when = f"{stretches(played.times, made)} ({np.sum(made) / played.motion.fps:.1f} s in all)"
+    return f"{when}: made landing and getting up, since the recording ends in flight"
 
 
 def _too_fast(played: Played, track: Track | None, library: Library | None) -> str | None:
@@ -143,8 +145,8 @@ def _too_fast(played: Played, track: Track | None, library: Library | None) -> s
     if not np.any(fast):
         return None
     return (
-        f"{stretches(played.times, fast)}: the track asks for up to {speed[fast].max():.1f} m/s, faster than the library's "
-        f"{library.fastest:.1f} m/s x {REACH[1]:g}: strides are stretched"
+        f"{stretches(played.times, fast)}: the track asks for up to {speed[fast].max():.1f} m/s, faster than the "
+        f"library's {library.fastest:.1f} m/s x {REACH[1]:g}: strides are stretched"
     )
 
 
@@ -207,8 +209,8 @@ def _out_of_reach(played: Played, keys: list[Moment]) -> str | None:
 
 
 def _other_words(played: Played, asked: Timeline | None, keys: list[Moment], library: Library | None) -> str | None:
-    """Words of the user's spans that clips carry, and that are not shown for WORD_SECONDS or more, but for entry and exit
-    of key moments."""
+    """Words of the user's spans that clips carry, and that are not shown for WORD_SECONDS or more, but for entry and
+    exit of key moments."""
     if asked is None or played.words is None or library is None:
         return None
     had = [(words or frozenset()) & library.words for words in words_per_frame(asked, played.times)]

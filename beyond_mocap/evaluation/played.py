@@ -77,8 +77,8 @@ class Played:
         return self.positions[:, foot_joints(self.motion.skeleton)]
 
     def stride(self, library: Library | None) -> np.ndarray:
-        """Source frames that pass per output frame at recorded speed, (T,); the usual step of clips whose own rate is not
-        known, as it is without a library."""
+        """Source frames that pass per output frame at recorded speed, (T,); the usual step of clips whose own rate is
+        not known, as it is without a library."""
         known = {} if library is None else {clip.path: clip.motion.fps for clip in library.clips}
         rates = np.ones(len(self.clips) + 1)
         for index, path in enumerate(self.clips):

@@ -94,10 +94,10 @@ def smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndar
     """Distance (T-1,) m between the feature vectors of consecutive frames of world positions (T, J, 3) m: the curves of
     Faustino's App. D (§5.2.1), whose peaks are what counts.
 
-    The features are those of his §3.2: position, velocity and acceleration of all joints seen from the root, in the scale of
-    `library.features`. He reduces them by PCA to 98 % of their energy, which leaves the curve as it is (on a take
-    from five folders of recordings 96 % of its height, correlation 0.999); here nothing is reduced, so that a motion has one
-    curve, whatever library it comes from.
+    The features are those of his §3.2: position, velocity and acceleration of all joints seen from the root, in the
+    scale of `library.features`. He reduces them by PCA to 98 % of their energy, which leaves the curve as it is
+    (on a take from five folders of recordings 96 % of its height, correlation 0.999); here nothing is reduced, so that
+    a motion has one curve, whatever library it comes from.
     """
     joints = feature_joints(skeleton)
     facing = np.unwrap(heading_from_positions(skeleton, positions))

@@ -1,8 +1,8 @@
 """What a library's uncut recordings score themselves, worked out once per library and output rate.
 
-Measured are the recordings as they are used: brought to the library's skeleton and mended (`library.repair`), which leaves
-their jerk as it was: the 95th percentile moves by 1 % at most where clips keep their speed class, by 4 to 9 % on a library of
-five bodies whose clips nearly all get other feet.
+Measured are the recordings as they are used: brought to the library's skeleton and mended (`library.repair`), which
+leaves their jerk as it was: the 95th percentile moves by 1 % at most where clips keep their speed class, by 4 to 9 % on
+a library of five bodies whose clips nearly all get other feet.
 
 Every recording is resampled to the output's rate and measured frame by frame; a take's own score is then a look-up of
 the frames it used. Twins are not measured again: all figures here are the same for left and right.
@@ -58,9 +58,9 @@ class LibraryReference:
 
     index: path -> recording; first (C + 1,): each recording's first row; rate (C,): its own frames per second; the
     per-frame arrays are Recording's, joined; jerk_above_real (N,): 1 where the window around a frame is above jerk_p95,
-    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95 (5,) m.
-    poses (M, 6 J): some ten a second of all clips, twins included. heel_rest: height of the heel joint on a flat foot, m. fastest:
-    highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
+    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95 (5,)
+    m. poses (M, 6 J): some ten a second of all clips, twins included. heel_rest: height of the heel joint on a flat
+    foot, m. fastest: highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
     """
 
     fps: float

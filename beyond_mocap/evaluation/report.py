@@ -45,9 +45,9 @@ def evaluate_played(
 ) -> dict:
     """The report of anything played, from memory or files (`played_from_take`, `played_from_tables`).
 
-    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. asked: the user's
-    own words, where `timeline` has automatic ones beside them. InputError where the library has another skeleton than
-    the motion.
+    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. asked: the
+    user's own words, where `timeline` has automatic ones beside them. InputError where the library has another skeleton
+    than the motion.
     """
     view = View(played, track, timeline, library)
     report = {

@@ -1,4 +1,5 @@
-"""What building a library worked out, kept in one `.npz` (never pickled) that depends on the content of every file read.
+"""What building a library worked out, kept in one `.npz` (never pickled) that depends on the content of every file
+read.
 
 A damaged or stale cache is simply not used and written anew; the file is written beside its place and renamed, so two
 processes that build at once do no harm: the later one wins with the same content.
@@ -25,7 +26,10 @@ from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
 VERSION = 22
-_FRAME_ARRAYS = ("clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean", "basis", "words")
+_FRAME_ARRAYS = (
+    "clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean",
+    "basis", "words",
+)
 
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
@@ -56,7 +60,8 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
 
 
 def save(place: Path, key: str, library, name: str = "library") -> bool:
-    """Writes `library` as `place`/`name`.npz and says whether it could; a place that cannot be written is left alone."""
+    """Writes `library` as `place`/`name`.npz and says whether it could; a place that cannot be written is left
+    alone."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     for length, clusters in library.clusters.items():
         for part in ("start", "label", "medoid"):

@@ -1,7 +1,7 @@
 """Which clip stands for which gait, where the user has chosen (Faustino §3.1.1).
 
-His automatic locomotion begins with "specifying which mocap to use for which locomotion"; all other clips must not carry
-that word, so that one word has one speed. Without a choice every annotated clip counts (`library.measure_gaits`).
+His automatic locomotion begins with "specifying which mocap to use for which locomotion"; all other clips must not
+carry that word, so that one word has one speed. Without a choice every annotated clip counts (`library.measure_gaits`).
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ def with_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
     """The library with `chosen` (gait word -> clip's path below the folder): its rows of that word
     alone say how fast the gait is, and no other clip's locomotion carries it. Actions of other clips keep their words.
 
-    InputError for a word that is no gait, a clip that the library has not, one whose rows do not carry the word, and for
-    clips that are not slower than the next faster gait's.
+    InputError for a word that is no gait, a clip that the library has not, one whose rows do not carry the word, and
+    for clips that are not slower than the next faster gait's.
     """
     if not chosen:
         return library
@@ -68,4 +68,5 @@ def _check_order(library: Library) -> None:
     lost = [word for word, _ in library.chosen if word not in speeds]
     if lost:
         told = ", ".join(f"{word} {speed:.1f} m/s" for word, speed in speeds.items())
-        raise InputError(_WHERE, f"the clip for {lost[0]} is not faster than a slower gait ({told})", "another clip for one")
+        what = f"the clip for {lost[0]} is not faster than a slower gait ({told})"
+        raise InputError(_WHERE, what, "another clip for one")

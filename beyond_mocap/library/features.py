@@ -1,10 +1,10 @@
 """Every frame of the library as a few numbers: joint positions, velocities and accelerations, reduced by PCA.
 
-Faustino §3.2 takes position, velocity and acceleration of all joints relative to the root, and §3.2.1 reduces them to the
-principal components that hold 98 % of the energy. He says neither in which frame nor in which scale. We take the root's
-heading frame (a walk north equals a walk east) and weigh velocity by 0.12 s and acceleration by half of 0.12 s squared: a
-distance between features is then in metres, about how far the joints will be apart an eighth of a second later.
-He drops each motion's first two frames, which lack derivatives; central differences lose none.
+Faustino §3.2 takes position, velocity and acceleration of all joints relative to the root, and §3.2.1 reduces them to
+the principal components that hold 98 % of the energy. He says neither in which frame nor in which scale. We take the
+root's heading frame (a walk north equals a walk east) and weigh velocity by 0.12 s and acceleration by half of 0.12 s
+squared: a distance between features is then in metres, about how far the joints will be apart an eighth of a second
+later. He drops each motion's first two frames, which lack derivatives; central differences lose none.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ class Frames:
     """All clips of a library, one after the other, at the library's rate: N frames.
 
     clip (N,) clip index; source (N,) fractional frame in the clip's own rate; first, count (C,) each clip's place.
-    root (N, 3) metres; heading (N,) facing, radians, unwrapped within a clip; path (N, 2) the root on the ground without
-    its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame (x forward, y left). feet (N, 4)
-    m: where the left and the right toe (ankle where there is none) lie on the ground, from the path, in the facing frame.
-    jerk (N,) m/s^3 of the joint that has most, from the third difference around each frame.
-    features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words (N, V) bool, one
-    column per word of `vocabulary`.
+    root (N, 3) metres; heading (N,) facing, radians, unwrapped within a clip; path (N, 2) the root on the ground
+    without its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame
+    (x forward, y left). feet (N, 4) m: where the left and the right toe (ankle where there is none) lie on the ground,
+    from the path, in the facing frame. jerk (N,) m/s^3 of the joint that has most, from the third difference around
+    each frame. features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words
+    (N, V) bool, one column per word of `vocabulary`.
     """
 
     clip: np.ndarray
@@ -82,8 +82,8 @@ def feature_joints(skeleton: Skeleton) -> np.ndarray:
 def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.ndarray:
     """One clip's features before PCA: joint positions (T, K, 3) m with the root first, heading (T,) -> (T, 9 K - 2).
 
-    The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided by
-    the root of K, so that a distance is the root mean square over joints.
+    The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided
+    by the root of K, so that a distance is the root mean square over joints.
     """
     velocity = _gradient(positions, fps)
     acceleration = _gradient(velocity, fps)
@@ -117,9 +117,12 @@ def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np
     return mean, vectors[:, :kept].astype(values.dtype)
 
 
-def describe(skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], fps: float, like: Frames | None = None) -> Frames:
+def describe(
+    skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], fps: float, like: Frames | None = None
+) -> Frames:
     """Frames of all `clips` at `fps`. `words_of(clip, frames)` gives the (T, V) bool words at fractional clip frames.
-    like: frames whose components are used, so that features of both can be compared; else those of the clips themselves."""
+    like: frames whose components are used, so that features of both can be compared; else those of the clips
+    themselves."""
     joints, body = feature_joints(skeleton), identify(skeleton)
     toes = [body.left.toe_or_foot, body.right.toe_or_foot]
     parts: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}

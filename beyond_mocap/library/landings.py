@@ -100,4 +100,5 @@ def told(completed_clips: Sequence[Completed], ways: Sequence[WayUp]) -> list[st
         return []
     seconds = np.median([(len(one.motion) - one.recorded) / one.motion.fps for one in completed_clips])
     by = "by a made getting up, since no clip shows one" if ways[0].made else "as the library's own clips get up"
-    return [f"{len(completed_clips)} clips end in flight: landing and getting up ({by}) made behind them, {seconds:.1f} s each"]
+    what = f"landing and getting up ({by}) made behind them, {seconds:.1f} s each"
+    return [f"{len(completed_clips)} clips end in flight: {what}"]

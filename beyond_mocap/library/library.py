@@ -37,8 +37,8 @@ Progress = Callable[[float, str], None]
 class Clip:
     """One recording or its mirrored twin.
 
-    path: below the library's folder, with slashes. motion: at its own rate, metres, the floor (2nd percentile of its toe
-    heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
+    path: below the library's folder, with slashes. motion: at its own rate, metres, the floor (2nd percentile of its
+    toe heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
     standing: (T, 2, 2) bool, left and right foot, whether heel and toe stand on the ground. recorded: number of frames
     that are recorded, where landing and getting up were made behind them (`library.landings`); None: all.
     """
@@ -83,7 +83,8 @@ class Clip:
 
 @dataclass(frozen=True)
 class Gait:
-    """A kind of locomotion that the library holds: its word, all words of its most common row, and mean speed in m/s."""
+    """A kind of locomotion that the library holds: its word, all words of its most common row, and mean speed in
+    m/s."""
 
     word: str
     words: tuple[str, ...]
@@ -92,9 +93,9 @@ class Gait:
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was decided;
-    kept: where its cache is and under which key, for what is worked out later; chosen: which clip stands for which gait,
-    (word, path) pairs (`library.chosen`)."""
+    """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was
+    decided; kept: where its cache is and under which key, for what is worked out later; chosen: which clip stands for
+    which gait, (word, path) pairs (`library.chosen`)."""
 
     folder: str
     skeleton: Skeleton
@@ -133,8 +134,8 @@ class Library:
 
     @cached_property
     def stance_seconds(self) -> np.ndarray:
-        """(N,) seconds that the foot which leaves the ground sooner stands there in all at each frame; 0 while one is in
-        the air. Whoever plays it faster or slower than the track drags that foot as long."""
+        """(N,) seconds that the foot which leaves the ground sooner stands there in all at each frame; 0 while one is
+        in the air. Whoever plays it faster or slower than the track drags that foot as long."""
         return np.concatenate([_stance_seconds(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
 
     @cached_property
@@ -148,9 +149,9 @@ class Library:
 
     @cached_property
     def extended(self) -> "Library":
-        """The recordings and, behind them, what `library.made` makes of them: the speeds between and above them, and kicks
-        on the run; made on first use and kept beside the cache. It has no clusters. InputError where no recording shows
-        locomotion."""
+        """The recordings and, behind them, what `library.made` makes of them: the speeds between and above them, and
+        kicks on the run; made on first use and kept beside the cache. It has no clusters. InputError where no recording
+        shows locomotion."""
         measure_gaits(self)  # a library without locomotion stays an error
         made = cache.load(*self.kept, "made") if self.kept else None
         if made is None:
@@ -171,8 +172,9 @@ class Library:
         return gaps(self.frames.speed[locomotion(self.frames, self.clips)], self.fps)
 
     def lacks(self, speed: np.ndarray, at_keys: np.ndarray) -> bool:
-        """Whether a track at `speed` (T,) m/s, at the library's rate, stays in a gap for a fifth of a second or more, or
-        has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick can be played without sliding."""
+        """Whether a track at `speed` (T,) m/s, at the library's rate, stays in a gap for a fifth of a second or more,
+        or has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick can be played without
+        sliding."""
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.gaps)
         too_fast = 1.3 * kick_speed(self.frames, self.clips, self.keys)
         return inside >= 0.2 * self.fps or bool(np.any(at_keys > too_fast))
@@ -316,7 +318,8 @@ def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[Cli
     """Rows cut to the clip; InputError for one that begins, or has its key moment, after the clip's end."""
     for row in rows:
         if row.start >= count:
-            raise InputError(path, f"a row that begins at frame {row.start:g}", f"frames 0 to {count - 1}", "mend the row")
+            what = f"a row that begins at frame {row.start:g}"
+            raise InputError(path, what, f"frames 0 to {count - 1}", "mend the row")
         if row.key is not None and row.key >= count:
             raise InputError(path, f"a key moment at frame {row.key:g}", f"frames 0 to {count - 1}", "mend the row")
     return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)

@@ -38,8 +38,8 @@ def floor_height(motion: Motion) -> float:
 
 
 def sole_height(skeleton: Skeleton) -> float:
-    """Metres from the ground up to the foremost joint of a foot that stands flat: 0 where that is a toe, which the floor
-    is told by; an ankle's usual height (as `neutral` has it) where there are no toes."""
+    """Metres from the ground up to the foremost joint of a foot that stands flat: 0 where that is a toe, which the
+    floor is told by; an ankle's usual height (as `neutral` has it) where there are no toes."""
     body = identify(skeleton)
     return 0.0 if body.left.toe is not None or body.right.toe is not None else _ANKLE * leg_length(skeleton)
 

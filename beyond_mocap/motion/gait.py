@@ -105,7 +105,8 @@ def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> 
 def _within_reach(
     course: Course, place: np.ndarray, on: np.ndarray, off: np.ndarray, leg: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stances (K,) cut where the hips are too far from the foot: when speed changes within a stance, feet lift earlier."""
+    """Stances (K,) cut where the hips are too far from the foot: when speed changes within a stance, feet lift
+    earlier."""
     share = np.linspace(0.0, 0.5, 26)
     ends = []
     for edge, sign in ((on, -1.0), (off, 1.0)):
@@ -178,7 +179,8 @@ def _straightest(steps: Footsteps, times: np.ndarray) -> np.ndarray:
 
 
 def kept_bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:
-    """The ankle (T, 3) drawn to its hip (T, 3) where the leg, `leg` metres long, would be straightened too far in swing."""
+    """The ankle (T, 3) drawn to its hip (T, 3) where the leg, `leg` metres long, would be straightened too far in
+    swing."""
     away = ankle - hip
     far = np.linalg.norm(away, axis=1)
     begin = (_straightest(steps, times) + 0.006 - _EASE) * leg

@@ -1,7 +1,7 @@
 """Published figures of walking and running, from standing to 9.5 m/s, for an adult with a leg of 0.87 m.
 
-Leg: thigh plus shank. Sources, by the letters used below; where authors differ or a speed lies between theirs, the value
-is a smooth line through them. Checked against recordings: cadence, bounce, thigh and knee angles over the cycle.
+Leg: thigh plus shank. Sources, by the letters used below; where authors differ or a speed lies between theirs, the
+value is a smooth line through them. Checked against recordings: cadence, bounce, thigh and knee angles over the cycle.
   G  Grieve and Gear 1966, Ergonomics 9: relation of cadence and stride length to walking speed
   W  Winter 1991, "The biomechanics and motor control of human gait": joint angles over the cycle, natural cadence
   M  Murray, Drought and Kory 1964, J Bone Joint Surg 46-A; Murray 1967: sway, pelvis, arms, foot angles of walking men
@@ -231,7 +231,8 @@ def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=None)
 def _bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Height of a mass over one step for duty factors (share of the step): the sine-wave model L, by integrating twice."""
+    """Height of a mass over one step for duty factors (share of the step): the sine-wave model L, by integrating
+    twice."""
     duties = np.linspace(0.40, 1.0, 25)
     phase = np.linspace(0.0, 1.0, 241)
     heights = np.empty((len(duties), len(phase)))

@@ -91,7 +91,8 @@ def _leaning(course: Course) -> np.ndarray:
 
 
 def hip_height(course: Course, neutral: Neutral, style: GaitStyle) -> np.ndarray:
-    """Height (N,) metres of the hip joints: over the middle of stance as the knee's flexion there says, and the bounce."""
+    """Height (N,) metres of the hip joints: over the middle of stance as the knee's flexion there says, and the
+    bounce."""
     gear, phase = course.gear, course.phase
     scale = neutral.leg / tables.LEG
     knee = np.radians(at_speed("knee_mid", gear)) + style.crouch

@@ -1,9 +1,9 @@
 """What follows a recording that ends in flight: free fall, the landing, lying still, and getting up.
 
-Goalkeepers' dives are recorded over floors that nobody likes to land on, and stop before the landing. Held there, or cut
-to the next clip, the body hangs in the air. Here it falls on: its middle as a stone does, its limbs and its own spin from
-what they were towards the pose it lands in; the ground stops the fall, friction the sliding; it settles, turns as the
-nearest way of getting up begins, and gets up.
+Goalkeepers' dives are recorded over floors that nobody likes to land on, and stop before the landing. Held there, or
+cut to the next clip, the body hangs in the air. Here it falls on: its middle as a stone does, its limbs and its own
+spin from what they were towards the pose it lands in; the ground stops the fall, friction the sliding; it settles,
+turns as the nearest way of getting up begins, and gets up.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ _SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # metres per second squared of a mark
 class Landed:
     """motion: the recording, frame by frame as it was, and what follows. recorded, touched, rising: number of recorded
     frames that are kept (all, but for a few behind a jump of its markers just before its end), the frame at which the
-    body meets the ground, and the one from which on the way up is played. way: index of the way up, and way_frames (R,):
-    its fractional frames from `rising` on."""
+    body meets the ground, and the one from which on the way up is played. way: index of the way up, and way_frames
+    (R,): its fractional frames from `rising` on."""
 
     motion: Motion
     recorded: int
@@ -136,8 +136,8 @@ class _Fall:
 
 
 class _Track:
-    """Local rotations (J, 4) in motion: where they are, how fast they turn (J, 3) rad/s in their own frames, and how that
-    changes; `towards` lets what they are off a goal fade."""
+    """Local rotations (J, 4) in motion: where they are, how fast they turn (J, 3) rad/s in their own frames, and how
+    that changes; `towards` lets what they are off a goal fade."""
 
     def __init__(self, motion: Motion | None = None, pose=None, speed=None, acceleration=None):
         if motion is not None:
@@ -168,8 +168,8 @@ class _Track:
 
 
 def _shown(count: int, fps: float) -> np.ndarray:
-    """Fractional frames (R,) of a way up of `count` frames as it is shown: its first for a while, then faster and faster
-    until it plays as it is."""
+    """Fractional frames (R,) of a way up of `count` frames as it is shown: its first for a while, then faster and
+    faster until it plays as it is."""
     start = _STARTING * fps
     played = np.arange(int(count + 0.5 * start)) / start
     frames = start * np.where(played < 1.0, played**3 - 0.5 * played**4, played - 0.5)
@@ -246,7 +246,8 @@ def _begin(way: Motion) -> float:
 
 
 def _nearest_way(ways: Sequence[Motion], lying: np.ndarray, fps: float) -> tuple[int, Motion]:
-    """Which way up needs least turning over from lying (J, 4), and its motion at `fps` from where it is worth playing."""
+    """Which way up needs least turning over from lying (J, 4), and its motion at `fps` from where it is worth
+    playing."""
     found = []
     for number, way in enumerate(ways):
         cut = way.frames(int(round(_begin(way))), len(way))
@@ -286,8 +287,8 @@ def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up
 
 
 def _cushioned(free: np.ndarray, ground: np.ndarray, ease: np.ndarray) -> np.ndarray:
-    """Heights (T,) that follow `free` above and `ground` below, and never go below the ground; the change is spread over
-    some centimetres, eased in (T,) from the recording's end."""
+    """Heights (T,) that follow `free` above and `ground` below, and never go below the ground; the change is spread
+    over some centimetres, eased in (T,) from the recording's end."""
     above = free - ground
     return ground + 0.5 * (above + np.hypot(above, 2.0 * _CUSHION * ease))
 

@@ -192,7 +192,8 @@ def throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0)
 
 
 def _walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves) -> Footsteps:
-    """Stances of one foot that stands still but for `moves`: rows (leaves, lands, metres ahead), seconds from the key."""
+    """Stances of one foot that stands still but for `moves`: rows (leaves, lands, metres ahead), seconds from the
+    key."""
     scale = neutral.leg / tables.LEG
     sign = 1.0 if side == LEFT else -1.0
     left = sign * 0.5 * tables.at_speed("width", 0.0) * scale

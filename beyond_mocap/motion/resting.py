@@ -38,8 +38,8 @@ def lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) ->
 
 
 def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float) -> np.ndarray:
-    """Local rotations (T, J, 4) with arms that reach below the ground turned up at the shoulder, evenly over time, so that
-    little of them is left below; root (T, 3) m, rotations (T, J, 4) local."""
+    """Local rotations (T, J, 4) with arms that reach below the ground turned up at the shoulder, evenly over time, so
+    that little of them is left below; root (T, 3) m, rotations (T, J, 4) local."""
     places, world = pose_kinematics(skeleton, root, rotations)
     out = rotations.copy()
     for chain in _arms(skeleton):
@@ -111,8 +111,8 @@ def _parts(body: Humanoid):
     yield from (("neck", body.neck), ("head", body.head), ("hips", body.hips))
 
 
-# degrees: flexion, abduction, inward turn and elbow of the lower and the upper arm; metres for an adult: ankles ahead of
-# the hips, along the body and above their middle; degrees: roll to the front, bend of spine and head
+# degrees: flexion, abduction, inward turn and elbow of the lower and the upper arm; metres for an adult: ankles ahead
+# of the hips, along the body and above their middle; degrees: roll to the front, bend of spine and head
 _LANDING = {
     "arms": ((150, 0, 0, 18), (140, 6, 10, 30)),
     "ankles": ((0.12, 0.74, -0.12), (0.22, 0.62, -0.02)),

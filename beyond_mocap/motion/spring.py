@@ -1,7 +1,8 @@
-"""A critically damped follower of third order: what is off its goal fades, from any place, speed and acceleration, smoothly.
+"""A critically damped follower of third order: what is off its goal fades, from any place, speed and acceleration,
+smoothly.
 
-Offsets are vectors (rotation vectors, metres). All three poles lie at -rate, so that nothing overshoots from rest and the
-acceleration is continuous wherever the goal changes.
+Offsets are vectors (rotation vectors, metres). All three poles lie at -rate, so that nothing overshoots from rest and
+the acceleration is continuous wherever the goal changes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A part of the body carried elsewhere: a foot or hand by its limb, head or chest by the spine, the rest as it was.
 
-A limb is swung about its upper joint and bends or straightens by a share of the way to the least or largest angle of its
-knee or elbow. A shift of the foot in space, the same at every frame, would ask for more than the leg's length where the
-recording stretches it, and the knee would snap straight.
+A limb is swung about its upper joint and bends or straightens by a share of the way to the least or largest angle of
+its knee or elbow. A shift of the foot in space, the same at every frame, would ask for more than the leg's length where
+the recording stretches it, and the knee would snap straight.
 
 What is applied is the difference between reaching for the new place and reaching for the old one, so that a shift of
 zero changes nothing at all, however straight the limb is.
@@ -25,7 +25,8 @@ MOST_BEND = {"head": 0.6, "chest": 0.35}
 """Radians that the whole spine bends at most."""
 
 LEAST_ANGLE, MOST_ANGLE = np.radians(35.0), np.radians(170.0)
-"""Radians inside a knee or elbow that a carried limb has at least and at most, unless the recording has less or more."""
+"""Radians inside a knee or elbow that a carried limb has at least and at most, unless the recording has less or
+more."""
 
 MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}
 """Radians that the whole limb turns about its hip or shoulder at most."""
@@ -93,8 +94,8 @@ class Swing:
 
 
 def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray, most: float, lowered=0.0) -> Swing:
-    """The swing that brings the limb's end to `place` (3,) m at frame `at`, or as near as MOST_ANGLE, LEAST_ANGLE and a turn
-    of `most` rad let it."""
+    """The swing that brings the limb's end to `place` (3,) m at frame `at`, or as near as MOST_ANGLE, LEAST_ANGLE and a
+    turn of `most` rad let it."""
     top, middle, end = body.places[at, list(chain)]
     old, new = end - top, place - top + [0.0, 0.0, lowered]
     turn = quaternion.to_rotation_vector(quaternion.between(old[None], new[None]))[0]
@@ -103,12 +104,13 @@ def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray
     own, wanted = (_inside(*bones, np.linalg.norm(line)) for line in (old, new))
     limit = MOST_ANGLE if wanted > own else LEAST_ANGLE
     left = limit - own
-    return Swing(turn, 0.0 if left * (wanted - own) <= 0.0 else min((wanted - own) / left, 1.0) * np.sign(left), lowered)
+    bend = 0.0 if left * (wanted - own) <= 0.0 else min((wanted - own) / left, 1.0) * np.sign(left)
+    return Swing(turn, bend, lowered)
 
 
 def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarray) -> np.ndarray:
-    """(W, 3) m by which the limb's end moves, with a share (W,) of a swing at each frame. What bends less than the limit
-    at one frame bends less at all, so that the knee's speed stays that of the recording."""
+    """(W, 3) m by which the limb's end moves, with a share (W,) of a swing at each frame. What bends less than the
+    limit at one frame bends less at all, so that the knee's speed stays that of the recording."""
     top, middle, end = (body.places[:, joint] for joint in chain)
     line = end - top
     length = np.linalg.norm(line, axis=1)

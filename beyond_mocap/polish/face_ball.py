@@ -1,8 +1,8 @@
 """The body turned so that what strikes points at the ball.
 
-A clip strikes somewhere beside or before the body, the tracked ball lies elsewhere, and neither the root leaves its track
-nor the ball its noise for that (../shared/metrics.md, contact gap). What is free is the body's heading: players turn into
-their kicks.
+A clip strikes somewhere beside or before the body, the tracked ball lies elsewhere, and neither the root leaves its
+track nor the ball its noise for that (../shared/metrics.md, contact gap). What is free is the body's heading: players
+turn into their kicks.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ def turned_to_ball(
 ) -> np.ndarray:
     """(T,) radians to turn the body by, about its root, at most MOST at any touch.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; ball (T, 3) m, NaN where there is none. Of two parts
-    that may strike, the faster one's place counts.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; ball (T, 3) m, NaN where there is none. Of two
+    parts that may strike, the faster one's place counts.
     """
     turn = np.zeros(len(root))
     at = np.arange(len(root))

@@ -36,8 +36,8 @@ class Room:
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """Where a part strikes. direction (3,) level, unit: from part to ball. along: share of the way from the start of the
-    part's line (the ankle) to its end (the toes)."""
+    """Where a part strikes. direction (3,) level, unit: from part to ball. along: share of the way from the start of
+    the part's line (the ankle) to its end (the toes)."""
 
     direction: np.ndarray
     along: float = 0.5
@@ -93,8 +93,8 @@ def meetings(
     room: Room,
     avoid: Sequence[tuple[Line, float]] = (),
 ) -> Meeting:
-    """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may and out of what it is to avoid, the
-    part the rest."""
+    """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may and out of what it is to avoid,
+    the part the rest."""
     along = np.array([aim.along for aim in aims])[:, None]
     start = line[0] + along * (line[1] - line[0])
     above = rise * (radius + BALL_RADIUS)

@@ -14,7 +14,8 @@ from ..motion.track import zero_phase_hann
 
 TURN_WEIGHT = 12.0
 OFF_THE_FEET = 40.0
-"""How many times firmer the recording's own turning is followed by who flies, lies or kneels and so cannot turn at will."""
+"""How many times firmer the recording's own turning is followed by who flies, lies or kneels and so cannot turn at
+will."""
 
 _FLIGHT_SECONDS = 0.3  # without a foot on the ground; the flights of running are shorter
 _LOW = 0.6  # of the usual height of the hips
@@ -43,11 +44,11 @@ def facing(
     """(T,) facing in radians, unwrapped: the least squares compromise between travel and the recording's own turning.
 
     direction (T,) of travel on the track and speed (T,) m/s there; velocity (T, 2) m/s of the recording in its facing
-    frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle to
-    the direction of travel; where either stands still there is no such angle and the recording's turning decides alone.
-    Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the facing has to be, NaN where
-    it is free: what lies around a stretch that is made anew. firm (T,): how many times firmer than usual the recording's
-    own turning is followed (`firmness`). aim: (T,) radians that a body which stands slowly turns to.
+    frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle
+    to the direction of travel; where either stands still there is no such angle and the recording's turning decides,
+    with a little of `aim`. Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the facing has to
+    be, NaN where it is free: what lies around a stretch that is made anew. firm (T,): how many times firmer than usual
+    the recording's own turning is followed (`firmness`). aim: (T,) radians that a body which stands slowly turns to.
     """
     count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
@@ -113,8 +114,8 @@ def pulled_to_track(
     root: np.ndarray, track: np.ndarray, fps: float, window: float = ROOT_WINDOW, rounds: int = 4
 ) -> np.ndarray:
     """(T, 2) root without what drifts slowly from the track (T, 2): the difference of the two, both seen through a
-    Hann window of `window` seconds (../shared/metrics.md, root error), is removed `rounds` times; once would leave a third of it, since the
-    window is not sharp."""
+    Hann window of `window` seconds (../shared/metrics.md, root error), is removed `rounds` times; once would leave a
+    third of it, since the window is not sharp."""
     smooth = zero_phase_hann(track, fps, window)
     for _ in range(rounds):
         root = root - (zero_phase_hann(root, fps, window) - smooth)

@@ -174,8 +174,8 @@ def _held(frame: float, count: int) -> tuple[int, int]:
 @dataclass(frozen=True, eq=False)
 class _Scene:
     """What a touch is played with: the parts, each with the share (W,) of its shift per frame; the ball's path (T, 3)
-    and whether it is measured (T,); the side of the part on which the ball is; what the ball avoids; `origin`, the first of the body's W
-    frames."""
+    and whether it is measured (T,); the side of the part on which the ball is; what the ball avoids; `origin`, the
+    first of the body's W frames."""
 
     moment: _Moment
     parts: tuple[Surface, ...]
@@ -227,10 +227,11 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
     scene = _Scene(moment, parts, shares, path, measured, Aim(ahead), avoid, origin)
     if len(parts) == 2:
         return scene
+    def possible(need: np.ndarray) -> np.ndarray:
+        return _bounded(body, parts[0], at, need)
+
     rise, ball, room = _RISE[parts[0].part], path[moment.frame], scene.room(moment.frame)
-    return replace(
-        scene, aim=best_aim(line, radius, ahead, rise, ball, room, avoid, lambda need: _bounded(body, parts[0], at, need))
-    )
+    return replace(scene, aim=best_aim(line, radius, ahead, rise, ball, room, avoid, possible))
 
 
 def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
@@ -337,8 +338,8 @@ def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
 
 
 def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """Shifts (P, 3) m that bring parts to the ball which are at `lines` (P, 2, 3) m by `shifts` (P, 3) m, as far as a body
-    can make them."""
+    """Shifts (P, 3) m that bring parts to the ball which are at `lines` (P, 2, 3) m by `shifts` (P, 3) m, as far as a
+    body can make them."""
     wished = shifts
     for _ in range(_ROUNDS):
         _, needs = scene.ball_and_needs(lines + (wished - shifts)[:, None], scene.moment.frame)

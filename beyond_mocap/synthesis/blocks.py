@@ -2,16 +2,16 @@
 
 The first pass chooses a cluster for every slot of 32 frames, the second a block from each chosen cluster; the slots are
 then halved twice, and each half is searched anew among the cluster that the parent's half belongs to. Cost per slot is
-alpha times the annotation cost D (eq. 18, 19) and between slots 1 - alpha times the continuity cost C (eq. 17), taken in
-units of `transition_cost.typical_distance`.
+alpha times the annotation cost D (eq. 18, 19) and between slots 1 - alpha times the continuity cost C (eq. 17), taken
+in units of `transition_cost.typical_distance`.
 
 Decisions where the paper is silent or misprinted:
-- A slot that holds a key moment offers only blocks that show a serving clip's key frame at exactly that frame. Eq. 20 as
-  printed multiplies D by zero there, which throws away the reward of the right block; with the right place enforced by the
-  choice of start no multiplier is needed, at any block length. At the coarse levels, where a clip may be too short to
-  reach the slot's edges, its end is held for the cost.
-- Slots beside a key moment also offer the same clip's neighbouring frames, as far as its annotated row goes, so that entry
-  and exit can be played whole.
+- A slot that holds a key moment offers only blocks that show a serving clip's key frame at exactly that frame. Eq. 20
+  as printed multiplies D by zero there, which throws away the reward of the right block; with the right place enforced
+  by the choice of start no multiplier is needed, at any block length. At the coarse levels, where a clip may be too
+  short to reach the slot's edges, its end is held for the cost.
+- Slots beside a key moment also offer the same clip's neighbouring frames, as far as its annotated row goes, so that
+  entry and exit can be played whole.
 - A parent's own half is always among the candidates, so that refining never makes a sequence worse.
 """
 
@@ -37,7 +37,8 @@ FINEST = BLOCK_LENGTHS[-1]
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Blocks on offer for a slot: clip (K,), start (K,) library frame (it may lie outside the clip beside a key moment)."""
+    """Blocks on offer for a slot: clip (K,), start (K,) library frame (it may lie outside the clip beside a key
+    moment)."""
 
     clip: np.ndarray
     start: np.ndarray
@@ -126,7 +127,8 @@ class BlockSearch:
         return blocks.at(fits)
 
     def _choose_clusters(self) -> list[Candidates]:
-        """One cluster per slot of 32 frames, by the same costs (Faustino: "DP is actually performed twice"); as candidates."""
+        """One cluster per slot of 32 frames, by the same costs (Faustino: "DP is actually performed twice"); as
+        candidates."""
         length = BLOCK_LENGTHS[0]
         clusters = self.library.clusters[length]
         count = len(clusters.medoid)
@@ -147,7 +149,8 @@ class BlockSearch:
         return [self._members(clusters, usable, label) for label in choice]
 
     def _cluster_costs(self, clusters, usable: np.ndarray, slot: int) -> np.ndarray:
-        """alpha times D of each cluster: the mean over its blocks (eq. 19); a key moment forbids clusters without it."""
+        """alpha times D of each cluster: the mean over its blocks (eq. 19); a key moment forbids clusters without
+        it."""
         count = len(clusters.medoid)
         cost = self.annotation.of_blocks(clusters.start, self.asked_words(slot, clusters.length))
         members = np.bincount(clusters.label[usable], minlength=count)
@@ -164,7 +167,8 @@ class BlockSearch:
         return Candidates(self.frames.clip[start], start)
 
     def _anything(self) -> Candidates:
-        """Candidates of a library whose clips are all shorter than the longest block: the start of every usable clip."""
+        """Candidates of a library whose clips are all shorter than the longest block: the start of every usable
+        clip."""
         clip = np.flatnonzero(self.wanted.allowed)
         return Candidates(clip, self.frames.first[clip])
 

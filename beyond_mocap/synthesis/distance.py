@@ -1,4 +1,5 @@
-"""Sections of blocks turned into what each output frame shows and how far it has travelled (Faustino §3.2.4, §3.3.2)."""
+"""Sections of blocks turned into what each output frame shows and how far it has travelled (Faustino §3.2.4,
+§3.3.2)."""
 
 from __future__ import annotations
 

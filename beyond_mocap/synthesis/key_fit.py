@@ -31,8 +31,8 @@ _LEAVING = (0.06, 0.3)
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """What the track says about the ball at a key moment, in the frame of travel: place (2,) m from the player; height m,
-    NaN where it is not measured; leaving (2,) m/s just after. NaN throughout where there is no ball."""
+    """What the track says about the ball at a key moment, in the frame of travel: place (2,) m from the player; height
+    m, NaN where it is not measured; leaving (2,) m/s just after. NaN throughout where there is no ball."""
 
     place: np.ndarray
     height: float
@@ -41,8 +41,8 @@ class Ball:
 
 @dataclass(frozen=True, eq=False)
 class Strikes:
-    """How K key moments of clips strike: place (K, 2) m of the part's middle from the hips, height (K,) m, velocity (K, 2)
-    m/s, in the frame of travel; NaN for what touches no ball."""
+    """How K key moments of clips strike: place (K, 2) m of the part's middle from the hips, height (K,) m, velocity
+    (K, 2) m/s, in the frame of travel; NaN for what touches no ball."""
 
     place: np.ndarray
     height: np.ndarray
@@ -103,7 +103,8 @@ def _strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarra
 
 
 def misfit(found: Strikes, ball: Ball) -> np.ndarray:
-    """(K,) cost of serving a key moment with that ball by each of the clips' strikes; what is not known costs nothing."""
+    """(K,) cost of serving a key moment with that ball by each of the clips' strikes; what is not known costs
+    nothing."""
     apart = np.linalg.norm(found.place - ball.place, axis=1)
     cost = PLACE_COST * np.clip(apart - _NOISE, 0.0, _FARTHEST)
     cost = np.nan_to_num(cost)

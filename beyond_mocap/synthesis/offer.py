@@ -23,10 +23,10 @@ _LONGEST_STANCE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Traits:
-    """K pairs of a rate and a library frame. number (K,) of the rate; frame (K,); speed (K,) m/s and turn (K,) radians of a
-    slot that begins there; long_stance (K,) s that both feet stand longer than in a walk; offset (K,) radians from the
-    direction of travel to the body's; made (K,) bool; missing (K,) share of the asked words that it lacks; unasked (K,)
-    bool: it shows an action nobody asked for, or nothing that is annotated."""
+    """K pairs of a rate and a library frame. number (K,) of the rate; frame (K,); speed (K,) m/s and turn (K,) radians
+    of a slot that begins there; long_stance (K,) s that both feet stand longer than in a walk; offset (K,) radians from
+    the direction of travel to the body's; made (K,) bool; missing (K,) share of the asked words that it lacks; unasked
+    (K,) bool: it shows an action nobody asked for, or nothing that is annotated."""
 
     number: np.ndarray
     frame: np.ndarray
@@ -82,12 +82,12 @@ class Offer:
     def traits(self, number: np.ndarray, frame: np.ndarray, words: frozenset[str]) -> Traits:
         """Of the pairs of RATES[number (K,)] and frame (K,), where `words` are asked (none: all will do)."""
         missing, unasked = self._words(words)
-        own = (self.long_stance, self.offset, self.made, missing, unasked)
-        return Traits(number, frame, self.speed[number, frame], self.turn[number, frame], *(values[frame] for values in own))
+        own = (values[frame] for values in (self.long_stance, self.offset, self.made, missing, unasked))
+        return Traits(number, frame, self.speed[number, frame], self.turn[number, frame], *own)
 
     def near_in_speed(self, speed: float, count: int, words: frozenset[str]) -> Traits:
-        """Of the `count` pairs nearest to a speed in m/s. The others' misfit in speed alone would put them behind, and a
-        large library is searched as fast as a small one."""
+        """Of the `count` pairs nearest to a speed in m/s. The others' misfit in speed alone would put them behind, and
+        a large library is searched as fast as a small one."""
         if words not in self._sorted:
             self._sorted[words] = self.traits(*np.divmod(self.by_speed, len(self.frames)), words)
         middle = int(np.searchsorted(self.speeds, speed))
@@ -95,8 +95,8 @@ class Offer:
         return self._sorted[words].part(low, low + count)
 
     def _words(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
-        """(N,) share of the words that each frame lacks; (N,) bool: a slot from there on shows an action (a kick, a jump)
-        that nobody asked for, or nothing that is annotated."""
+        """(N,) share of the words that each frame lacks; (N,) bool: a slot from there on shows an action
+        (a kick, a jump) that nobody asked for, or nothing that is annotated."""
         if words not in self._by_words:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.missing_share(words) if words else np.zeros(len(frames))
@@ -107,8 +107,9 @@ class Offer:
 
 
 def wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) and (N,): by how much the largest jerk within REACH frames before and after each frame exceeds what is usual at
-    its speed, as a share; 0 where it does not. A seam's jerk is measured over such windows (../shared/metrics.md)."""
+    """(N,) and (N,): by how much the largest jerk within REACH frames before and after each frame exceeds what is usual
+    at its speed, as a share; 0 where it does not. A seam's jerk is measured over such windows
+    (../shared/metrics.md)."""
     frames = library.frames
     kind = np.digitize(frames.speed, _SPEED_CLASSES)
     around = maximum_filter1d(frames.jerk, 2 * REACH + 1, mode="nearest")
@@ -118,8 +119,8 @@ def wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
 
 
 def played_speed_and_turn(library: Library, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Per library frame, if a slot starts there at `rate`: (N,) mean speed in m/s, (N,) turn of the body in radians, (N,)
-    whether the clip lasts that long."""
+    """Per library frame, if a slot starts there at `rate`: (N,) mean speed in m/s, (N,) turn of the body in radians,
+    (N,) whether the clip lasts that long."""
     frames = library.frames
     after = np.arange(len(frames)) + SLOT * rate
     valid = frames.left_in_clip >= SLOT * rate

@@ -18,14 +18,14 @@ from .wanted import Wanted
 
 @dataclass(frozen=True)
 class Weights:
-    """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a walk;
-    turn per radian and slot; facing per radian between the body and where it should face; words for lacking all of the
-    asked ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made clip, which
-    steps in only where recordings miss the speed by more, made_key at key moments, where a recording is worth more; rate
-    per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch for any cut; pose per metre of joint distance;
-    feet per metre that a foot which stands before and after a cut would jump; wild for cutting where the clips jerk by as
-    much again as is usual; rate_change per unit; replay for a stretch shown less than 4 s ago; held per frame beyond a
-    clip's end.
+    """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a
+    walk; turn per radian and slot; facing per radian between the body and where it should face; words for lacking all
+    of the asked ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made
+    clip, which steps in only where recordings miss the speed by more, made_key at key moments, where a recording is
+    worth more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch for any cut; pose per metre
+    of joint distance; feet per metre that a foot which stands before and after a cut would jump; wild for cutting where
+    the clips jerk by as much again as is usual; rate_change per unit; replay for a stretch shown less than 4 s ago;
+    held per frame beyond a clip's end.
     """
 
     speed: float = 1.0
@@ -67,8 +67,8 @@ class PathCosts:
         return speed, float(track.direction[last] - track.direction[first]) * min(1.0, speed)
 
     def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
-        """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end; inf
-        where the clip ends before or may not be used."""
+        """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end;
+        inf where the clip ends before or may not be used."""
         cost = self._misfit(first, end, self.offer.traits(number, frame, self._words(first, end)))
         return np.where(self.offer.valid[number, frame], cost, np.inf)
 
@@ -93,9 +93,9 @@ class PathCosts:
         return cost + np.float32(w.made) * what.made
 
     def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held at
-        their ends. Words do not count here. A kick that was recorded slower than the player runs is played faster, within
-        the limits of what may give way (../shared/metrics.md)."""
+        """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held
+        at their ends. Words do not count here. A kick that was recorded slower than the player runs is played faster,
+        within the limits of what may give way (../shared/metrics.md)."""
         low, high = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         length = end - first
         a, b = (np.clip(at, low, high) for at in (start, start + rate * length))
@@ -119,8 +119,8 @@ class PathCosts:
         return cost + w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
 
     def cut(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """(B, K) cost of a cut from library frames ends (B,) to start (K,): how far their poses are apart, and how wild the
-        motion is that is left or entered (nobody can blend out of a kick half way)."""
+        """(B, K) cost of a cut from library frames ends (B,) to start (K,): how far their poses are apart, and how wild
+        the motion is that is left or entered (nobody can blend out of a kick half way)."""
         ends, start = self.inside(ends), self.inside(start)
         a, b = self.frames.features[ends], self.frames.features[start]
         square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)

@@ -1,11 +1,11 @@
 """A search that looks at speed, turning, facing and words together with continuity, over the whole track.
 
 Faustino searches for words first and repairs distance afterwards; his §6.1 and §6.2 wish for position, distance and
-orientation inside the main search. Here every slot of about eight frames offers every frame of the library at five rates;
-its cost is how far speed, turn, facing and words are from what the track asks, plus what the change of pose costs. A beam
-keeps the best states of every slot. Whoever begins a piece of a key moment is bound to it as long as that clip's own entry
-and exit ask; the slot of the key frame itself is open to nobody else, so the beam has to pass through one of these clips at
-exactly the asked time, and begins its run-up as early as it must.
+orientation inside the main search. Here every slot of about eight frames offers every frame of the library at five
+rates; its cost is how far speed, turn, facing and words are from what the track asks, plus what the change of pose
+costs. A beam keeps the best states of every slot. Whoever begins a piece of a key moment is bound to it as long as that
+clip's own entry and exit ask; the slot of the key frame itself is open to nobody else, so the beam has to pass through
+one of these clips at exactly the asked time, and begins its run-up as early as it must.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ _SAME = 0.05
 
 @dataclass(frozen=True)
 class Width:
-    """How much a search looks at: `beam` states are kept of every slot; `candidates` pairs of library frame and rate are
-    weighed against them, the cheapest of the `looked_at` pairs nearest to the asked speed."""
+    """How much a search looks at: `beam` states are kept of every slot; `candidates` pairs of library frame and rate
+    are weighed against them, the cheapest of the `looked_at` pairs nearest to the asked speed."""
 
     beam: int = 64
     candidates: int = 1500
@@ -74,8 +74,9 @@ class States:
 class PathSearch:
     """One search; `run()` gives the edit list.
 
-    between: search this stretch only and keep the rest. hurry: when it says so the rest is searched by a narrow beam, and
-    `hurried` is the frame from which on, else None; before the first slot is filled it ends the search as `cancelled` does.
+    between: search this stretch only and keep the rest. hurry: when it says so the rest is searched by a narrow beam,
+    and `hurried` is the frame from which on, else None; before the first slot is filled it ends the search as
+    `cancelled` does.
     """
 
     def __init__(
@@ -105,7 +106,8 @@ class PathSearch:
         """The cheapest way through all slots that the beam finds; InputError where no clip is as long as a slot."""
         if not len(self.offer.by_speed):
             raise InputError(
-                self.library.folder or "library", f"no clip of more than {SLOT} frames at {self.library.fps:g} per second",
+                self.library.folder or "library",
+                f"no clip of more than {SLOT} frames at {self.library.fps:g} per second",
                 "clips of a second or more", "add longer recordings",
             )
         layers: list[States] = []
@@ -138,8 +140,8 @@ class PathSearch:
 
     def _first(self) -> States:
         clip, start, rate, cost, piece = self._offered(0)
-        states = States(clip, start, rate, cost, np.zeros(len(clip), int), piece, np.full((len(clip), MEMORY_SLOTS), -1))
-        return self._kept(states)
+        recent = np.full((len(clip), MEMORY_SLOTS), -1)
+        return self._kept(States(clip, start, rate, cost, np.zeros(len(clip), int), piece, recent))
 
     def _arriving(self) -> tuple[States, int]:
         """The one state from which a stretch sets out, the frame before, with what was shown up to there; and its
@@ -155,7 +157,8 @@ class PathSearch:
         """The last states, of `shown` frames, with what it costs to come to the frame that stays behind the stretch."""
         edit, at = self.between.edit, np.array([self.between.end])
         everyone = np.arange(len(states.cost))
-        way = self._ways(states, everyone, states.start + states.rate * shown, edit.clip[at], edit.frame[at], _steps(edit, at))
+        ends, goal = states.start + states.rate * shown, (edit.clip[at], edit.frame[at], _steps(edit, at))
+        way = self._ways(states, everyone, ends, *goal)
         return replace(states, cost=way[:, 0])
 
     def _layer(self, slot: int, before: States, shown: int) -> States:
@@ -172,8 +175,8 @@ class PathSearch:
         return self._kept(States(clip, start, rate, cost, back, piece, np.roll(before.recent[back], -1, axis=1)))
 
     def _kept(self, states: States) -> States:
-        """The cheapest of those that are free and of those bound to a key moment, as many of each as the beam keeps, with
-        their memory moved on."""
+        """The cheapest of those that are free and of those bound to a key moment, as many of each as the beam keeps,
+        with their memory moved on."""
         order = np.argsort(states.cost, kind="stable")
         free = states.piece[order] < 0
         kept = states.only(np.concatenate([order[free][: self.width.beam], order[~free][: self.width.beam]]))
@@ -181,9 +184,9 @@ class PathSearch:
         return kept
 
     def _offered(self, slot: int):
-        """What can begin in a slot: pieces of key moments, and, unless a key frame lies in it, library frames at any rate:
-        the cheapest candidates, those that lead into a piece, and what was shown before an edit. clip, start, rate, cost,
-        piece, each (K,)."""
+        """What can begin in a slot: pieces of key moments, and, unless a key frame lies in it, library frames at any
+        rate: the cheapest candidates, those that lead into a piece, and what was shown before an edit. clip, start,
+        rate, cost, piece, each (K,)."""
         low, high = self.edges[slot : slot + 2]
         here = np.flatnonzero(self.pieces.first == slot)
         clip, start, rate = self.pieces.clip[here], self.pieces.start[here], self.pieces.rate[here]
@@ -207,8 +210,8 @@ class PathSearch:
         return clip, start, rate, cost, np.full(len(soon), -1)
 
     def _as_before(self, low: int, high: int):
-        """What the edit list shows in a slot of a stretch that is searched anew, so that the search may come back to it;
-        nothing where it is cut there."""
+        """What the edit list shows in a slot of a stretch that is searched anew, so that the search may come back to
+        it; nothing where it is cut there."""
         edit = self.between.edit if self.between else None
         cut = edit is None or np.any((edit.seams > low) & (edit.seams < high))
         at = np.array([], int) if cut else np.array([low])
@@ -234,8 +237,8 @@ class PathSearch:
         return clip, start, rate, way[best, np.arange(len(start))] + unary, free[best], piece
 
     def _ways(self, before: States, free: np.ndarray, ends: np.ndarray, clip, start, rate) -> np.ndarray:
-        """(B, K) cost of coming by the states `free` (B,), which end at library frames `ends` (B,), to frames start (K,) of
-        clips (K,) at a rate (K,): a cut, unless the clip shows that frame next anyway."""
+        """(B, K) cost of coming by the states `free` (B,), which end at library frames `ends` (B,), to frames start
+        (K,) of clips (K,) at a rate (K,): a cut, unless the clip shows that frame next anyway."""
         cut = self.costs.cut(ends, start)
         buckets = self.offer.bucket[self.costs.inside(start)]
         cut += np.float32(self.weights.replay) * self._seen(before.recent[free])[:, buckets]

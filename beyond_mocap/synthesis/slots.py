@@ -1,8 +1,8 @@
 """The output cut into slots of about eight frames, and the pieces that clips of key moments fill among them.
 
-A key moment's clip is played as long as its own entry and exit ask (Faustino §3.2.2): from the last slot edge before the
-entry to the first one after the exit, at one rate, so that the key frame is on time. Between two key moments that crowd
-each other lies an edge half way, which neither crosses.
+A key moment's clip is played as long as its own entry and exit ask (Faustino §3.2.2): from the last slot edge before
+the entry to the first one after the exit, at one rate, so that the key frame is on time. Between two key moments that
+crowd each other lies an edge half way, which neither crosses.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from .wanted import Wanted, needed, pool_frame
 KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])
 SHORTEST = 6
 AROUND = 12
-"""Frames before and behind a key frame that its clip is played at least, however short its annotated row: who cuts nearer
-cuts into the swing itself."""
+"""Frames before and behind a key frame that its clip is played at least, however short its annotated row: who cuts
+nearer cuts into the swing itself."""
 
 _CROWDED = 3 * SLOT
 _TRIMMED = 2.5  # frames of an entry or exit that may go, so that a slot more is not bound for them
@@ -28,8 +28,9 @@ _TRIMMED = 2.5  # frames of an entry or exit that may go, so that a slot more is
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """P ways to serve key moments, every choice at every rate: wanted (P,) number of the key moment; choice (P,) which of
-    its choices; clip (P,); rate (P,); first, end (P,) slots; start (P,) fractional library frame at the first slot's edge."""
+    """P ways to serve key moments, every choice at every rate: wanted (P,) number of the key moment; choice (P,) which
+    of its choices; clip (P,); rate (P,); first, end (P,) slots; start (P,) fractional library frame at the first slot's
+    edge."""
 
     wanted: np.ndarray
     choice: np.ndarray
@@ -47,9 +48,9 @@ class Pieces:
 def slot_edges(library: Library, wanted: Wanted, first: int = 0, end: int | None = None) -> np.ndarray:
     """(S + 1,) output frames from first to end (all of them); slots of about SLOT frames.
 
-    There is an edge half way between key moments that crowd each other, and one before and after each where the shortest of
-    its clips begins and ends, so that a clip which does not fit its surroundings need not be played longer than it must;
-    none of these leaves a slot shorter than SHORTEST beside it.
+    There is an edge half way between key moments that crowd each other, and one before and after each where the
+    shortest of its clips begins and ends, so that a clip which does not fit its surroundings need not be played longer
+    than it must; none of these leaves a slot shorter than SHORTEST beside it.
     """
     end = len(wanted) if end is None else end
     served = [key for key in wanted.keys if key.choices and first <= round(key.frame) < end]
@@ -66,8 +67,8 @@ def slot_edges(library: Library, wanted: Wanted, first: int = 0, end: int | None
 
 
 def key_pieces(library: Library, wanted: Wanted, edges: np.ndarray) -> Pieces:
-    """All pieces of all key moments between the first edge and the last that find room; one between two others in the same
-    slot finds none."""
+    """All pieces of all key moments between the first edge and the last that find room; one between two others in the
+    same slot finds none."""
     served = [n for n, key in enumerate(wanted.keys) if key.choices and edges[0] <= round(key.frame) < edges[-1]]
     inside = {number: slot_of(edges, wanted.keys[number].frame) for number in served}
     rows: list[tuple] = []

@@ -38,8 +38,9 @@ def asked_otherwise(before: Wanted, after: Wanted, slot: int) -> np.ndarray:
     """(T,) bool: frames of which other words, another speed or another turning over `slot` frames is asked."""
     old, new = before.track, after.track
     words = np.array([a != b for a, b in zip(before.asked, after.asked)])
-    turn = np.abs(quaternion.wrapped(_turn(new.direction, slot) - _turn(old.direction, slot))) * np.minimum(1.0, new.speed)
-    facing = np.abs(quaternion.wrapped(wanted_offset(new) - wanted_offset(old))) * np.minimum(1.0, new.speed)
+    moving = np.minimum(1.0, new.speed)
+    turn = np.abs(quaternion.wrapped(_turn(new.direction, slot) - _turn(old.direction, slot))) * moving
+    facing = np.abs(quaternion.wrapped(wanted_offset(new) - wanted_offset(old))) * moving
     return words | (np.abs(new.speed - old.speed) > SPEED) | (turn > TURN) | (facing > FACING)
 
 

@@ -1,4 +1,5 @@
-"""The order in frames of the library's rate: what is asked of every frame, and which clips can serve each key moment."""
+"""The order in frames of the library's rate: what is asked of every frame, and which clips can serve each key
+moment."""
 
 from __future__ import annotations
 
@@ -6,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, gait_thresholds, spoken, words_per_frame
+from ..annotation import (
+    TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, gait_thresholds, spoken, words_per_frame,
+)
 from ..errors import NotInLibrary
 from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
@@ -21,9 +24,9 @@ Words = frozenset[str] | None
 
 @dataclass(frozen=True)
 class WantedKey:
-    """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may serve
-    it (empty: locomotion stands in), the words used where the asked ones are lacking, and whether the feed measured the
-    ball's height then."""
+    """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may
+    serve it (empty: locomotion stands in), the words used where the asked ones are lacking, and whether the feed
+    measured the ball's height then."""
 
     asked: KeyMoment
     frame: float
@@ -35,7 +38,8 @@ class WantedKey:
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
-    gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use."""
+    gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use.
+    warnings: what the library lacks of what is asked."""
 
     track: SampledTrack
     asked: tuple[Words, ...]
@@ -50,7 +54,8 @@ class Wanted:
 
 
 def wanted(library: Library, plan: Plan) -> Wanted:
-    """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless plan.nearest)."""
+    """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries
+    (unless plan.nearest)."""
     track = sample(plan.track, library.fps, plan.track_window)
     gaits = library.gaits
     speeds = np.array([gait.speed for gait in gaits])
@@ -78,9 +83,11 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
         return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), None)
     offered = nearest_words(usable, moment.words)
     line = f"line {moment.line}, " if moment.line else ""
-    text = f"{line}{moment.time:g} s: the library has no clip for '{' '.join(moment.words)}'; nearest: {_listed(offered)}"
+    lacks = f"the library has no clip for '{' '.join(moment.words)}'"
+    text = f"{line}{moment.time:g} s: {lacks}; nearest: {_listed(offered)}"
     if not go_on:
-        raise NotInLibrary(f"{text}; ask for one of these, add such a clip, or go on with the nearest (--nearest, in Blender Nearest Words)", offered)
+        way_out = "add such a clip, or go on with the nearest (--nearest, in Blender Nearest Words)"
+        raise NotInLibrary(f"{text}; ask for one of these, {way_out}", offered)
     choices = nearest_serving(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].words
     used = spoken(choices[0].words) if choices else gait_words
@@ -95,7 +102,8 @@ def _listed(offered: tuple[str, ...]) -> str:
 def _lacking(library: Library, timeline: Timeline) -> list[str]:
     """One warning per word of a span that no clip carries."""
     asked = {word for span in timeline.spans for word in span.words} - {TRANSITION}
-    return [f"no clip carries the word '{word}': spans that ask for it follow the rest" for word in sorted(asked - library.words)]
+    lacking = sorted(asked - library.words)
+    return [f"no clip carries the word '{word}': spans that ask for it follow the rest" for word in lacking]
 
 
 def _with_transitions(asked: list[Words], keys: tuple[WantedKey, ...], library: Library) -> list[Words]:

@@ -1,4 +1,5 @@
-"""A leg swung to planted places: exact where its joints allow, at their limits where not, and never past them between."""
+"""A leg swung to planted places: exact where its joints allow, at their limits where not, and never past them
+between."""
 
 import numpy as np
 import pytest
