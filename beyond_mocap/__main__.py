@@ -245,8 +245,8 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
         write_report(options.report, report)
     told.end()
     if library.notes:
-        command = f"'beyond-mocap library {options.library}'"
-        told.note(f"{options.library}: {len(library.notes)} notes on how its recordings were read; {command} tells them")
+        notes = f"{len(library.notes)} notes on how its recordings were read and mended"
+        told.note(f"{options.library}: {notes}; the command 'library' prints them")
     of_take = [line for line in take.warnings if line not in library.notes]
     for line in (*of_take, *(f"{options.track}: {line}" for line in data.lines)):
         told.note(line)
@@ -358,7 +358,7 @@ def _writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
         raise InputError(
             out, f"no file ending in {out.suffix} can be written here" if out.suffix else "no file ending",
             f"one of {', '.join(sorted(known))}",
-            "inside Blender .blend, .fbx, .glb and .usdc can be written too",
+            "choose another ending" if writers else "inside Blender .blend, .fbx, .glb and .usdc can be written too",
         )
     return known[out.suffix.lower()]
 

@@ -405,7 +405,7 @@ def test_what_a_library_says_of_itself_is_one_line_to_who_synthesizes(run, synth
     own = [line for line in out.splitlines() if line.startswith("unit ")]
     status, _, error = synthesize()
     assert status == 0 and own and not any(note in line for note in own for line in error)
-    assert sum("'beyond-mocap library " in line for line in error) == 1
+    assert sum("the command 'library' prints them" in line for line in error) == 1
 
 
 def test_no_progress_where_nobody_looks(run, clip_file, tmp_path):
