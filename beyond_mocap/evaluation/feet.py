@@ -13,6 +13,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..motion import quaternion
 from ..motion.humanoid import identify
+from ..motion.runs import runs
 from ..motion.skeleton import Skeleton
 
 NOTICED_SLIDE = 0.021
@@ -41,8 +42,7 @@ def stances(contacts: np.ndarray) -> np.ndarray:
     """Runs of at least two contact frames: (S, 3) int rows of first frame, frame after the last, side."""
     rows = []
     for side in range(contacts.shape[1]):
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], contacts[:, side], [False]]).astype(np.int8)))
-        rows += [(start, stop, side) for start, stop in zip(edges[::2], edges[1::2]) if stop - start >= 2]
+        rows += [(start, stop, side) for start, stop in runs(contacts[:, side]) if stop - start >= 2]
     return np.array(rows, dtype=int).reshape(-1, 3)
 
 

@@ -16,6 +16,7 @@ from ..annotation import Timeline, words_per_frame
 from ..library.library import Library
 from ..library.landings import LANDING_FOLDER
 from ..library.made import BLENDED, KICKED, MADE_FOLDER
+from ..motion.runs import runs
 from ..motion.track import Track
 from . import feet, jerk, root
 from .moments import Moment, met, moments
@@ -87,8 +88,7 @@ def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> str | No
 def stretches(times: np.ndarray, flags: np.ndarray) -> str:
     """Where flags (T,) hold, as text: "4.2-6.0, 7.3 s". Stretches less than JOIN_SECONDS apart are one; of more than
     MOST_STRETCHES the longest are named."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    first, last = times[edges[::2]], times[edges[1::2] - 1]
+    first, last = np.array([(times[a], times[b - 1]) for a, b in runs(flags)]).T
     apart = np.flatnonzero(first[1:] - last[:-1] >= JOIN_SECONDS)
     first, last = first[np.append(0, apart + 1)], last[np.append(apart, len(last) - 1)]
     longest = np.sort(np.argsort(first - last, kind="stable")[:MOST_STRETCHES])

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..motion.contacts import floor_height
 from ..motion.humanoid import heading_from_positions, side_and_part
 from ..motion.quaternion import about_up, rotate
+from ..motion.runs import runs
 from ..motion.track import BALL_RADIUS
 from . import figures, pieces, realism, root
 from .view import View
@@ -207,8 +208,7 @@ def _clip_bar(ax, view: View, low: int, high: int, names: dict[int, tuple[int, s
 
 def _bars(ax, view: View, flags: np.ndarray, bottom: float, colour: str, height: float = 0.36) -> None:
     """A bar wherever flags (T,) hold."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    spans = [(view.played.start_time + a / view.fps, (b - a) / view.fps) for a, b in zip(edges[::2], edges[1::2])]
+    spans = [(view.played.start_time + a / view.fps, (b - a) / view.fps) for a, b in runs(flags)]
     ax.broken_barh(spans, (bottom, height), facecolors=colour, linewidth=0)
 
 

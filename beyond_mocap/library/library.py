@@ -359,14 +359,19 @@ def _described(clips, like: Frames | None = None) -> Frames:
 
 def _standing(clip: Clip, source: np.ndarray) -> np.ndarray:
     """(T, 2) of one clip at its frames `source` (T,)."""
-    return clip.standing.any(axis=2)[np.clip(np.round(source).astype(int), 0, len(clip.standing) - 1)]
+    return clip.standing.any(axis=2)[_nearest(clip, source)]
 
 
 def _stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
     """(T,) of one clip at its frames `source` (T,)."""
     stands = clip.standing.any(axis=2)
     length = np.stack([_run_lengths(stands[:, side]) for side in (0, 1)], axis=1).min(axis=1) / clip.motion.fps
-    return length[np.clip(np.round(source).astype(int), 0, len(length) - 1)]
+    return length[_nearest(clip, source)]
+
+
+def _nearest(clip: Clip, source: np.ndarray) -> np.ndarray:
+    """(T,) the clip's whole frames nearest to `source` (T,)."""
+    return np.clip(np.round(source).astype(int), 0, len(clip.standing) - 1)
 
 
 def _run_lengths(flags: np.ndarray) -> np.ndarray:

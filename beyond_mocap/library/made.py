@@ -33,6 +33,7 @@ from ..motion.gait import gait
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics
 from ..motion.phase_blend import Strides, blend, strides
+from ..motion.runs import runs
 from ..polish.foot_plant import plant
 from .features import Frames
 from .scan import CACHE_FOLDER
@@ -81,9 +82,8 @@ def gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float], ...]:
     if lacking.all():
         return ()
     lacking[: int(np.argmin(lacking))] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], lacking, [False]]).astype(np.int8)))
     ends = np.append(grid, FASTEST)
-    return tuple((float(grid[a]), float(ends[b])) for a, b in zip(edges[::2], edges[1::2]))
+    return tuple((float(grid[a]), float(ends[b])) for a, b in runs(lacking))
 
 
 def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:

@@ -25,6 +25,7 @@ from scipy.ndimage import minimum_filter1d
 from ..motion import contacts, quaternion
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
+from ..motion.runs import runs
 from ..motion.track import zero_phase_hann
 from ..polish.foot_plant import plant
 
@@ -225,8 +226,7 @@ def _inner(stands: np.ndarray) -> np.ndarray:
     """Weights (T, 2), 1 in the middle third of every stance and 0 in its outer sixths, from `stands` (T, 2) bool."""
     weight = np.zeros(stands.shape)
     for side, one in enumerate(stands.T):
-        edges = np.flatnonzero(np.diff(one, prepend=False, append=False))
-        for start, stop in zip(edges[::2], edges[1::2]):
+        for start, stop in runs(one):
             share = (np.arange(stop - start) + 0.5) / (stop - start)
             weight[start:stop, side] = np.clip(3.0 * np.minimum(share, 1.0 - share) - 0.5, 0.0, 1.0)
     return weight

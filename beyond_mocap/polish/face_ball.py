@@ -13,7 +13,7 @@ import numpy as np
 
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..motion.striking import surfaces
+from ..motion.striking import faster_middle, surfaces
 from .strike import Touch
 
 MOST = np.radians(60.0)
@@ -50,8 +50,7 @@ def _offset(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> float:
     if len(root) < 3 or not found or not np.isfinite(ball[frame]).all():
         return 0.0
     places, world = pose_kinematics(skeleton, root[frame - 1 : frame + 2], rotations[frame - 1 : frame + 2])
-    middles = [np.mean(surface.line(places, world), axis=0) for surface in found]
-    middle = max(middles, key=lambda way: float(np.linalg.norm(way[2] - way[0])))
+    middle = faster_middle(found, places, world)
     part, goal = middle[1, :2] - root[frame, :2], ball[frame, :2] - root[frame, :2]
     clear = np.clip((min(np.linalg.norm(part), np.linalg.norm(goal)) - _NEAR) / (_CLEAR - _NEAR), 0.0, 1.0)
     apart = np.arctan2(part[0] * goal[1] - part[1] * goal[0], part @ goal)

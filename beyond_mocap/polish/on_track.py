@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from ..motion import quaternion
+from ..motion.runs import runs
 from ..motion.track import zero_phase_hann
 
 TURN_WEIGHT = 12.0
@@ -76,9 +77,8 @@ def firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray
     """(T,) `firm` of `facing`: OFF_THE_FEET where no foot stands for a while or the hips are low, else 1; standing
     (T, 2, 2) bool of heels and toes, height (T,) m of the root."""
     off = ~standing.any(axis=(1, 2))
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(np.int8)))
     out = np.where(height < _LOW * np.median(height), OFF_THE_FEET, 1.0)
-    for first, last in zip(edges[::2], edges[1::2]):
+    for first, last in runs(off):
         if last - first >= _FLIGHT_SECONDS * fps:
             out[first:last] = OFF_THE_FEET
     return out

@@ -19,6 +19,7 @@ import numpy as np
 from ..motion import quaternion
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
+from ..motion.runs import runs
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 from .reach import two_bone
@@ -250,8 +251,8 @@ class _Plan:
     def _dragged(self, side: int, now: int) -> list[tuple[int, int]]:
         """Stances (first, end) from `now` on that drag too far, the first one first; notes how far each frame's foot
         lags."""
-        runs = [run for run in _runs(self.stands[:, side]) if run[1] > now]
-        return [run for run in runs if self._drag(side, *run) > SPARED]
+        ahead = [run for run in runs(self.stands[:, side]) if run[1] > now]
+        return [run for run in ahead if self._drag(side, *run) > SPARED]
 
     def _drag(self, side: int, first: int, end: int) -> float:
         """How far the foot would lag at most in frames first .. end, 1 where a step is due."""
@@ -304,7 +305,7 @@ class _Plan:
         step; whether there is one."""
         other, (first, end) = 1 - side, self.left[side][0]
         foot, reach = self.feet[other], int(round(0.3 * self.fps))
-        for up, down in _runs(~self.stands[:, other] & ~self.stepped[:, other]):
+        for up, down in runs(~self.stands[:, other] & ~self.stepped[:, other]):
             inside = max(now, 1) <= up < end and down > first
             if inside and self._gentle(foot, up, down) and self.free_until[up] >= down:
                 kept = foot, self.stands.copy(), self.lag.copy(), self.left[other]
@@ -376,25 +377,19 @@ def _until(flags: np.ndarray) -> np.ndarray:
     return np.append(np.minimum.accumulate(unset[::-1])[::-1], count)
 
 
-def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """First frames and ends of the runs in which `flags` (T,) is set."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [tuple(run) for run in edges.reshape(-1, 2).tolist()]
-
-
 def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
     """(T, 2, 2) m by which feet that step are set down further apart, so that the left one stays to the left of the
     right one; left (T,): that way, complex. A stance's foot stands at the mean of where the body takes it
     (`foot_plant.shift`)."""
-    runs = [_runs(plan.stands[:, side]) for side in (_LEFT, _RIGHT)]
+    stances = [runs(plan.stands[:, side]) for side in (_LEFT, _RIGHT)]
     near = np.pad(stepped, ((1, 1), (0, 0)))
-    loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in runs[side]] for side in (_LEFT, _RIGHT)]
-    place = [[foot.points[a:b].mean(axis=0) for a, b in runs[side]] for side, foot in enumerate(plan.feet)]
+    loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in stances[side]] for side in (_LEFT, _RIGHT)]
+    place = [[foot.points[a:b].mean(axis=0) for a, b in stances[side]] for side, foot in enumerate(plan.feet)]
     pushed = [[0.0j] * len(side) for side in place]
     pairs = [
         (i, j, complex(left[(max(a, c) + min(b, d)) // 2]))
-        for i, (a, b) in enumerate(runs[_LEFT])
-        for j, (c, d) in enumerate(runs[_RIGHT])
+        for i, (a, b) in enumerate(stances[_LEFT])
+        for j, (c, d) in enumerate(stances[_RIGHT])
         if max(a, c) <= min(b, d) and (loose[_LEFT][i] or loose[_RIGHT][j])
     ]
     for _ in range(_ROUNDS):
@@ -408,7 +403,7 @@ def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
     out = np.zeros((len(stepped), 2, 2))
     for side in (_LEFT, _RIGHT):
         if any(pushed[side]):
-            ends = np.ravel(runs[side]) - [0, 1] * len(runs[side])
+            ends = np.ravel(stances[side]) - [0, 1] * len(stances[side])
             by = np.interp(np.arange(len(out)), ends, np.repeat(pushed[side], 2))
             out[:, side] = np.stack([by.real, by.imag], axis=1)
     return out
@@ -419,7 +414,7 @@ def _swings(stepped: np.ndarray, fps: float) -> np.ndarray:
     off, on = int(round(HEEL_OFF * fps)), int(round(TOE_ON * fps))
     out = np.zeros_like(stepped)
     for side in (_LEFT, _RIGHT):
-        for first, end in _runs(stepped[:, side]):
+        for first, end in runs(stepped[:, side]):
             out[first + off : end - on, side] = True
     return out
 
@@ -430,13 +425,13 @@ def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list
     moves, sway = np.zeros((len(stepped), 2, 4)), np.zeros((len(stepped), 2))
     early = int(0.2 * fps)
     for side in (_LEFT, _RIGHT):
-        for first, end in _runs(stepped[:, side]):
+        for first, end in runs(stepped[:, side]):
             moves[first:end, side, 3] = _tilt(_through(first, end))
             low, high, middle = max(first - early, 0), min(end + early, len(root)), (first + end) // 2
             over = feet[1 - side][middle] - root[middle]
             over = SWAY * np.array([over.real, over.imag]) / max(abs(over), 1e-9)
             sway[low:high] += np.sin(np.pi * _through(low, high))[:, None] ** 2 * over
-        for first, end in _runs(swings[:, side]):
+        for first, end in runs(swings[:, side]):
             rising = np.clip(np.minimum(_through(first, end), 1.0 - _through(first, end)) / 0.45, 0.0, 1.0)
             moves[first:end, side, 2] = LIFT * _eased(rising)
     return moves, sway

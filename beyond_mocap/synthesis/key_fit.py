@@ -15,7 +15,7 @@ from ..library.keys import Key
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.motion import at_frames, pose_kinematics
-from ..motion.striking import surfaces
+from ..motion.striking import faster_middle, surfaces
 from ..motion.track import SampledTrack
 from .wanted import pool_frame
 
@@ -95,8 +95,7 @@ def _strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarra
     found = surfaces(library.skeleton, key.words)
     if not found:
         return np.full(2, np.nan), np.nan, np.full(2, np.nan)
-    middles = [np.mean(surface.line(places, rotations), axis=0) for surface in found]
-    middle = max(middles, key=lambda way: float(np.linalg.norm(way[2] - way[0])))
+    middle = faster_middle(found, places, rotations)
     level = np.stack([(middle[1] - places[1, 0])[:2], (middle[2] - middle[0])[:2] / (2.0 * _MOMENT)])
     place, velocity = quaternion.turned_level(level, np.full(2, back))
     return place, float(middle[1, 2]), velocity

@@ -193,7 +193,8 @@ class PathSearch:
         cost = self.costs.key_misfit(low, high, clip, start, rate) + self._choice_cost[here]
         offers = [(clip, start, rate, cost, here)]
         if slot not in self._closed:
-            offers += [self._candidates(low, high), self._leading_in(slot), self._as_before(low, high)]
+            offers += [self._candidates(low, high), self._leading_in(slot)]
+            offers += [self._as_before(low, high)] if self.between else []
         return [np.concatenate(parts) for parts in zip(*offers)]
 
     def _candidates(self, low: int, high: int):
@@ -212,15 +213,12 @@ class PathSearch:
     def _as_before(self, low: int, high: int):
         """What the edit list shows in a slot of a stretch that is searched anew, so that the search may come back to
         it; nothing where it is cut there."""
-        edit = self.between.edit if self.between else None
-        cut = edit is None or np.any((edit.seams > low) & (edit.seams < high))
-        at = np.array([], int) if cut else np.array([low])
-        rate = _steps(edit, at) if len(at) else np.array([])
+        edit = self.between.edit
+        at = np.array([] if np.any((edit.seams > low) & (edit.seams < high)) else [low], int)
+        start, rate = edit.frame[at], _steps(edit, at)
         number = np.abs(RATES - rate[:, None]).argmin(axis=1)
-        start = edit.frame[at] if len(at) else rate
-        clip = edit.clip[at] if len(at) else at
         cost = self.costs.misfit(low, high, number, self.costs.inside(start))
-        return clip, start, rate, cost, np.full(len(at), -1)
+        return edit.clip[at], start, rate, cost, np.full(len(at), -1)
 
     def _misfit_inside(self, slot: int, clip: np.ndarray, start: np.ndarray, number: np.ndarray) -> np.ndarray:
         """(K,) misfit of going through clips from fractional frames on, inf where they do not last."""

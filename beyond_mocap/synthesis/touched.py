@@ -14,6 +14,7 @@ import numpy as np
 from ..annotation.gaze import wanted_offset
 from ..library.library import Library
 from ..motion import quaternion
+from ..motion.runs import runs
 from .edit_list import EditList, PlacedKey
 from .wanted import Wanted, WantedKey, needed
 
@@ -82,8 +83,7 @@ def to_search(library: Library, edit: EditList, before: Wanted, after: Wanted, s
 def stretches(touched: np.ndarray, gap: int) -> list[Stretch]:
     """(first, end) of the stretches in which `touched` (T,) is true, those less than `gap` frames apart taken
     together."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], touched, [False]]).astype(int)))
-    return _joined(list(zip(edges[::2].tolist(), edges[1::2].tolist())), gap)
+    return _joined(runs(touched), gap)
 
 
 def _joined(found: list[Stretch], gap: int) -> list[Stretch]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError
+from ..runs import runs
 from .data import Track
 from .sampling import GAP_INTERVALS, LONG_GAP
 
@@ -118,7 +119,7 @@ def _parked_at_origin(ball: np.ndarray) -> np.ndarray:
     """(N,) bool: in a run of three or more samples exactly at (0, 0) that the ball did not roll into or out of."""
     zero = (ball[:, :2] == 0.0).all(axis=1)
     out = np.zeros(len(ball), dtype=bool)
-    for start, stop in _runs(zero):
+    for start, stop in runs(zero):
         beside = [i for i in (start - 1, stop) if 0 <= i < len(ball) and np.isfinite(ball[i, :2]).all()]
         out[start:stop] = stop - start >= 3 and all(np.linalg.norm(ball[i, :2]) > 1.5 for i in beside)
     return out
@@ -241,7 +242,7 @@ def _on_a_line(times: np.ndarray, positions: np.ndarray) -> bool:
 def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> np.ndarray:
     """(N, 2): the believed positions, and a cubic between them everywhere else."""
     out = positions.copy()
-    for start, stop in _runs(~believed):
+    for start, stop in runs(~believed):
         before = _end_state(times, positions, believed, start - 1, -1)
         after = _end_state(times, positions, believed, stop, +1)
         out[start:stop] = _cubic(times[start:stop], before, after)
@@ -327,12 +328,6 @@ def _replacements(track: Track) -> list[str]:
     if unknown.any() and not unknown.all():
         out.append(f"ball unknown in {unknown.sum()} of {len(track)} samples")
     return out
-
-
-def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """(start, stop) of every run of True in flags (N,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
 def _places(times, most: int = 5) -> str:
