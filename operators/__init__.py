@@ -14,6 +14,7 @@ from . import (
     export_bvh,
     import_clips,
     import_tracking,
+    keymap,
     mirror,
     remove_player,
     synthesize,
@@ -38,14 +39,16 @@ CLASSES = (
 
 
 def register():
-    """Register the operators, in order, and the command."""
+    """Register the operators, in order, the command, and the keys."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     command.register()
+    keymap.register()
 
 
 def unregister():
-    """Take the command away and unregister the operators, the last one first."""
+    """Take keys and command away and unregister the operators, the last one first."""
+    keymap.unregister()
     command.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
