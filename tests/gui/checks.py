@@ -1,46 +1,22 @@
-"""The extension in a real Blender's window, as its user meets it. Run inside Blender by tests/gui/run.
-
-Each check is a generator (see window.py) that raises AssertionError. A failed check is told and the next one goes on.
-"""
+"""The extension in a real Blender's window, as its user meets it: switched on, drawn, pressed. See play.py."""
 
 import importlib
 import importlib.metadata
 import pathlib
-import re
 import sys
 import time
 import tomllib
-import traceback
 
 import addon_utils
 import bpy
+from tab import (
+    EXTENSION, PICTURES, TAB, assert_no_trouble_since, moves, operator_of, output, press_all, printed_since, sample, trouble,
+    wait_for_work, window,
+)
+from window import unfold
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from window import Output, Window, talk, unfold  # noqa: E402
-
-EXTENSION = "bl_ext.user_default.beyond_mocap"
-TAB = "Beyond Mocap"
-PICTURES = pathlib.Path("build/gui")
+LIMIT = 600
 HEAVY = {"scipy", "sklearn", "kloppy", "lxml", "joblib", "matplotlib"}
-
-output = Output()
-window = Window()
-
-
-def trouble(text):
-    """The lines of printed text that only an error prints."""
-    return re.findall(r"^(?:Traceback \(most recent call last\):.*|/.*\.py:\d+|.*rna_uiItem\w*:.*|UILayout\..*)$", text, re.M)
-
-
-def printed_since(mark):
-    """What was printed after the first `mark` characters."""
-    return output.text()[mark:]
-
-
-def assert_no_trouble_since(mark):
-    """Fail with what was printed, each line once, where an error is in it."""
-    printed = printed_since(mark)
-    assert not trouble(printed), "printed:\n" + "\n".join(list(dict.fromkeys(printed.splitlines()))[:40])
 
 
 def check_it_is_enabled():
@@ -137,6 +113,9 @@ def check_the_eye_and_the_hand():
     assert len(set(trouble(seen))) >= 2, seen
 
 
+check_the_eye_and_the_hand.plants_trouble = True
+
+
 def check_the_tab_draws():
     mark = len(output.text())
     area = window.area("VIEW_3D")
@@ -158,80 +137,10 @@ def check_every_button():
     assert_no_trouble_since(mark)
 
 
-def press_all(wanted=None, then=None):
-    """Press each button of the tab (or only the wanted operators'), page by page; return the calls that were pressed.
-
-    `then` is what to do after each press; without it, whatever began is ended by Escape.
-    """
-    area = window.area("VIEW_3D")
-    yield from window.open_tab(area, TAB)
-    region = window.sidebar(area)
-    pressed, more = [], True
-    while more and not (wanted and len(pressed) >= len(wanted)):
-        found = yield from window.buttons(area, region)
-        new = [call for call in found if call not in pressed and (wanted is None or operator_of(call) in wanted)]
-        for call in new:  # a press may move the others: then they are looked for again
-            if (yield from window.points_at(area, region, found[call])) == call:
-                pressed.append(call)
-                yield from press_one(call, found[call], then or end_what_began)
-        more = bool(new) or (yield from window.scroll(region))
-    return pressed
-
-
-def operator_of(call):
-    """The operator's name in a call as Blender writes it.
-
-    >>> operator_of("bpy.ops.beyond_mocap.build_library(rebuild=True)")
-    'build_library'
-    """
-    return call.split("(")[0].rpartition(".")[2]
-
-
-def press_one(call, place, then):
-    """Press the button that stood there, and tell what came of it."""
-    usable = can_run(call)
-    yield from window.click(*place)
-    yield 0.3
-    reaction = yield from then()
-    output.say(f"     pressed {call}: {reaction if usable else 'greyed out'}")
-
-
-def can_run(call):
-    """Whether a button's operator says that it can be used just now."""
-    group, name = call.split("(")[0].split(".")[-2:]
-    area = window.area("VIEW_3D")
-    with bpy.context.temp_override(window=window.window, area=area, region=window.sidebar(area)):
-        return getattr(getattr(bpy.ops, group), name).poll()
-
-
-def end_what_began():
-    """Leave the file browser, dialog or running operator that a button brought up; say which it was."""
-    manager = bpy.context.window_manager
-    reaction = "done"
-    for _ in range(20):
-        browser = next((w for w in manager.windows if any(a.type == "FILE_BROWSER" for a in w.screen.areas)), None)
-        running = [operator.bl_idname for operator in window.window.modal_operators]
-        if browser is None and not running:
-            return reaction
-        reaction = "opened the file browser" if browser else f"ran {running}"
-        yield from window.escape_from(browser or window.window)
-        yield 0.5
-    raise AssertionError(f"{reaction} and did not end by Escape")
-
-
-def wait_for_work(limit=120):
-    """Wait until no operator is running any more; say how long it took."""
-    start = time.monotonic()
-    while window.window.modal_operators:
-        assert time.monotonic() - start < limit, f"still running after {limit} s"
-        yield 0.2
-    return f"took {time.monotonic() - start:.1f} s"
-
-
 def check_the_quickstart():
     """Open the sample as an animator does and press its three buttons: bodies move at the end."""
     mark = len(output.text())
-    bpy.ops.wm.open_mainfile(filepath=str((PICTURES / "sample" / "quickstart.blend").resolve()))
+    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
     yield 1.5
     steps = ["build_library", "synthesize", "bake"]
     pressed = yield from press_all(steps, then=wait_for_work)
@@ -242,36 +151,3 @@ def check_the_quickstart():
     yield 2
     window.picture(PICTURES / "quickstart.png")
     assert_no_trouble_since(mark)
-
-
-def moves(body):
-    """Whether an armature's bones stand differently at two frames of the scene."""
-    scene = bpy.context.scene
-    poses = []
-    for frame in (scene.frame_start, (scene.frame_start + scene.frame_end) // 2):
-        scene.frame_set(frame)
-        poses.append([tuple(bone.matrix.translation) for bone in body.pose.bones])
-    return poses[0] != poses[1]
-
-
-def all_checks():
-    """Run the checks in the order of the file; the status is 1 where one failed."""
-    checks = [value for name, value in globals().items() if name.startswith("check_")]
-    failed = 0
-    for check in checks:
-        name, start = check.__name__.removeprefix("check_").replace("_", " "), time.monotonic()
-        try:
-            yield from check()
-            output.say(f"ok   {name} ({time.monotonic() - start:.0f} s)")
-        except Exception:
-            failed += 1
-            window.picture(PICTURES / f"failed-{check.__name__}.png")
-            output.say(f"FAIL {name}\n{traceback.format_exc()}")
-    (PICTURES / "output.txt").write_text(output.text(), "utf-8")
-    output.say(f"window tests: {len(checks) - failed} passed, {failed} failed in Blender {bpy.app.version_string}")
-    return min(failed, 1)
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.system.use_region_overlap = False  # else each move over the sidebar draws the whole view anew
-talk(all_checks, output, limit=840)

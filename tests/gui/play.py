@@ -1,0 +1,61 @@
+"""Play a file of window checks inside Blender, and end Blender with what came of them: 0 all passed, 1 not.
+
+    blender --enable-event-simulate --python tests/gui/play.py -- tests/gui/checks.py
+
+A file of checks holds generators named `check_...` (see window.py), which are played in the order of the file. All
+names of tab.py, `output` and `window` among them, are there without an import. A check fails with an AssertionError, or
+where drawing printed an error meanwhile; a failed check is told, its picture kept, and the next one goes on. A file may
+set LIMIT, the seconds that it may take in all.
+"""
+
+import importlib.util
+import pathlib
+import sys
+import time
+import traceback
+
+import bpy
+
+sys.path.insert(0, "tests/gui")  # Blender does not put a script's folder there; the current one is the clone's top
+import tab  # noqa: E402
+from window import talk  # noqa: E402
+
+LIMIT = 240
+
+
+def checks_of(path):
+    """The file at `path` as a module that knows tab.py's names."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    vars(module).update({name: value for name, value in vars(tab).items() if not name.startswith("__")})
+    spec.loader.exec_module(module)
+    return module
+
+
+def play_all(module):
+    """Run the module's checks one after the other; the status is 1 where one failed."""
+    checks = [value for name, value in vars(module).items() if name.startswith("check_")]
+    failed, begun = 0, time.monotonic()
+    for check in checks:
+        name, start, mark = check.__name__.removeprefix("check_").replace("_", " "), time.monotonic(), len(tab.output.text())
+        try:
+            yield from check()
+            yield 0.2  # what the last step changed is drawn
+            if not getattr(check, "plants_trouble", False):
+                tab.assert_no_trouble_since(mark)
+            tab.output.say(f"ok   {name} ({time.monotonic() - start:.0f} s)")
+        except Exception:
+            failed += 1
+            tab.window.picture(tab.PICTURES / f"failed-{check.__name__}.png")
+            tab.output.say(f"FAIL {name}\n{traceback.format_exc()}")
+    (tab.PICTURES / f"{module.__name__}.txt").write_text(tab.output.text(), "utf-8")
+    told = f"{len(checks) - failed} passed, {failed} failed in {time.monotonic() - begun:.0f} s"
+    tab.output.say(f"{module.__name__}: {told}, Blender {bpy.app.version_string}")
+    return min(failed, 1) if checks else 1
+
+
+tab.PICTURES.mkdir(parents=True, exist_ok=True)
+bpy.context.preferences.view.show_splash = False
+bpy.context.preferences.system.use_region_overlap = False  # else each move over the sidebar draws the whole view anew
+played = checks_of(pathlib.Path(sys.argv[sys.argv.index("--") + 1]))
+talk(lambda: play_all(played), tab.output, getattr(played, "LIMIT", LIMIT))

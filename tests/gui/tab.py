@@ -1,0 +1,124 @@
+"""What all window tests share: the tab's buttons, found and pressed, and what was printed meanwhile.
+
+`output` and `window` are the one eye and the one hand of a run. tests/gui/play.py puts every name of this file into each
+file of checks, so that these need not import anything from here.
+"""
+
+import pathlib
+import re
+import shutil
+import time
+
+import bpy
+from window import Output, Window
+
+EXTENSION = "bl_ext.user_default.beyond_mocap"
+TAB = "Beyond Mocap"
+PICTURES = pathlib.Path("build/gui")
+SAMPLE = PICTURES / "sample"  # a copy of sample_blend, since a library's cache is written beside its clips
+
+output = Output()
+window = Window()
+
+
+def sample():
+    """The folder with our own sample, which a check may write to."""
+    if not SAMPLE.exists():
+        shutil.copytree("sample_blend", SAMPLE, ignore=shutil.ignore_patterns("__pycache__", ".beyond_mocap"))
+    return SAMPLE.resolve()
+
+
+def trouble(text):
+    """The lines of printed text that only an error prints."""
+    return re.findall(r"^(?:Traceback \(most recent call last\):.*|/.*\.py:\d+|.*rna_uiItem\w*:.*|UILayout\..*)$", text, re.M)
+
+
+def printed_since(mark):
+    """What was printed after the first `mark` characters."""
+    return output.text()[mark:]
+
+
+def assert_no_trouble_since(mark):
+    """Fail with what was printed, each line once, where an error is in it."""
+    printed = printed_since(mark)
+    assert not trouble(printed), "printed:\n" + "\n".join(list(dict.fromkeys(printed.splitlines()))[:40])
+
+
+def press_all(wanted=None, then=None):
+    """Press each button of the tab (or only the wanted operators'), page by page; return the calls that were pressed.
+
+    `then` is what to do after each press; without it, whatever began is ended by Escape.
+    """
+    area = window.area("VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    region = window.sidebar(area)
+    pressed, more = [], True
+    while more and not (wanted and len(pressed) >= len(wanted)):
+        found = yield from window.buttons(area, region)
+        new = [call for call in found if call not in pressed and (wanted is None or operator_of(call) in wanted)]
+        for call in new:  # a press may move the others: then they are looked for again
+            if (yield from window.points_at(area, region, found[call])) == call:
+                pressed.append(call)
+                yield from press_one(call, found[call], then or end_what_began)
+        more = bool(new) or (yield from window.scroll(region))
+    return pressed
+
+
+def operator_of(call):
+    """The operator's name in a call as Blender writes it.
+
+    >>> operator_of("bpy.ops.beyond_mocap.build_library(rebuild=True)")
+    'build_library'
+    """
+    return call.split("(")[0].rpartition(".")[2]
+
+
+def press_one(call, place, then):
+    """Press the button that stood there, and tell what came of it."""
+    usable = can_run(call)
+    yield from window.click(*place)
+    yield 0.3
+    reaction = yield from then()
+    output.say(f"     pressed {call}: {reaction if usable else 'greyed out'}")
+
+
+def can_run(call):
+    """Whether a button's operator says that it can be used just now."""
+    group, name = call.split("(")[0].split(".")[-2:]
+    area = window.area("VIEW_3D")
+    with bpy.context.temp_override(window=window.window, area=area, region=window.sidebar(area)):
+        return getattr(getattr(bpy.ops, group), name).poll()
+
+
+def end_what_began():
+    """Leave the file browser, dialog or running operator that a button brought up; say which it was."""
+    manager = bpy.context.window_manager
+    reaction = "done"
+    for _ in range(20):
+        browser = next((w for w in manager.windows if any(a.type == "FILE_BROWSER" for a in w.screen.areas)), None)
+        running = [operator.bl_idname for operator in window.window.modal_operators]
+        if browser is None and not running:
+            return reaction
+        reaction = "opened the file browser" if browser else f"ran {running}"
+        yield from window.escape_from(browser or window.window)
+        yield 0.5
+    raise AssertionError(f"{reaction} and did not end by Escape")
+
+
+def wait_for_work(limit=120):
+    """Wait until no operator is running any more; say how long it took."""
+    start = time.monotonic()
+    while window.window.modal_operators:
+        assert time.monotonic() - start < limit, f"still running after {limit} s"
+        yield 0.2
+    return f"took {time.monotonic() - start:.1f} s"
+
+
+def moves(body):
+    """Whether an armature's bones stand differently at two frames of the scene."""
+    scene = bpy.context.scene
+    poses = []
+    for frame in (scene.frame_start, (scene.frame_start + scene.frame_end) // 2):
+        scene.frame_set(frame)
+        poses.append([tuple(bone.matrix.translation) for bone in body.pose.bones])
+    return poses[0] != poses[1]
