@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..beyond_mocap.errors import InputError
-from ..scene import session
+from ..scene import preferences, session
 from ..scene.settings import absolute
 from .verb import BackgroundVerb
 
@@ -25,6 +25,7 @@ class Order:
     folder: str
     unit: float | None
     rebuild: bool
+    preferences: dict  # arguments of the core's build
 
 
 class BEYOND_MOCAP_OT_build_library(BackgroundVerb, bpy.types.Operator):
@@ -50,14 +51,16 @@ The result is kept in a cache, so that the next time takes a moment"""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
-        return Order(absolute(settings.library_folder), settings.library_unit or None, self.rebuild)
+        folder = absolute(settings.library_folder)
+        return Order(folder, settings.library_unit or None, self.rebuild, preferences.for_build(folder))
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
         """Build it."""
         from ..beyond_mocap.library.library import build
 
-        return build(order.folder, rebuild=order.rebuild, unit=order.unit, progress=progress, cancelled=cancelled)
+        asked = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
+        return build(order.folder, **asked, progress=progress, cancelled=cancelled)
 
     def apply(self, scene, built):
         """Keep it, and say what it holds."""

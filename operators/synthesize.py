@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import perf_counter
 
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from ..beyond_mocap.annotation import validate
 from ..beyond_mocap.errors import Cancelled, NotInLibrary
 from ..beyond_mocap.plan import Plan
 from ..beyond_mocap.take import Take
-from ..scene import plans, session
+from ..scene import plans, preferences, session
 from ..scene.settings import absolute
 from .build_library import summary
 from .verb import BackgroundVerb
@@ -44,6 +44,7 @@ class Order:
     folder: str
     unit: float | None
     library: "Library | None"
+    preferences: dict = field(default_factory=dict)  # arguments of the core's build
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class SynthesisVerb(BackgroundVerb):
             plan, warnings = plans.plan_of(settings, player)
             asked.append((player.name, plan, plans.words_from(player), warnings, self.starts_from(player)))
         unit = settings.library_unit or None
-        return Order(tuple(asked), folder, unit, session.library(folder, unit))
+        return Order(tuple(asked), folder, unit, session.library(folder, unit), preferences.for_build(folder))
 
     @staticmethod
     def work(order, progress, cancelled, hurry):
@@ -96,7 +97,8 @@ class SynthesisVerb(BackgroundVerb):
         from ..beyond_mocap.synthesize import synthesize
 
         clips = order.library or build(
-            order.folder, unit=order.unit, progress=progress, cancelled=lambda: cancelled() or hurry()
+            order.folder, unit=order.unit, **order.preferences,
+            progress=progress, cancelled=lambda: cancelled() or hurry(),
         )
         made = []
         for number, (name, plan, where, warnings, before) in enumerate(order.plans):

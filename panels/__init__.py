@@ -5,7 +5,7 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 
 import bpy
 
-from . import library, menus, players, result, synthesis
+from . import library, menus, players, preferences, result, synthesis
 
 CLASSES = (
     library.BEYOND_MOCAP_PT_library,
@@ -13,6 +13,7 @@ CLASSES = (
     players.BEYOND_MOCAP_PT_players,
     synthesis.BEYOND_MOCAP_PT_synthesis,
     result.BEYOND_MOCAP_PT_result,
+    preferences.BeyondMocapPreferences,
 )
 
 

@@ -5,6 +5,7 @@
 - `channels`    curves in bulk; alone knows slots and channelbags
 - `body`, `ball`, `curve`, `stage`, `material`   what is seen
 - `settings`    what the panels show, per scene; `session` what lives as long as Blender runs
+- `preferences` what the user sets once for all files
 - `tracks`, `plans`   the settings as tracks and plans of the core
 - `bake`        a take becomes all of that
 - `background`  long work in a thread

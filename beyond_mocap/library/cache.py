@@ -54,9 +54,13 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
     if os.access(beside if beside.is_dir() else folder, os.W_OK):
         return beside, ""
     base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    name = hashlib.blake2b(str(folder.absolute()).encode()).hexdigest()[:16]
-    elsewhere = Path(base) / "beyond_mocap" / name
+    elsewhere = own_folder(Path(base) / "beyond_mocap", folder)
     return elsewhere, f"{folder} cannot be written: its cache is kept in {elsewhere}"
+
+
+def own_folder(base: Path, folder: Path) -> Path:
+    """The folder below `base` in which the library of `folder` is kept apart from all others."""
+    return base / hashlib.blake2b(str(folder.absolute()).encode()).hexdigest()[:16]
 
 
 def save(place: Path, key: str, library, name: str = "library") -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -198,6 +199,7 @@ def build(
     skeleton: str | Path | None = None,
     unit: float | None = None,
     seed: int = 0,
+    threads: int = 1,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Library:
@@ -205,7 +207,8 @@ def build(
 
     rebuild: ignore the cache. cache_dir: where to keep it (default: the folder itself, else the user's cache folder).
     skeleton: a BVH file whose skeleton it is (default: the one with most frames, ties by name). unit: metres per file
-    unit (default: guessed per file). seed: of the clustering.
+    unit (default: guessed per file). seed: of the clustering. threads: how many files are read at once, which
+    changes no bit of what comes out.
     Clips of other skeletons are brought to this one and all are mended (`one_skeleton`, `repair`); notes say how.
     Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled.
     """
@@ -223,11 +226,11 @@ def build(
             _keep_made(place, _completed(found.clips), missing_only=True)
             return replace(found, folder=str(folder), kept=(place, key))
     notes: list[str] = [where] if where else []
-    clips = _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled)
+    clips = _read_clips(folder, paths, annotations, chosen, unit, threads, notes, report, cancelled)
     built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
     _keep_made(place, _completed(built.clips))
     if not cache.save(place, key, built):
-        told = f"{place} cannot be written: the library is worked out anew each time; give --cache a folder of yours"
+        told = f"{place} cannot be written: the library is worked out anew each time; give --cache (in Blender: Cache Folder in the preferences) a folder of yours"
         built = replace(built, notes=(*built.notes, told))
     report(1.0, "Library ready")
     return replace(built, kept=(place, key))
@@ -265,16 +268,10 @@ def _keep_made(place: Path, made: Iterable[Clip], missing_only: bool = False) ->
         return
 
 
-def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancelled) -> tuple[Clip, ...]:
+def _read_clips(folder, paths, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
     """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
-    read = []
-    for number, path in enumerate(paths):
-        _check(cancelled)
-        report(0.4 * number / len(paths), f"Reading {path.name}")
-        read.append(bvh.read(path, unit))
+    read, unpopped, level = zip(*_read_files(paths, unit, threads, report, cancelled))
     notes += _unit_notes(read)
-    unpopped = [repair.without_pops(source.motion) for source in read]
-    level = [repair.without_drift(motion) for motion, _ in unpopped]
     carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
     mended, rows = [], []
     for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
@@ -292,6 +289,27 @@ def _read_clips(folder, paths, annotations, chosen, unit, notes, report, cancell
             "write which frames are standing, walking, jogging, running, kick ...",
         )
     return tuple(clips)
+
+
+def _read_files(paths, unit, threads, report, cancelled) -> list[tuple]:
+    """Each file as read, without pops (and their number), and without drift (and its metres); some at once."""
+
+    def read_one(path: Path):
+        source = bvh.read(path, unit)
+        unpopped = repair.without_pops(source.motion)
+        return source, unpopped, repair.without_drift(unpopped[0])
+
+    read = []
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        waiting = [pool.submit(read_one, path) for path in paths]
+        try:
+            for number, (path, one) in enumerate(zip(paths, waiting)):
+                _check(cancelled)
+                report(0.4 * number / len(paths), f"Reading {path.name}")
+                read.append(one.result())
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+    return read
 
 
 def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[str]) -> list[Clip]:

@@ -46,7 +46,7 @@ LAZY = {
 EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
-    "panels": ["panels", "scene.settings"],
+    "panels": ["panels", "scene.settings", "scene.preferences"],
 }
 
 

@@ -1,0 +1,56 @@
+"""What a user sets once for all files, in Blender's preferences under Add-ons > Beyond Mocap.
+
+Everything works without them too (an extension that is switched on by a script alone has none): then the defaults hold.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import bpy
+from bpy.props import IntProperty, StringProperty
+
+EXTENSION = __package__.rpartition(".")[0]
+
+
+class Preferences:
+    """The properties; panels/preferences.py draws and registers them."""
+
+    cache_folder: StringProperty(
+        name="Cache Folder", subtype="DIR_PATH",
+        description="Where built libraries are kept, each in a folder of its own. Empty: beside the recordings, in "
+        "a folder .beyond_mocap",
+    )
+    threads: IntProperty(
+        name="Threads", default=0, min=0, max=256,
+        description="How many recordings are read at once when a library is built. 0: as many as there are processor "
+        "cores. A synthesis itself keeps to one, so that the same input always gives the same motion",
+    )
+
+
+def get() -> "Preferences | None":
+    """The user's preferences; None where the extension has none."""
+    addon = bpy.context.preferences.addons.get(EXTENSION)
+    return addon.preferences if addon is not None else None
+
+
+def threads() -> int:
+    """How many threads may be used, at least one."""
+    chosen = get()
+    return (chosen.threads if chosen else 0) or os.cpu_count() or 1
+
+
+def cache_folder(library_folder: str) -> str | None:
+    """Where the library of that folder is kept; None means beside its recordings."""
+    from ..beyond_mocap.library import cache  # slow to import, and switching the extension on has to be quick
+
+    chosen = get()
+    if not chosen or not chosen.cache_folder:
+        return None
+    return str(cache.own_folder(Path(bpy.path.abspath(chosen.cache_folder)), Path(library_folder)))
+
+
+def for_build(library_folder: str) -> dict:
+    """What the preferences say to the core's `library.build`, as its arguments."""
+    return {"cache_dir": cache_folder(library_folder), "threads": threads()}
