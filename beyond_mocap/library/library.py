@@ -230,7 +230,10 @@ def build(
     built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
     _keep_made(place, _completed(built.clips))
     if not cache.save(place, key, built):
-        told = f"{place} cannot be written: the library is worked out anew each time; give --cache (in Blender: Cache Folder in the preferences) a folder of yours"
+        told = (
+            f"{place} cannot be written: the library is worked out anew each time; give --cache "
+            "(in Blender: Cache Folder in the preferences) a folder of yours"
+        )
         built = replace(built, notes=(*built.notes, told))
     report(1.0, "Library ready")
     return replace(built, kept=(place, key))
