@@ -6,6 +6,8 @@
 - `clips`       what the library's clips are annotated with
 - `gaits`       which gait a speed asks for (§3.1.1)
 - `gaze`        which way a body faces while it goes
+- `decision`    the vocabulary as a tree of choices on number keys, with what the library has of them
+- `annotating`  annotating by keys: what each does, without any window
 
     timeline = read_timeline("player.txt", fps=30)
     validate(timeline, known_words=library_words, start=track.times[0], end=track.times[-1], where="player.txt")
