@@ -6,11 +6,12 @@ The classes are registered in the order of CLASSES.
 import bpy
 
 from . import (
+    accept,
     add_stage,
-    bake,
     build_library,
     cancel,
     command,
+    discard,
     export_bvh,
     import_clips,
     import_tracking,
@@ -33,7 +34,8 @@ CLASSES = (
     synthesize.BEYOND_MOCAP_OT_synthesize,
     update.BEYOND_MOCAP_OT_update,
     cancel.BEYOND_MOCAP_OT_cancel,
-    bake.BEYOND_MOCAP_OT_bake,
+    accept.BEYOND_MOCAP_OT_accept,
+    discard.BEYOND_MOCAP_OT_discard,
     add_stage.BEYOND_MOCAP_OT_add_stage,
 )
 

@@ -10,7 +10,7 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
-    """Add a pitch with its lines, a sun and a camera that follows the players once they are baked"""
+    """Add a pitch with its lines, a sun and a camera that follows the players once they move"""
 
     bl_idname = "beyond_mocap.add_stage"
     bl_label = "Add Pitch, Light and Camera"

@@ -1,4 +1,4 @@
-"""Remove Player: take one off the list; what was baked stays."""
+"""Remove Player: take one off the list; what was made stays."""
 
 from __future__ import annotations
 

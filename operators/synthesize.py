@@ -1,4 +1,4 @@
-"""Synthesize: a take for every chosen player. Nothing in the scene moves before Bake."""
+"""Synthesize: a take for every chosen player, shown on its armature as a preview."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..beyond_mocap.annotation import validate
 from ..beyond_mocap.errors import Cancelled, NotInLibrary
 from ..beyond_mocap.plan import Plan
 from ..beyond_mocap.take import Take
-from ..scene import plans, preferences, session
+from ..scene import plans, preferences, preview, session
 from ..scene.settings import absolute
 from .build_library import summary
 from .verb import BackgroundVerb
@@ -82,6 +82,7 @@ class SynthesisVerb(BackgroundVerb):
         folder = absolute(settings.library_folder)
         asked = []
         for player in plans.chosen(settings):
+            preview.check(player)
             plan, warnings = plans.plan_of(settings, player)
             asked.append((player.name, plan, plans.words_from(player), warnings, self.starts_from(player)))
         unit = settings.library_unit or None
@@ -136,14 +137,13 @@ class SynthesisVerb(BackgroundVerb):
         for name, plan, take, report, warnings in result.made:
             if name in lost:
                 continue
-            player = settings.players[name]
-            player.take = session.keep_take(plan, take)
-            player.quality, player.moments = quality(report), moments(report)
             told = dict.fromkeys((*warnings, *report.get("warnings", ())))
-            player.warnings = "\n".join(line for line in told if line not in result.library.notes)
+            told = "\n".join(line for line in told if line not in result.library.notes)
+            lines = {"quality": quality(report), "moments": moments(report), "warnings": told}
+            preview.show(bpy.context, settings.players[name], session.keep_take(plan, take, report), lines)
         if lost:
             self.report({"WARNING"}, f"not in the list any more, so their takes are dropped: {', '.join(lost)}")
-        told = f"players synthesized: {len(result.made) - len(lost)}; press Bake to see them"
+        told = f"players synthesized: {len(result.made) - len(lost)}; Accept keeps them"
         if len(result.made) < result.asked:  # in the same line, since the status bar shows the last one
             told = f"ended early, {result.asked - len(result.made)} left as before; {told}"
         self.report({"WARNING" if len(result.made) < result.asked else "INFO"}, told)
@@ -151,7 +151,7 @@ class SynthesisVerb(BackgroundVerb):
 
 class BEYOND_MOCAP_OT_synthesize(SynthesisVerb, bpy.types.Operator):
     """Find clips for every ticked player's track and words, and join them into one motion.
-The scene changes with Bake only"""
+It is shown as a preview, until it is accepted or discarded"""
 
     bl_idname = "beyond_mocap.synthesize"
     bl_label = "Synthesize"

@@ -10,7 +10,7 @@ from .synthesize import SynthesisVerb
 
 class BEYOND_MOCAP_OT_update(SynthesisVerb, bpy.types.Operator):
     """Make anew only what changes of the words or the track touch since the last Synthesize or Update.
-The rest stays as it is, to the last bit; the scene changes with Bake only"""
+The rest stays as it is, to the last bit; shown as a preview, until it is accepted or discarded"""
 
     bl_idname = "beyond_mocap.update"
     bl_label = "Update"

@@ -82,7 +82,7 @@ def prepare(bpy) -> None:
 
 
 def synthesize(load, settings, steps) -> list[dict]:
-    """Library and takes, kept for Bake; returns the players' reports."""
+    """Library and takes, kept for Accept; returns the players' reports."""
     plans, session = load("scene.plans"), load("scene.session")
     order, recipe = load("operators.synthesize"), load("beyond_mocap.synthesize")
     steps.enter("Library")
@@ -230,16 +230,16 @@ def run(out: pathlib.Path) -> None:
     import bpy
 
     told = load("beyond_mocap.__main__").Told(False)
-    steps = Steps(told, {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Bake": 0.03, "Render": 0.65, "Save": 0.02})
+    steps = Steps(told, {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Accept": 0.03, "Render": 0.65, "Save": 0.02})
     with quiet():
         prepare(bpy)
     settings, session = bpy.context.scene.beyond_mocap, load("scene.session")
     reports = synthesize(load, settings, steps)
-    steps.enter("Bake")
+    steps.enter("Accept")
     made = [session.made(player.take) for player in settings.players]
     plans, takes = [one.plan for one in made], [one.take for one in made]
     with quiet():
-        bpy.ops.beyond_mocap.bake()
+        bpy.ops.beyond_mocap.accept()
     load("beyond_mocap.files.bvh").write(out / "player.bvh", takes[0].motion)
     others = dict(zip([player.name for player in settings.players][1:], reports[1:]))
     load("beyond_mocap.files.tables").write_report(out / "report.json", {**reports[0], "others": others})

@@ -22,12 +22,12 @@ HOW_TO = """Beyond Mocap: quickstart
 In the 3D view press N and choose the tab "Beyond Mocap", then press from top to bottom:
 
   1  Build Library    reads the clips in the folder "library"
-  3  Synthesize       finds clips for both players' tracks and words
-  4  Bake             puts them onto armatures, with the ball
+  3  Synthesize       finds clips for both players' tracks and words, and shows what came of them
+  4  Accept           keeps it (Discard puts it away)
 
 Press Space to play.
 The words of the first player are in the text "player1 words" (Text Editor): change them and
-press Synthesize and Bake again.
+press Synthesize and Accept again.
 """
 
 

@@ -8,6 +8,7 @@
 - `preferences` what the user sets once for all files
 - `tracks`, `plans`   the settings as tracks and plans of the core
 - `bake`        a take becomes all of that
+- `result`, `preview`, `set_aside`, `blocks`   a take is shown, kept or put away again; as one action or as NLA strips
 - `background`  long work in a thread
 
 The classes are registered in the order of CLASSES: what others point to comes first.
@@ -15,9 +16,9 @@ The classes are registered in the order of CLASSES: what others point to comes f
 
 import bpy
 
-from . import background, session, settings
+from . import background, result, session, settings
 
-CLASSES = (settings.BeyondMocapPlayer, settings.BeyondMocapSettings, settings.BeyondMocapWork)
+CLASSES = (*result.CLASSES, settings.BeyondMocapPlayer, settings.BeyondMocapSettings, settings.BeyondMocapWork)
 
 
 def register():

@@ -18,12 +18,13 @@ from .measure import frames_per_second, whole_frames
 
 
 def write(
-    body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None, name: str | None = None
+    body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
+    name: str | None = None, generated: bool = False,
 ) -> bpy.types.Action:
     """Play `motion` on the armature `body`: a new action `name` with a key on every whole scene frame.
 
     start: scene frame (may be fractional) at which the motion's first frame is played; the scene's first if None. The
-    armature needs a bone for every joint. Returns the action.
+    armature needs a bone for every joint. generated: as for `channels.animate`. Returns the action.
     """
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:
@@ -43,7 +44,7 @@ def write(
     for joint, bone in enumerate(motion.skeleton.names):
         body.pose.bones[bone].rotation_mode = "QUATERNION"
         curves[_path(bone, "rotation_quaternion")] = (bone, pose[:, joint])
-    return channels.animate(body, name or f"{body.name} motion", frames, curves)
+    return channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
 
 
 def read(

@@ -14,7 +14,7 @@ from .settings import BeyondMocapPlayer, BeyondMocapSettings
 
 COLLECTION = "Beyond Mocap"
 BALL = "Ball"
-MARK = "beyond_mocap_take"  # on actions that a bake made and the next one may replace
+MARK = "beyond_mocap_take"  # on what was made for a take and may be replaced or taken away by the next one
 
 
 def frame_at(scene: bpy.types.Scene, seconds: float) -> float:
@@ -28,17 +28,18 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
     take, scene, settings = made.take, context.scene, context.scene.beyond_mocap
     room = collection(scene)
     target = order.body
-    if target is None or not _fits(target, take, scene):
+    if target is None or not fits(target, take, scene):
         target = armature.create(context, take.motion.skeleton, order.name, room)
+        target[MARK] = True
         order.body = target
     if settings.make_bodies and not any(child.type == "MESH" for child in target.children):
-        body.create(target, order.name, tuple(order.shirt), room, scene, take.motion)
+        body.create(target, order.name, tuple(order.shirt), room, scene, take.motion)[MARK] = True
     channels.discard(target, MARK)
     start = frame_at(scene, take.start_time)
-    action.write(target, take.motion, scene, start, f"{order.name} take")[MARK] = True
+    action.write(target, take.motion, scene, start, f"{order.name} take", generated=True)[MARK] = True
     if settings.make_paths:
         ground = sample(made.plan.track, made.plan.fps).positions
-        curve.write(context, f"{order.name} track", ground, tuple(order.shirt), room)
+        curve.write(context, track_name(order), ground, tuple(order.shirt), room)
     _lengthen(scene, start + take.motion.duration * frames_per_second(scene))
     return target
 
@@ -80,7 +81,12 @@ def ball_of(takes: list[Take], settings: BeyondMocapSettings) -> BallPath | None
     return next((take.ball for take in takes if take.ball is not None), None) if settings.make_ball else None
 
 
-def _fits(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) -> bool:
+def track_name(order: BeyondMocapPlayer) -> str:
+    """The name of the ribbon that shows a player's track."""
+    return f"{order.name} track"
+
+
+def fits(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) -> bool:
     """Whether the object is an armature in this scene with the take's bones."""
     if target.type != "ARMATURE" or target.name not in scene.objects or not target.data.bones:
         return False

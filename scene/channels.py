@@ -10,13 +10,24 @@ import bpy
 import numpy as np
 
 LINEAR = 1  # Keyframe.interpolation as foreach_set takes it
+GENERATED = 5  # Keyframe.type likewise: drawn dim in the editors
+
+PLACES = ("co", "handle_left", "handle_right")
+FIGURES = {  # what else a key has, and how foreach_get gives it
+    "interpolation": np.int32, "easing": np.int32, "type": np.int32, "handle_left_type": np.int32,
+    "handle_right_type": np.int32, "amplitude": np.float32, "back": np.float32, "period": np.float32,
+}
 
 
-def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]]):
+def animate(
+    target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
+    generated: bool = False,
+):
     """Give `target` a new action `name` and return it.
 
-    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n)). The action
-    that was there before is kept in the file.
+    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n)). generated:
+    whether the keys are to be told from hand-made ones by their type. The action that was there before is kept in the
+    file.
     """
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type=target.id_type, name=target.name)
@@ -31,6 +42,8 @@ def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: d
             points.add(len(frames))
             points.foreach_set("co", keys.ravel())
             points.foreach_set("interpolation", linear)
+            if generated:
+                points.foreach_set("type", np.full(len(frames), GENERATED, np.int32))
             curve.update()
     assign(target, action, slot)
     return action
@@ -74,6 +87,84 @@ def curves(action: bpy.types.Action, slot) -> dict[tuple[str, int], bpy.types.FC
             bag = strip.channelbag(slot)
             found.update({(c.data_path, c.array_index): c for c in (bag.fcurves if bag else ())})
     return found
+
+
+def keys_of(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:
+    """All that the n keys of a curve have: PLACES (n, 2), FIGURES (n,)."""
+    points, count = curve.keyframe_points, len(curve.keyframe_points)
+    found = {}
+    for name in PLACES:
+        values = np.empty(2 * count, np.float32)
+        points.foreach_get(name, values)
+        found[name] = values.reshape(-1, 2)
+    for name, kind in FIGURES.items():
+        found[name] = np.empty(count, kind)
+        points.foreach_get(name, found[name])
+    return found
+
+
+def put_keys(curve: bpy.types.FCurve, keys: dict[str, np.ndarray]) -> None:
+    """Let a curve without keys have those of `keys_of`, whose frames rise."""
+    points = curve.keyframe_points
+    points.add(len(keys["co"]))
+    for name in ("handle_left_type", "handle_right_type", *PLACES, *(n for n in FIGURES if not n.startswith("handle"))):
+        points.foreach_set(name, np.ascontiguousarray(keys[name]).ravel())
+
+
+def chosen(keys: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
+    """Those keys of a table that an index or mask picks."""
+    return {name: values[which] for name, values in keys.items()}
+
+
+def built(name: str, slot_name: str, tables: dict, like: dict):
+    """A new action `name` with one slot, and that slot.
+
+    tables: (data path, array index) -> keys as of `keys_of`. like: (data path, array index) -> a curve whose group,
+    extrapolation, lock and mute are taken over.
+    """
+    action = bpy.data.actions.new(name)
+    slot = action.slots.new(id_type="OBJECT", name=slot_name)
+    bag = _channelbag(action, slot)
+    for (path, index), keys in tables.items():
+        model = like[path, index]
+        curve = _new_curve(bag, path, index, model.group.name if model.group is not None else "")
+        put_keys(curve, keys)
+        curve.extrapolation, curve.lock, curve.mute = model.extrapolation, model.lock, model.mute
+    return action, slot
+
+
+def cut(whole: bpy.types.Action, slot, start: float, end: float, name: str):
+    """A new action with the keys between two frames, and two more on either side, so that its curves run between them
+    as the whole's do; and its slot."""
+    models, tables = curves(whole, slot), {}
+    for place, curve in models.items():
+        keys = keys_of(curve)
+        frames = keys["co"][:, 0]
+        if len(frames):
+            low = max(0, int(np.searchsorted(frames, start - 1e-3)) - 2)
+            high = int(np.searchsorted(frames, end + 1e-3)) + 2
+            tables[place] = chosen(keys, slice(low, high))
+    return built(name, slot.name_display, tables, models)
+
+
+def joined(parts: list, name: str, slot_name: str):
+    """A new action that plays (action, slot, start frame, end frame) one after the other, and its slot; on a frame that
+    two share the later one's key counts."""
+    tables, models = {}, {}
+    for action, slot, start, end in parts:
+        for place, curve in curves(action, slot).items():
+            keys = keys_of(curve)
+            inside = (keys["co"][:, 0] > start - 1e-3) & (keys["co"][:, 0] < end + 1e-3)
+            before = tables.get(place)
+            if before is not None:
+                before = chosen(before, before["co"][:, 0] < start - 1e-3)
+            tables[place] = _appended(before, chosen(keys, inside))
+            models.setdefault(place, curve)
+    return built(name, slot_name, tables, models)
+
+
+def _appended(before: dict | None, after: dict) -> dict:
+    return after if before is None else {name: np.concatenate([before[name], after[name]]) for name in after}
 
 
 def keyed_range(found: dict) -> tuple[int, int] | None:

@@ -30,7 +30,7 @@ def write(context: bpy.types.Context, name: str, points: np.ndarray, rgb, collec
         collection.objects.link(ribbon)
     else:
         old, ribbon.data = ribbon.data, data
-        if not old.users:
+        if not old.users:  # a preview may have set it aside
             bpy.data.curves.remove(old)
             data.name = name
     ribbon.hide_select = True

@@ -11,6 +11,7 @@ def colour(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -
     if found is not None:
         return found
     material = bpy.data.materials.new(name)
+    material["beyond_mocap_take"] = True  # ours: may go when nothing wears it any more
     if material.node_tree is None:  # Blender before 5.0 makes it on request
         material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")

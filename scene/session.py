@@ -26,10 +26,11 @@ _takes: dict[str, "Made"] = {}
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """What was asked and what came of it."""
+    """What was asked, what came of it, and how good it is: the report, where one was made."""
 
     plan: "Plan"
     take: "Take"
+    report: dict | None = None
 
 
 def keep_library(library: "Library", unit: float | None) -> None:
@@ -42,10 +43,10 @@ def library(folder: str, unit: float | None) -> "Library | None":
     return _libraries.get((str(Path(folder).resolve()), unit))
 
 
-def keep_take(plan: "Plan", take: "Take") -> str:
-    """Keep a take with its plan; returns its name."""
+def keep_take(plan: "Plan", take: "Take", report: dict | None = None) -> str:
+    """Keep a take with its plan and its report; returns its name."""
     name = f"take-{next(_numbers)}"
-    _keep(_takes, name, Made(plan, take), KEPT_TAKES)
+    _keep(_takes, name, Made(plan, take, report), KEPT_TAKES)
     return name
 
 

@@ -12,10 +12,18 @@ from bpy.props import (
     StringProperty,
 )
 
+from .result import BeyondMocapResult, BeyondMocapShared
+
 METHODS = (
     ("path", "On the path", "The player's body is laid on the track, with the sway of the clips kept"),
     ("distance", "Distance", "Travelled distance matched by adding or leaving out steps, then by warping time"),
     ("blocks", "Blocks", "Smoothest sequence of clips for the words; the track is not followed"),
+)
+
+
+FORMS = (
+    ("ACTION", "Action", "One action on the body"),
+    ("STRIPS", "Strips", "NLA strips on the body, one for each piece of a clip, named by clip and words"),
 )
 
 
@@ -27,7 +35,7 @@ def is_armature(_settings, candidate: bpy.types.Object) -> bool:
 class BeyondMocapPlayer(bpy.types.PropertyGroup):
     """One player: the dots, the words, and the body that came of them."""
 
-    use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Bake")
+    use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
     tracking_file: StringProperty(
         name="Tracking", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="The file with this player's positions",
@@ -54,7 +62,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     body: PointerProperty(
         name="Body", type=bpy.types.Object, poll=is_armature,
-        description="The armature that this player's takes are baked onto; made by the first Bake",
+        description="The armature that this player's takes are shown on; made where it is missing",
     )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
@@ -64,6 +72,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     warnings: StringProperty(
         name="Warnings", options={"HIDDEN"}, description="Lines about what to look at in the newest take"
     )
+    result: PointerProperty(type=BeyondMocapResult, description="What became of the newest take")
 
 
 class BeyondMocapSettings(bpy.types.PropertyGroup):
@@ -149,9 +158,11 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Clock at Start", default=0.0, unit="TIME_ABSOLUTE", precision=2,
         description="Seconds on the tracking file's clock at the start frame",
     )
-    make_bodies: BoolProperty(name="Bodies", default=True, description="Bake makes a low-poly body for each player")
-    make_ball: BoolProperty(name="Ball", default=True, description="Bake makes the ball, where the tracking has one")
-    make_paths: BoolProperty(name="Paths", default=True, description="Bake draws each player's track on the ground")
+    make_bodies: BoolProperty(name="Bodies", default=True, description="Make a low-poly body for each player")
+    make_ball: BoolProperty(name="Ball", default=True, description="Make the ball, where the tracking has one")
+    make_paths: BoolProperty(name="Paths", default=True, description="Draw each player's track on the ground")
+    accept_as: EnumProperty(name="Accept As", items=FORMS, default="ACTION", description="What an accepted take becomes")
+    shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):

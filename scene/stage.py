@@ -47,22 +47,27 @@ def remove(scene: bpy.types.Scene) -> None:
     bpy.data.collections.remove(stage)
 
 
+def focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The empty that the stage's camera hangs on; None where there is no such camera."""
+    stage = scene.collection.children.get(NAME)
+    return stage.objects.get(FOCUS) if stage else None
+
+
 def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:
     """Let the stage's camera follow and stand back as far as it takes; nothing happens where there is no such camera.
 
     frames: (F,) scene frames. places: (F, 2) metres, the middle of what is to be seen. reach: (F,) metres from there to
     the farthest player. The camera hangs on an empty, whose size is its distance.
     """
-    stage = scene.collection.children.get(NAME)
-    focus = stage.objects.get(FOCUS) if stage else None
-    if focus is None:
+    target = focus(scene)
+    if target is None:
         return
-    path = np.column_stack([places * units_per_metre(scene), np.full(len(frames), focus.location.z)])
+    path = np.column_stack([places * units_per_metre(scene), np.full(len(frames), target.location.z)])
     distance = np.maximum(1.0, reach / (HALF_WIDTH * np.linalg.norm(CAMERA_FROM)))
     group = "Object Transforms"
     curves = {"location": (group, path), "scale": (group, np.repeat(distance[:, None], 3, axis=1))}
-    channels.discard(focus, MARK)
-    channels.animate(focus, FOCUS, frames, curves)[MARK] = True
+    channels.discard(target, MARK)
+    channels.animate(target, FOCUS, frames, curves)[MARK] = True
 
 
 def _ground(stage, units: float) -> None:

@@ -1,4 +1,4 @@
-"""The road from tracking to baked players: operators give what the functions give, undo works, trouble is told."""
+"""The road from tracking to moving players: operators give what the functions give, undo works, trouble is told."""
 
 import importlib
 import os
@@ -131,8 +131,8 @@ def test_the_whole_road(extension, ready, core, session):
         assert np.array_equal(made.take.motion.root_positions, again.motion.root_positions)
         assert "Feet slide" in player.quality
     synthesized = state()
-    assert press(bpy.ops.beyond_mocap.bake) == {"FINISHED"}
-    baked = state()
+    assert press(bpy.ops.beyond_mocap.accept) == {"FINISHED"}
+    accepted = state()
     rooms = {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("action", "bake")}
     resample = core("motion.motion").resample
     for player in bpy.context.scene.beyond_mocap.players:
@@ -152,7 +152,7 @@ def test_the_whole_road(extension, ready, core, session):
     assert bpy.context.scene.beyond_mocap.library_holds == ""
     for _ in range(3):
         bpy.ops.ed.redo()
-    assert state() == baked
+    assert state() == accepted
 
 
 def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, core, session):
@@ -197,31 +197,31 @@ def test_in_a_hurry_players_that_are_not_begun_stay_as_they_are(extension, ready
     result = work(0.2)
     assert (len(result.made), result.asked) == (1, 2)
     Verb().apply(bpy.context.scene, result)
-    assert said == [({"WARNING"}, "ended early, 1 left as before; players synthesized: 1; press Bake to see them")]
+    assert said == [({"WARNING"}, "ended early, 1 left as before; players synthesized: 1; Accept keeps them")]
     assert "cut short" in "".join(result.made[0][2].warnings)
     assert len(work(2.0).made) == 2
     with pytest.raises(core("errors").Cancelled):
         work(0.0)
 
 
-def test_baking_again_replaces_the_take_only(extension, ready, session):
+def test_accepting_again_replaces_the_take_only(extension, ready, session):
     bpy.ops.beyond_mocap.synthesize()
-    bpy.ops.beyond_mocap.bake()
+    bpy.ops.beyond_mocap.accept()
     once = state()
     ready.seed = 1
     bpy.ops.beyond_mocap.synthesize()
-    bpy.ops.beyond_mocap.bake()
+    bpy.ops.beyond_mocap.accept()
     assert {kind: state()[kind] for kind in ("objects", "actions", "meshes", "curves", "armatures")} == {
         kind: once[kind] for kind in ("objects", "actions", "meshes", "curves", "armatures")}
     bpy.data.objects.remove(ready.players[0].body)
-    bpy.ops.beyond_mocap.bake()
+    bpy.ops.beyond_mocap.accept()
     assert ready.players[0].body is not None
 
 
 def test_the_ball_lies_where_the_file_says_and_rolls(extension, ready, session):
     bpy.context.scene.render.fps = 10
     bpy.ops.beyond_mocap.synthesize()
-    bpy.ops.beyond_mocap.bake()
+    bpy.ops.beyond_mocap.accept()
     ball = bpy.data.objects["Ball"]
     bpy.context.scene.frame_set(1 + 50)
     at, angle = 3.0 * 5.0, -0.08 * 5.0
@@ -235,7 +235,7 @@ def test_the_ball_lies_where_the_file_says_and_rolls(extension, ready, session):
 def test_another_unit_scale(ready, session):
     bpy.context.scene.unit_settings.scale_length = 0.01
     bpy.ops.beyond_mocap.synthesize()
-    bpy.ops.beyond_mocap.bake()
+    bpy.ops.beyond_mocap.accept()
     bpy.context.scene.frame_set(1 + 24 * 6)
     body = ready.players[0].body
     hips = body.matrix_world @ body.pose.bones[0].matrix
@@ -246,7 +246,7 @@ def test_another_unit_scale(ready, session):
 @pytest.mark.parametrize("operator, message", [
     ("build_library", "Choose the library's folder first"),
     ("synthesize", "Choose the library's folder"),
-    ("bake", "Synthesize first"),
+    ("accept", "Synthesize first"),
     ("import_tracking", "no file given"),
 ])
 def test_nothing_filled_in(operator, message):
@@ -296,7 +296,9 @@ def test_words_that_the_library_lacks(ready, match):
 def test_a_take_of_another_session(ready, session):
     bpy.ops.beyond_mocap.synthesize()
     session.clear()
-    refused(bpy.ops.beyond_mocap.bake, "synthesize again")
+    for player in ready.players:
+        bpy.data.objects.remove(player.body)
+    refused(bpy.ops.beyond_mocap.accept, "synthesize again")
 
 
 def test_a_library_that_cannot_be_written(ready, library_folder, tmp_path):

@@ -23,7 +23,7 @@ def test_three_buttons(tmp_path):
         assert player.annotation_text.as_string().strip() == on_disk.strip(), "run sample_blend/make_quickstart.py again"
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
-    assert bpy.ops.beyond_mocap.bake() == {"FINISHED"}
+    assert bpy.ops.beyond_mocap.accept() == {"FINISHED"}
     bodies = [player.body for player in settings.players]
     before = [body.pose.bones[0].matrix.translation.copy() for body in bodies]
     bpy.context.scene.frame_set(300)

@@ -145,7 +145,7 @@ def check_the_quickstart():
     mark = len(output.text())
     bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
     yield 1.5
-    steps = ["build_library", "synthesize", "bake"]
+    steps = ["build_library", "synthesize", "accept"]
     pressed = yield from press_all(steps, then=wait_for_work)
     assert [operator_of(call) for call in pressed] == steps, pressed
     moving = [body.name for body in bpy.data.objects if body.type == "ARMATURE" and moves(body)]

@@ -1,0 +1,183 @@
+"""Preview, Accept, Discard: what was there comes back to the last bit, and strips play what the action plays."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+from undo import assert_one_step, press, state
+
+from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
+
+
+def look(player):
+    """Everything about a body that a preview may touch, as plain values."""
+    body = player.body
+    if body is None:
+        return None
+    data = body.animation_data
+    bones = [(b.name, b.rotation_mode, *b.location, *b.rotation_quaternion, *b.rotation_euler, *b.scale)
+             for b in body.pose.bones]
+    if data is None:
+        return body.name, bones, None
+    slot = data.action_slot.identifier if data.action_slot else ""
+    strips = [(t.name, s.name, s.frame_start, s.frame_end, s.action.name) for t in data.nla_tracks for s in t.strips]
+    action = data.action.name if data.action else ""
+    return body.name, bones, (action, slot, data.use_nla, data.action_influence, data.action_blend_type, strips)
+
+
+def poses(body, frames):
+    """Bone matrices (frames, bones, 4, 4) as Blender plays them."""
+    found = []
+    for frame in frames:
+        bpy.context.scene.frame_set(int(frame), subframe=float(frame % 1))
+        found.append([np.array(bone.matrix) for bone in body.pose.bones])
+    return np.array(found)
+
+
+@pytest.fixture
+def one(ready, session):  # noqa: F811
+    """One player, the other not ticked."""
+    bpy.context.scene.render.fps = 30
+    ready.players[1].use = False
+    return ready.players[0]
+
+
+def kinds():
+    return {kind: state()[kind] for kind in ("objects", "armatures", "actions", "meshes", "curves", "materials")}
+
+
+def test_a_preview_of_a_new_player_leaves_nothing_when_discarded(one):
+    before, end = kinds(), bpy.context.scene.frame_end
+    bpy.context.scene.frame_end = end = 40
+    bpy.ops.beyond_mocap.synthesize()
+    assert one.result.state == "PREVIEW" and one.body is not None and bpy.context.scene.frame_end > 40
+    assert bpy.ops.beyond_mocap.discard() == {"FINISHED"}
+    assert one.result.state == "NONE" and one.body is None and one.take == "" and one.quality == ""
+    assert kinds() == before and bpy.context.scene.frame_end == end
+    refused(bpy.ops.beyond_mocap.discard, "No preview is shown")
+
+
+def test_discard_brings_back_what_the_armature_played(one):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept()
+    body, scene = one.body, bpy.context.scene
+    data = body.animation_data
+    mine = bpy.data.actions.new("mine")
+    data.action = mine
+    data.action_slot = mine.slots.new("OBJECT", "another name")
+    body.pose.bones[3].rotation_mode = "XYZ"
+    body.pose.bones[3].rotation_euler = (0.1, 0.2, 0.3)
+    body.pose.bones[3].keyframe_insert("rotation_euler", frame=3)
+    track = data.nla_tracks.new()
+    track.strips.new("layer", 1, mine)
+    data.action_influence, data.action_blend_type = 0.5, "COMBINE"
+    scene.frame_set(10)
+    moved = poses(body, [5, 50.5])
+    before, files, ball = look(one), kinds(), bpy.data.objects["Ball"].animation_data.action
+    bpy.ops.beyond_mocap.synthesize()
+    assert look(one) != before
+    bpy.ops.beyond_mocap.synthesize()  # a preview over a preview
+    assert bpy.ops.beyond_mocap.discard() == {"FINISHED"}
+    assert kinds() == files and one.result.state == "ACCEPTED"
+    assert bpy.data.objects["Ball"].animation_data.action == ball
+    np.testing.assert_array_equal(poses(body, [5, 50.5]), moved)
+    assert look(one) == before
+
+
+def test_strips_play_what_the_action_plays(one, session):  # noqa: F811
+    bpy.ops.beyond_mocap.synthesize()
+    assert_one_step(bpy.ops.beyond_mocap.accept, form="ACTION")
+    one = bpy.context.scene.beyond_mocap.players[0]
+    body, take = one.body, session.made(one.take).take
+    frames = np.arange(1, 360, 3.37)
+    whole = poses(body, frames)
+    actions = len(bpy.data.actions)
+    assert press(bpy.ops.beyond_mocap.accept, form="STRIPS") == {"FINISHED"}
+    strips = body.animation_data.nla_tracks["Beyond Mocap"].strips
+    assert body.animation_data.action is None and 3 < len(strips) <= len(take.seams) + 1
+    assert len(bpy.data.actions) == actions - 1 + len(strips)
+    assert any("kick" in strip.name for strip in strips)
+    np.testing.assert_allclose(poses(body, frames), whole, atol=1e-5)
+    assert bpy.ops.beyond_mocap.accept(form="ACTION") == {"FINISHED"}
+    assert not body.animation_data.nla_tracks and len(bpy.data.actions) == actions
+    np.testing.assert_allclose(poses(body, frames), whole, atol=1e-6)
+
+
+def test_a_preview_over_strips_and_back(one):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept(form="STRIPS")
+    played = poses(one.body, [33.3, 200])
+    before, files = look(one), kinds()
+    bpy.ops.beyond_mocap.synthesize()
+    assert_one_step(bpy.ops.beyond_mocap.discard)
+    one = bpy.context.scene.beyond_mocap.players[0]
+    assert kinds() == files
+    np.testing.assert_array_equal(poses(one.body, [33.3, 200]), played)
+    assert look(one) == before
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept(form="STRIPS")
+    assert {k: len(v) for k, v in kinds().items()} == {k: len(v) for k, v in files.items()}
+
+
+def test_the_user_s_own_layers_stay(one):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept(form="STRIPS")
+    layer = one.body.animation_data.nla_tracks.new()
+    layer.name = "mine"
+    layer.strips.new("nod", 1, bpy.data.actions.new("nod"))
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept(form="STRIPS")
+    assert [track.name for track in one.body.animation_data.nla_tracks] == ["Beyond Mocap", "mine"]
+    assert one.body.animation_data.use_nla
+
+
+def test_a_body_of_the_user_s_own_with_other_bones_comes_back(one):
+    data = bpy.data.armatures.new("Own")
+    own = bpy.data.objects.new("Own", data)
+    bpy.context.scene.collection.objects.link(own)
+    one.body = own
+    files = kinds()
+    bpy.ops.beyond_mocap.synthesize()
+    assert one.body != own
+    bpy.ops.beyond_mocap.discard()
+    assert one.body == own and kinds() == files
+
+
+def test_two_players_share_the_ball(ready, session):  # noqa: F811
+    bpy.ops.beyond_mocap.synthesize()
+    first, second = ready.players
+    bpy.ops.beyond_mocap.discard(player=first.name)
+    assert second.result.state == "PREVIEW" and first.result.state == "NONE"
+    bpy.ops.beyond_mocap.accept(player=second.name)
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept()
+    assert "Ball" in bpy.data.objects
+    with pytest.raises(RuntimeError, match="nobody"):
+        bpy.ops.beyond_mocap.accept(player="nobody")
+
+
+def test_a_linked_body_is_refused(one, tmp_path):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept()
+    bpy.data.libraries.write(str(tmp_path / "body.blend"), {one.body})
+    with bpy.data.libraries.load(str(tmp_path / "body.blend"), link=True) as (source, target):
+        target.objects = source.objects[:]
+    linked = next(thing for thing in target.objects if thing.type == "ARMATURE")
+    one.body = linked
+    refused(bpy.ops.beyond_mocap.synthesize, "linked from another file")
+
+
+def test_the_report_is_kept_with_the_take(extension, one, session):  # noqa: F811
+    bpy.ops.beyond_mocap.synthesize()
+    assert session.made(one.take).report["root_error_m"]["mean"] < 0.2
+
+
+def test_the_body_deleted_under_a_preview(one):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.data.objects.remove(one.body)
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    assert one.body is not None and one.result.state == "PREVIEW"
+    bpy.data.objects.remove(one.body)
+    assert bpy.ops.beyond_mocap.discard() == {"FINISHED"}
+    assert one.result.state == "NONE" and one.body is None
