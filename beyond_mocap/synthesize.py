@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .annotation import spoken
+from .annotation import avoided_per_frame, spoken
 from .errors import InputError
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
@@ -25,6 +25,7 @@ from .lay_out import as_far, chained, faced, footed, leaning, met, on_track, smo
 from .library.chosen import with_chosen_gaits
 from .library.library import Library
 from .motion.motion import Motion
+from .motion.runs import runs
 from .motion.track import SampledTrack, sample
 from .plan import METHODS, Plan
 from .polish.foot_plant import Planted
@@ -39,6 +40,9 @@ from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, wanted
 from .take import BallPath, KeyResult, Take
+
+NEAR_KEY = 1.5
+"""Seconds around a key moment in which its own words may be shown, whoever avoids them."""
 
 Progress = Callable[[float, str], None]
 
@@ -205,6 +209,7 @@ def with_warnings(take: Take, recordings: Library, order: Wanted, hurried: int |
     told = [*recordings.notes, *order.warnings, *_crowded_out(order, take.edit)]
     if hurried is not None:
         told.append(f"{take.start_time + hurried / recordings.fps:.1f} s: from here on the search was cut short")
+    told += _shown_all_the_same(take)
     return replace(take, warnings=(*told, *_gave_way(recordings, take.plan, take)))
 
 
@@ -217,6 +222,24 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
         for number, key in enumerate(order.keys)
         if key.choices and number not in placed
     ]
+
+
+def _shown_all_the_same(take: Take) -> list[str]:
+    """One warning per stretch and word that must not be, where no way without it was found; what key moments close by
+    ask for is not told."""
+    times = take.start_time + np.arange(len(take.words)) / take.motion.fps
+    avoided = avoided_per_frame(take.plan.timeline, times)
+    asked = [(key.asked.time, frozenset(key.asked.words)) for key in take.keys]
+    told = []
+    for word in sorted(frozenset().union(*avoided)):
+        shows = np.array([word in avoid and word in words for avoid, words in zip(avoided, take.words)])
+        for time, words in asked:
+            shows &= (word not in words) | (np.abs(times - time) > NEAR_KEY)
+        told += [
+            f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it must not be; "
+            "no way without it was found" for first, end in runs(shows)
+        ]
+    return told
 
 
 def key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:

@@ -19,7 +19,19 @@
 from .clips import ClipAnnotation, clip_annotations, read_annotation_csv, read_clip_annotations
 from .gaits import LOCOMOTION, LOCOMOTION_WORDS, STANDING_SPEED, automatic_gaits, gait_thresholds, recorded_thresholds
 from .text import format_timeline, parse_timeline, read_text, read_timeline
-from .timeline import KeyMoment, Span, Timeline, fill, missing_keys, problems, validate, words_per_frame
+from .timeline import (
+    MUST_NOT,
+    KeyMoment,
+    Span,
+    Timeline,
+    avoided_per_frame,
+    fill,
+    missing_keys,
+    problems,
+    spelled,
+    validate,
+    words_per_frame,
+)
 from .vocabulary import (
     CONTINUOUS,
     DISCRETE,
@@ -39,6 +51,7 @@ __all__ = [
     "DISCRETE",
     "LOCOMOTION",
     "LOCOMOTION_WORDS",
+    "MUST_NOT",
     "STANDING_SPEED",
     "TRANSITION",
     "VOCABULARY",
@@ -47,6 +60,7 @@ __all__ = [
     "Span",
     "Timeline",
     "automatic_gaits",
+    "avoided_per_frame",
     "clip_annotations",
     "fill",
     "format_timeline",
@@ -62,6 +76,7 @@ __all__ = [
     "read_timeline",
     "relatives",
     "similar_words",
+    "spelled",
     "spoken",
     "swap_sides",
     "validate",

@@ -1,5 +1,7 @@
 """The text form of timelines (Faustino §4.2.2): `START END words...` or `TIME words...`, read and written.
 
+A word behind `-` is one that must not be: `3.2 6.0 running -dribble` asks for running without the ball at the feet.
+
 `#` starts a comment. Times are seconds; a number that ends in `f`, or every number after a line `unit frames`, counts
 frames from the track's first time. Faustino leaves words out where a transition is wanted; here a line without words
 means automatic locomotion (his line 1), and the word `transition` alone says transition.
@@ -11,7 +13,7 @@ import os
 from pathlib import Path
 
 from ..errors import InputError
-from .timeline import LONGEST_TIME, NUMBER, KeyMoment, Span, Timeline
+from .timeline import LONGEST_TIME, MUST_NOT, NUMBER, KeyMoment, Span, Timeline, spelled
 
 _FORM = "'START END words...' or 'TIME words...'"
 _LARGEST_FILE = 16 * 1024 * 1024
@@ -48,8 +50,8 @@ def parse_timeline(text: str, where: str = "annotations", fps: float | None = No
 
 def format_timeline(timeline: Timeline) -> str:
     """The text that `parse_timeline` reads back to an equal timeline: one line each in time order, seconds."""
-    lines = [(span.start, f"{_spell(span.start)} {_spell(span.end)}", span.words) for span in timeline.spans]
-    lines += [(key.time, _spell(key.time), key.words) for key in timeline.keys]
+    lines = [(span.start, f"{_spell(span.start)} {_spell(span.end)}", spelled(span)) for span in timeline.spans]
+    lines += [(key.time, _spell(key.time), spelled(key)) for key in timeline.keys]
     lines.sort(key=lambda line: line[0])
     return "".join(" ".join((times, *words)) + "\n" for _, times, words in lines)
 
@@ -108,15 +110,18 @@ def _span(times: list[float], words: list[str], number: int, place: str) -> Span
 
 
 def _key(time: float, words: list[str], number: int, place: str) -> KeyMoment:
-    if not words:
+    if all(word.startswith(MUST_NOT) for word in words):
         raise InputError(place, "one time and no words", _FORM, "give a second time, or say what happens")
     return _placed(KeyMoment, place, time, words, number)
 
 
 def _placed(kind, place: str, *values):
-    """A span or key moment; what its words lack is told with the line it stands on."""
+    """A span or key moment of times, words and line; what its words lack is told with the line it stands on."""
+    *times, words, line = values
+    asked = [word for word in words if not word.startswith(MUST_NOT)]
+    avoid = [word.removeprefix(MUST_NOT) for word in words if word.startswith(MUST_NOT)]
     try:
-        return kind(*values)
+        return kind(*times, asked, line, avoid)
     except InputError as error:
         raise InputError(place, str(error), _FORM) from None
 

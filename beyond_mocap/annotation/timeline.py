@@ -24,11 +24,16 @@ LONGEST_TIME = 1e11
 _SAME_TIME = 1e-6
 
 
+MUST_NOT = "-"
+"""Before a word in the text form: what is shown must not carry it."""
+
+
 def _checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
     out = tuple(dict.fromkeys(str(word).lower() for word in words))
     for word in out:
-        if not word or "#" in word or word.split() != [word] or NUMBER.fullmatch(word):
-            raise InputError(where, f"{word!r} as a word", "a word without blanks and '#' that is not a number")
+        if not word or "#" in word or word.startswith(MUST_NOT) or word.split() != [word] or NUMBER.fullmatch(word):
+            expected = f"a word without blanks and '#' that is not a number and does not begin with '{MUST_NOT}'"
+            raise InputError(where, f"{word!r} as a word", expected)
     return out
 
 
@@ -42,30 +47,36 @@ def _checked_time(value: float, where: str) -> float:
 @dataclass(frozen=True)
 class Span:
     """A stretch: start .. end in seconds on the track's clock; no words means automatic locomotion, TRANSITION alone
-    leaves it to continuity. Words are lower case, each once. line: where it was read, for messages only."""
+    leaves it to continuity. avoid: words that nothing shown there may carry. Words are lower case, each once. line:
+    where it was read, for messages only."""
 
     start: float
     end: float
     words: tuple[str, ...] = ()
     line: int | None = field(default=None, compare=False, repr=False)
+    avoid: tuple[str, ...] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "start", _checked_time(self.start, "span"))
         object.__setattr__(self, "end", _checked_time(self.end, "span"))
         object.__setattr__(self, "words", _checked_words(self.words, "span"))
+        object.__setattr__(self, "avoid", _checked_words(self.avoid, "span"))
 
 
 @dataclass(frozen=True)
 class KeyMoment:
-    """A moment, seconds on the track's clock, at which the clip's own key moment must be played (Faustino §4.2.2)."""
+    """A moment, seconds on the track's clock, at which the clip's own key moment must be played (Faustino §4.2.2).
+    avoid: words that the clip's key moment may not carry."""
 
     time: float
     words: tuple[str, ...]
     line: int | None = field(default=None, compare=False, repr=False)
+    avoid: tuple[str, ...] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "time", _checked_time(self.time, "key moment"))
         object.__setattr__(self, "words", _checked_words(self.words, "key moment"))
+        object.__setattr__(self, "avoid", _checked_words(self.avoid, "key moment"))
 
 
 @dataclass(frozen=True)
@@ -90,12 +101,31 @@ def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str
     out: list[frozenset[str] | None] = [frozenset()] * len(times)
     for span in timeline.spans:
         if span.words:
-            first, last = np.searchsorted(times, [span.start - _SAME_TIME, span.end - _SAME_TIME])
-            if len(times) and abs(times[-1] - span.end) <= _SAME_TIME:
-                last = len(times)
+            held = _held(span, times)
             words = None if span.words == (TRANSITION,) else frozenset(span.words)
-            out[first:last] = [words] * (last - first)
+            out[held] = [words] * (held.stop - held.start)
     return out
+
+
+def avoided_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str]]:
+    """Per time of `times` (T,) seconds: the words that nothing shown then may carry. Spans without words of their own may
+    lie over others; what a span asks for counts more than that another one avoids it."""
+    times = np.asarray(times, dtype=float)
+    out: list[frozenset[str]] = [frozenset()] * len(times)
+    for span in timeline.spans:
+        for frame in range(*_held(span, times).indices(len(times))) if span.avoid else ():
+            out[frame] |= frozenset(span.avoid)
+    if any(out):
+        out = [avoid - (asked or frozenset()) for avoid, asked in zip(out, words_per_frame(timeline, times))]
+    return out
+
+
+def _held(span: Span, times: np.ndarray) -> slice:
+    """The frames in which a span holds: see `words_per_frame`."""
+    first, last = np.searchsorted(times, [span.start - _SAME_TIME, span.end - _SAME_TIME])
+    if len(times) and abs(times[-1] - span.end) <= _SAME_TIME:
+        last = len(times)
+    return slice(int(first), int(last))
 
 
 def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> Timeline:
@@ -186,19 +216,25 @@ def _first_time(item: Span | KeyMoment) -> float:
 
 
 def _word_problems(item: Span | KeyMoment, known: frozenset[str], place: str) -> list[InputError]:
-    if TRANSITION in item.words:
+    if TRANSITION in (*item.words, *item.avoid):
         return _transition_problems(item, place)
-    out = [_unknown_word(word, item, known, place) for word in item.words if word not in known]
+    out = [_unknown_word(word, item, known, place) for word in (*item.words, *item.avoid) if word not in known]
+    out += [_both_ways(word, place) for word in item.words if word in item.avoid]
     if isinstance(item, KeyMoment) and not item.words:
         out.append(InputError(place, "a key moment without words", "TIME words...", "say what happens there"))
     return out
 
 
 def _transition_problems(item: Span | KeyMoment, place: str) -> list[InputError]:
-    if isinstance(item, Span) and item.words == (TRANSITION,):
+    if isinstance(item, Span) and item.words == (TRANSITION,) and TRANSITION not in item.avoid:
         return []
-    found = f"{TRANSITION!r} in {' '.join(item.words)!r}"
+    found = f"{TRANSITION!r} in {' '.join(spelled(item))!r}"
     return [InputError(place, found, f"'START END {TRANSITION}'", "write it alone, on a line with two times")]
+
+
+def _both_ways(word: str, place: str) -> InputError:
+    found = f"{word!r} is asked for and avoided"
+    return InputError(place, found, f"'{word}' or '{MUST_NOT}{word}'", "take one of them away")
 
 
 def _unknown_word(word: str, item: Span | KeyMoment, known: frozenset[str], place: str) -> InputError:
@@ -251,4 +287,10 @@ def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
 
 def _named(item: Span | KeyMoment) -> str:
     times = f"{item.start:g} {item.end:g}" if isinstance(item, Span) else f"{item.time:g}"
-    return f"'{times} {' '.join(item.words)}'" + ("" if item.line is None else f" (line {item.line})")
+    return f"'{' '.join((times, *spelled(item)))}'" + ("" if item.line is None else f" (line {item.line})")
+
+
+def spelled(item: Span | KeyMoment) -> tuple[str, ...]:
+    """The words of a span or key moment as its line in the text form has them: those it asks for, then those that must
+    not be, each behind MUST_NOT."""
+    return (*item.words, *(MUST_NOT + word for word in item.avoid))

@@ -42,6 +42,10 @@ class AnnotationCost:
         # both - only one = both - (either - both)
         return np.where(either > 0, -(2.0 * common - either) / np.maximum(either, 1.0), 0.0)
 
+    def showing(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) bool: frames that carry any of the words."""
+        return np.diff(self._shared(words)) > 0
+
     def missing_share(self, words: frozenset[str]) -> np.ndarray:
         """(N,) share of the asked words that each frame lacks."""
         shared = np.diff(self._shared(words))

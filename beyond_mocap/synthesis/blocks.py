@@ -32,6 +32,8 @@ from .transition_cost import distances, typical_distance, windows
 from .wanted import Wanted, needed, pool_frame
 
 MOST_CANDIDATES = 600
+AVOIDED = 1000.0
+"""What a block costs that shows a word which it must not: more than a whole track of anything else."""
 FINEST = BLOCK_LENGTHS[-1]
 
 
@@ -153,10 +155,12 @@ class BlockSearch:
         it."""
         count = len(clusters.medoid)
         cost = self.annotation.of_blocks(clusters.start, self.asked_words(slot, clusters.length))
+        blocks, _ = self._key_blocks(slot, clusters.length)
+        fine = usable & ~self._shows_avoided(clusters.start, slot, clusters.length)
+        usable = fine if fine.any() and not len(blocks) else usable
         members = np.bincount(clusters.label[usable], minlength=count)
         total = np.bincount(clusters.label[usable], cost[usable], minlength=count)
         out = np.where(members > 0, self.alpha * total / np.maximum(members, 1), np.inf)
-        blocks, _ = self._key_blocks(slot, clusters.length)
         labels = {clusters.label_at(start) for start in blocks.start} - {-1}
         if labels:
             out[[label for label in range(count) if label not in labels]] = np.inf
@@ -193,7 +197,8 @@ class BlockSearch:
                 blocks, which = self._thinned(slot, length, candidates), []
             slots.append(blocks)
             keys.append(which)
-            unary.append(self.alpha * self.annotation.of_blocks(blocks.start, self.asked_words(slot, length)))
+            cost = self.alpha * self.annotation.of_blocks(blocks.start, self.asked_words(slot, length))
+            unary.append(cost + AVOIDED * self._shows_avoided(blocks.start, slot, length))
         ends, starts = zip(*(self._ends(blocks, length) for blocks in slots))
         weight = (1.0 - self.alpha) / (self.scale * np.sqrt(length // 2))
         choice, _ = cheapest_path(unary, lambda slot: weight * distances(ends[slot], starts[slot + 1]))
@@ -205,9 +210,20 @@ class BlockSearch:
         """At most MOST_CANDIDATES blocks, those with the best words first, plus the ones beside key moments."""
         if len(offered) > MOST_CANDIDATES:
             cost = self.annotation.of_blocks(offered.start, self.asked_words(slot, length))
+            cost += AVOIDED * self._shows_avoided(offered.start, slot, length)
             offered = offered.at(np.sort(np.argsort(cost, kind="stable")[:MOST_CANDIDATES]))
         beside = self._beside_keys(slot, length)
         return Candidates(np.append(offered.clip, beside.clip), np.append(offered.start, beside.start))
+
+    def _shows_avoided(self, start: np.ndarray, slot: int, length: int) -> np.ndarray:
+        """(M,) bool: whether a block that starts at frame `start` (M,) and fills a slot shows a word that it must
+        not."""
+        avoid = self.wanted.avoided_in(slot * length, (slot + 1) * length)
+        if not avoid:
+            return np.zeros(len(start), bool)
+        shown = np.append(0, np.cumsum(self.annotation.showing(avoid)))
+        low, high = np.clip(start, 0, len(self.frames)), np.clip(start + length, 0, len(self.frames))
+        return shown[high] > shown[low]
 
     def _ends(self, blocks: Candidates, length: int) -> tuple[np.ndarray, np.ndarray]:
         """Windows around the frame after each block's last and around its first (eq. 17)."""

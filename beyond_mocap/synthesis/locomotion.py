@@ -106,6 +106,10 @@ def _locomotion_blocks(search: BlockSearch, section: Section) -> Candidates:
     inside = (start - frames.first[frames.clip[start]]) % 4 == 0
     fits = inside & search.wanted.allowed[frames.clip[start]] & ~keyed[start]
     fits &= frames.words[start][:, columns].any(axis=1) & frames.words[start + FINEST - 1][:, columns].any(axis=1)
+    if avoid := search.wanted.avoided_in(section.first * FINEST, section.end * FINEST):
+        shown = np.append(0, np.cumsum(search.annotation.showing(avoid)))
+        free = fits & (shown[start + FINEST] == shown[start])
+        fits = free if free.any() else fits
     start = start[fits]
     if len(start) > MOST_BLOCKS:
         start = _evenly(start, frames.clip[start])

@@ -19,6 +19,7 @@ REACH = 8
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)
 _USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0
+_SHOWN = 14  # library frames that a long slot shows at the fastest rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,8 @@ class Offer:
         self.stands = library.feet_standing
         self.wild_before, self.wild_after = wildness(library)
         self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
-        self._sorted: dict[frozenset[str], Traits] = {}
+        self._sorted: dict[tuple[frozenset[str], frozenset[str]], tuple[Traits, np.ndarray]] = {}
+        self._showing: dict[frozenset[str], np.ndarray] = {}
 
     def traits(self, number: np.ndarray, frame: np.ndarray, words: frozenset[str]) -> Traits:
         """Of the pairs of RATES[number (K,)] and frame (K,), where `words` are asked (none: all will do)."""
@@ -85,14 +87,30 @@ class Offer:
         own = (values[frame] for values in (self.long_stance, self.offset, self.made, missing, unasked))
         return Traits(number, frame, self.speed[number, frame], self.turn[number, frame], *own)
 
-    def near_in_speed(self, speed: float, count: int, words: frozenset[str]) -> Traits:
-        """Of the `count` pairs nearest to a speed in m/s. The others' misfit in speed alone would put them behind, and
-        a large library is searched as fast as a small one."""
-        if words not in self._sorted:
-            self._sorted[words] = self.traits(*np.divmod(self.by_speed, len(self.frames)), words)
-        middle = int(np.searchsorted(self.speeds, speed))
-        low = int(np.clip(middle - count // 2, 0, max(0, len(self.by_speed) - count)))
-        return self._sorted[words].part(low, low + count)
+    def near_in_speed(
+        self, speed: float, count: int, words: frozenset[str], avoid: frozenset[str] = frozenset()
+    ) -> Traits:
+        """Of the `count` pairs nearest to a speed in m/s, none that shows a word of `avoid` unless all do. The others'
+        misfit in speed alone would put them behind, and a large library is searched as fast as a small one."""
+        if (words, avoid) not in self._sorted:
+            pairs, speeds = self._without(avoid)
+            self._sorted[words, avoid] = self.traits(*np.divmod(pairs, len(self.frames)), words), speeds
+        traits, speeds = self._sorted[words, avoid]
+        middle = int(np.searchsorted(speeds, speed))
+        low = int(np.clip(middle - count // 2, 0, max(0, len(speeds) - count)))
+        return traits.part(low, low + count)
+
+    def _without(self, avoid: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Of the valid pairs (K,) and their speeds (K,) those that show no word of `avoid`; all where all do."""
+        fine = ~self.showing(avoid)[self.by_speed % len(self.frames)]
+        return (self.by_speed[fine], self.speeds[fine]) if avoid and fine.any() else (self.by_speed, self.speeds)
+
+    def showing(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) bool: a slot from there on shows one of the words."""
+        if words not in self._showing:
+            carried = self.annotation.showing(words)
+            self._showing[words] = maximum_filter1d(carried, _SHOWN, origin=-(_SHOWN // 2), mode="nearest")
+        return self._showing[words]
 
     def _words(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
         """(N,) share of the words that each frame lacks; (N,) bool: a slot from there on shows an action

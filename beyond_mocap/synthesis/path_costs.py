@@ -47,6 +47,12 @@ class Weights:
     held: float = 0.1
 
 
+_NEAR_KEY = 45  # frames around a key moment in which its own words may be shown
+
+AVOIDED = 1000.0
+"""What a slot costs that shows a word which it must not: more than a whole track of anything else."""
+
+
 class PathCosts:
     """The costs of one order on one library of N frames."""
 
@@ -70,13 +76,18 @@ class PathCosts:
         """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end;
         inf where the clip ends before or may not be used."""
         cost = self._misfit(first, end, self.offer.traits(number, frame, self._words(first, end)))
+        if avoid := self.wanted.avoided_in(first, end):
+            cost += AVOIDED * self.offer.showing(avoid)[frame]
         return np.where(self.offer.valid[number, frame], cost, np.inf)
 
     def cheapest(self, first: int, end: int, looked_at: int, count: int):
         """The `count` pairs of rate and library frame that cost least of the `looked_at` nearest in speed: number (K,),
         frame (K,), misfit (K,)."""
-        near = self.offer.near_in_speed(self.asked(first, end)[0], looked_at, self._words(first, end))
+        avoid = self.wanted.avoided_in(first, end)
+        near = self.offer.near_in_speed(self.asked(first, end)[0], looked_at, self._words(first, end), avoid)
         cost = self._misfit(first, end, near)
+        if avoid:
+            cost += AVOIDED * self.offer.showing(avoid)[near.frame]
         best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
         return near.number[best], near.frame[best], cost[best]
 
@@ -94,7 +105,7 @@ class PathCosts:
 
     def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held
-        at their ends. Words do not count here. A kick that was recorded slower than the player runs is played faster,
+        at their ends. Words do not count here but for those that must not be. A kick that was recorded slower than the player runs is played faster,
         within the limits of what may give way (../shared/metrics.md)."""
         low, high = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         length = end - first
@@ -108,7 +119,16 @@ class PathCosts:
         off = np.abs(rate - 1.0)
         cost += self.weights.rate * off + self.weights.stretch * np.maximum(off - 0.15, 0.0) + self.weights.held * held
         cost += self.weights.made_key * self.offer.made[self.inside(start)]
-        return cost * (length / SLOT)
+        cost *= length / SLOT
+        return cost + AVOIDED * self._avoided_between(first, end, a, b) if self.wanted.avoided else cost
+
+    def _avoided_between(self, first: int, end: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """(K,) bool: whether library frames a .. b (K,) show a word that the output's first .. end must not, but for
+        those that a key moment close by asks for."""
+        avoid = self.wanted.avoided_in(first, end)
+        near = (key.asked.words for key in self.wanted.keys if first - _NEAR_KEY <= key.frame < end + _NEAR_KEY)
+        shown = np.append(0, np.cumsum(self.offer.annotation.showing(avoid.difference(*near))))
+        return shown[self.inside(b) + 1] > shown[self.inside(a)]
 
     def _motion_misfit(self, first: int, end: int, speed, turn, offset, long_stance) -> np.ndarray:
         wanted_speed, wanted_turn = self.asked(first, end)

@@ -1,6 +1,6 @@
 """What an edit touches: where the new order differs from the old one, and what of it has to be searched anew.
 
-Touched is what is asked otherwise: other words, another speed (by more than 5 cm/s), turning (by more than 0.05 rad
+Touched is what is asked otherwise: other words, also such that must not be, another speed (by more than 5 cm/s), turning (by more than 0.05 rad
 over a slot) or facing (by more than 0.3 rad), and key moments that moved, changed their words, came, went, or whose
 ball has moved (by more than 15 cm), with the entry and exit of their clips. Around it a run-up of a second is searched
 too, so that the new motion finds into the old one; key moments that stay are gone round where they do not lie within.
@@ -39,6 +39,9 @@ def asked_otherwise(before: Wanted, after: Wanted, slot: int) -> np.ndarray:
     """(T,) bool: frames of which other words, another speed or another turning over `slot` frames is asked."""
     old, new = before.track, after.track
     words = np.array([a != b for a, b in zip(before.asked, after.asked)])
+    if before.avoided != after.avoided:
+        none = [frozenset()] * len(after)
+        words |= [a != b for a, b in zip(before.avoided or none, after.avoided or none)]
     moving = np.minimum(1.0, new.speed)
     turn = np.abs(quaternion.wrapped(_turn(new.direction, slot) - _turn(old.direction, slot))) * moving
     facing = np.abs(quaternion.wrapped(wanted_offset(new) - wanted_offset(old))) * moving

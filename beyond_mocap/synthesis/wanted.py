@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import (
-    TRANSITION, KeyMoment, Timeline, automatic_gaits, fill, gait_thresholds, spoken, words_per_frame,
+    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill, gait_thresholds, spoken,
+    words_per_frame,
 )
 from ..errors import NotInLibrary
 from ..library.automatic import automatic_words
@@ -38,7 +39,7 @@ class WantedKey:
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
-    gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use.
+    avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use.
     warnings: what the library lacks of what is asked."""
 
     track: SampledTrack
@@ -48,9 +49,14 @@ class Wanted:
     keys: tuple[WantedKey, ...]
     allowed: np.ndarray
     warnings: tuple[str, ...]
+    avoided: tuple[frozenset[str], ...] = ()
 
     def __len__(self) -> int:
         return len(self.track.times)
+
+    def avoided_in(self, first: int, end: int) -> frozenset[str]:
+        """All words that are avoided in any of the frames first .. end."""
+        return frozenset().union(*self.avoided[max(first, 0) : end])
 
 
 def wanted(library: Library, plan: Plan) -> Wanted:
@@ -62,7 +68,11 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     labelled = plan.method == "path" and not plan.omega
     thresholds = library.gait_thresholds if labelled else gait_thresholds(speeds, plan.omega or PAPERS_OMEGA)
     gait = automatic_gaits(track.speed, library.fps, speeds, thresholds)
-    timeline = fill(plan.timeline, track.times, automatic_words(library, gait, track))
+    avoided = avoided_per_frame(plan.timeline, track.times)
+    gait = _other_gaits(library, gait, track.speed, avoided)
+    automatic = automatic_words(library, gait, track)
+    automatic = [tuple(word for word in words if word not in avoid) for words, avoid in zip(automatic, avoided)]
+    timeline = fill(plan.timeline, track.times, automatic)
     allowed = np.array([plan.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
     keys = tuple(_key(library, moment, track, gait, allowed, plan.nearest, warnings) for moment in timeline.keys)
@@ -71,13 +81,27 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     keys = tuple(replace(key, ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
     asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
     warnings += _lacking(library, plan.timeline)
-    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings))
+    avoided = tuple(avoided) if any(avoided) else ()
+    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided)
+
+
+def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:
+    """The gaits (T,) with the one nearest to the `speed` (T,) m/s in place of one whose word is avoided, where there is
+    one; near by ratio, since who walks may rather jog than stand."""
+    out = gait.copy()
+    for frame in [frame for frame, avoid in enumerate(avoided) if library.gaits[gait[frame]].word in avoid]:
+        others = [n for n, other in enumerate(library.gaits) if other.word not in avoided[frame]]
+        away = [abs(np.log((library.gaits[n].speed + STANDING_SPEED) / (speed[frame] + STANDING_SPEED))) for n in others]
+        out[frame] = others[int(np.argmin(away))] if others else gait[frame]
+    return out
 
 
 def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:
     frame = float(np.clip((moment.time - track.times[0]) * library.fps, 0, len(track.times) - 1))
     usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made)
     made = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
+    if moment.avoid:
+        usable, made = _without(moment, usable, made, warnings)
     choices = serving(usable, moment.words)
     if choices:
         return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), None)
@@ -93,6 +117,17 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     used = spoken(choices[0].words) if choices else gait_words
     warnings.append(f"{text}; used instead: {' '.join(used) if choices else 'locomotion goes on there'}")
     return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), used)
+
+
+def _without(moment: KeyMoment, usable: tuple[Key, ...], made: tuple[Key, ...], warnings: list[str]):
+    """Of recorded and made keys those that carry none of the words which the moment avoids; all of them, and a warning,
+    where no recorded one would be left that carries its words."""
+    kept = tuple(tuple(key for key in keys if not key.words.intersection(moment.avoid)) for keys in (usable, made))
+    if serving(usable, moment.words) and not serving(kept[0], moment.words):
+        avoided = " ".join(MUST_NOT + word for word in moment.avoid)
+        warnings.append(f"{moment.time:g} s: no clip for '{' '.join(moment.words)}' is {avoided}: one is shown all the same")
+        return usable, made
+    return kept
 
 
 def _listed(offered: tuple[str, ...]) -> str:

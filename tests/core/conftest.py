@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import KeyMoment, Span, Timeline
+from beyond_mocap.annotation import Timeline, parse_timeline
 from beyond_mocap.files import bvh
 from beyond_mocap.library.library import Library, build
 from beyond_mocap.motion import quaternion
@@ -145,11 +145,9 @@ def track_of():
 
 @pytest.fixture(scope="session")
 def timeline_of():
-    """timeline_of((start, end, words) or (time, words), ...) -> Timeline, words as text."""
+    """timeline_of((start, end, words) or (time, words), ...) -> Timeline, words as in the text form."""
 
     def make(*lines) -> Timeline:
-        spans = [Span(line[0], line[1], tuple(line[2].split())) for line in lines if len(line) == 3]
-        keys = [KeyMoment(line[0], tuple(line[1].split())) for line in lines if len(line) == 2]
-        return Timeline(tuple(spans), tuple(keys))
+        return parse_timeline("".join(" ".join(map(str, line)) + "\n" for line in lines))
 
     return make

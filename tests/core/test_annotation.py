@@ -16,6 +16,7 @@ from beyond_mocap.annotation import (
     Span,
     Timeline,
     automatic_gaits,
+    avoided_per_frame,
     fill,
     format_timeline,
     gait_thresholds,
@@ -114,8 +115,8 @@ def test_an_empty_file_means_all_automatic():
 words = st.lists(st.from_regex(r"[a-z_]{1,8}", fullmatch=True).filter(lambda w: w != "unit"), max_size=4).map(tuple)
 seconds = st.floats(-1e10, 1e10)
 stretches = st.tuples(seconds, seconds).map(sorted).filter(lambda pair: pair[0] < pair[1])
-spans = st.builds(lambda pair, w: Span(*pair, w), stretches, words)
-keys = st.builds(KeyMoment, seconds, words.filter(bool))
+spans = st.builds(lambda pair, w, avoid: Span(*pair, w, avoid=avoid), stretches, words, words)
+keys = st.builds(KeyMoment, seconds, words.filter(bool), avoid=words)
 
 
 @settings(deadline=None)
@@ -135,7 +136,7 @@ def test_any_text_is_read_or_refused_in_one_line(text):
         assert parse_timeline(format_timeline(timeline)) == timeline
 
 
-TOKENS = "0 1 2.5 9f -3 1e400 nan inf kick walking transition unit frames # x".split()
+TOKENS = "0 1 2.5 9f -3 1e400 nan inf kick walking -walking -kick - transition -transition unit frames # x".split()
 
 
 @settings(deadline=None)
@@ -165,6 +166,12 @@ def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
         ("2 kick\n2 jump", "a.txt:2", "at one time"),
         ("2 transition", "a.txt:1", "write it alone"),
         ("2 3 transition kick", "a.txt:1", "write it alone"),
+        ("2 3 -transition", "a.txt:1", "'-transition'"),
+        ("2 3 walking -walkin", "a.txt:1", "like walking"),
+        ("0 3 walking -walking", "a.txt:1", "'walking' is asked for and avoided"),
+        ("5 -kick", "a.txt:1", "one time and no words"),
+        ("2 3 walking -", "a.txt:1", "'' as a word"),
+        ("2 3 walking --kick", "a.txt:1", "'-kick' as a word"),
     ],
 )
 def test_every_mistake_gets_its_line_and_a_way_out(text, where, part):
@@ -211,6 +218,14 @@ def test_words_that_the_text_form_cannot_carry_are_refused():
             Span(0, 1, (word,))
 
 
+def test_words_that_must_not_be_stand_behind_a_dash():
+    timeline = parse_timeline("0 20 -Dribble\n3.2 6 running -sprinting\n4 kick -left")
+    assert timeline.spans == (Span(0, 20, avoid=("dribble",)), Span(3.2, 6, ("running",), avoid=("sprinting",)))
+    assert timeline.keys == (KeyMoment(4, ("kick",), avoid=("left",)),)
+    assert problems(timeline, start=0.0, end=20.0) == []
+    assert format_timeline(timeline) == "0 20 -dribble\n3.2 6 running -sprinting\n4 kick -left\n"
+
+
 # --- frames
 
 
@@ -222,6 +237,14 @@ def test_words_hold_from_start_up_to_end():
         *[frozenset({"right", "dribble"})] * 2,
         *[frozenset()] * 3,
     ]
+
+
+def test_words_are_avoided_from_start_up_to_end_but_for_those_that_are_asked():
+    timeline = parse_timeline("0 4 -dribble -kick\n1 2 dribble\n2 3 walking -back")
+    assert avoided_per_frame(timeline, np.arange(5.0)) == [
+        {"dribble", "kick"}, {"kick"}, {"dribble", "kick", "back"}, {"dribble", "kick"}, {"dribble", "kick"},
+    ]
+    assert avoided_per_frame(parse_timeline("0 4 walking"), np.arange(5.0)) == [frozenset()] * 5
 
 
 def test_automatic_gaits_fill_what_is_left_open():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation import Span
 from beyond_mocap.errors import Cancelled
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
@@ -213,3 +214,12 @@ def test_a_cancelled_edit_is_no_take(library, take):
     plan = replace(take.plan, track=moved(take.plan.track, 10.0, (0.8, 0.0)))
     with pytest.raises(Cancelled):
         resynthesize(library, plan, take, cancelled=lambda: True)
+
+
+def test_a_word_that_must_not_be_is_made_anew_where_it_must_not(library, take):
+    walk = Span(8.0, 10.0, avoid=("jogging",))
+    timeline = replace(take.plan.timeline, spans=(*take.plan.timeline.spans, walk))
+    after = resynthesize(library, replace(take.plan, timeline=timeline), take)
+    assert "jogging" in take.words[270]
+    assert not any("jogging" in words for words in after.words[240:300])
+    assert not changed(take, after)[: 240 - 60].any()

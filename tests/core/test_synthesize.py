@@ -409,3 +409,19 @@ def test_in_a_hurry_a_whole_take_comes_out_and_says_from_when_on(take_of):
 def test_in_a_hurry_before_anything_is_found_there_is_no_take(take_of, method):
     with pytest.raises(Cancelled):
         take_of((6.0, "kick right"), method=method, hurry=lambda: True)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_words_that_must_not_be_are_not_shown(take_of, track_of, method):
+    plain, without = (take_of(*lines, track=track_of(2.8), method=method) for lines in ((), ((2, 6, "-jogging"),)))
+    assert "jogging" in plain.words[120]
+    assert not any("jogging" in words for words in without.words[60:180])
+    assert not any("must not" in line for line in without.warnings)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_every_clip_carries_is_shown_all_the_same_and_told(take_of, clip_file, tmp_path, method):
+    clip_file(tmp_path / "walk.bvh", seconds=6.0)
+    take = take_of((2, 5, "-walking"), library=build(tmp_path), method=method)
+    assert_whole(take, 241)
+    assert "2.0 s: 'walking' is shown for 3.0 s though it must not be; no way without it was found" in take.warnings

@@ -24,6 +24,20 @@ def test_words_of_spans_are_asked_where_they_stand(order):
     assert found.asked[75] == {"walking", "left"} and found.asked[30] == {"walking"} == found.asked[150]
 
 
+def test_an_avoided_gait_gives_its_place_to_the_one_nearest_in_speed(order, track_of):
+    found = order((2, 4, "-walking"))
+    assert found.asked[75] == {"jogging"} and found.asked[30] == {"walking"} == found.asked[150]
+    assert found.avoided_in(0, 59) == frozenset() and found.avoided_in(50, 61) == {"walking"}
+    assert order((2, 4, "walking")).avoided == ()
+
+
+def test_a_key_moment_takes_no_clip_with_a_word_that_must_not_be(order, library):
+    found = order((4.0, "kick -left"))
+    assert [library.clips[key.clip].mirrored for key in found.keys[0].choices] == [False] and not found.warnings
+    only = order((4.0, "kick left -inside"))
+    assert only.keys[0].choices and "no clip for 'kick left' is -inside" in only.warnings[0]
+
+
 def test_a_transition_asks_for_nothing(order):
     found = order((2, 4, "transition"))
     assert found.asked[75] is None and found.asked[30] is not None
