@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..beyond_mocap.errors import InputError
-from ..scene import preferences, session
+from ..scene import clips, preferences, session, watch
 from ..scene.settings import absolute
 from .verb import BackgroundVerb
 
@@ -52,21 +52,31 @@ The result is kept in a cache, so that the next time takes a moment"""
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
         folder = absolute(settings.library_folder)
-        return Order(folder, settings.library_unit or None, self.rebuild, preferences.for_build(folder))
+        unit = settings.library_unit or None
+        return Order(settings.library_folder, folder, unit, self.rebuild, preferences.for_build(folder))
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Build it."""
+        """Build it, and list its clips; where it cannot be built they are listed all the same, to be given words."""
         from ..beyond_mocap.library.library import build
+        from ..beyond_mocap.library.listing import listed, scanned
 
+        files = watch.look(order.folder) or {}
         asked = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
-        return build(order.folder, **asked, progress=progress, cancelled=cancelled)
+        try:
+            built = build(order.folder, **asked, progress=progress, cancelled=cancelled)
+        except InputError as error:
+            return Built(order.setting, None, error, scanned(order.folder, asked["cache_dir"]), files)
+        return Built(order.setting, built, None, listed(built), files)
 
     def apply(self, scene, built):
         """Keep it, and say what it holds."""
-        session.keep_library(built, scene.beyond_mocap.library_unit or None)
-        scene.beyond_mocap.library_holds = summary(built)
-        for note in built.notes:
+        clips.keep(bpy.context.window_manager, built.setting, built.listing, built.files)
+        if built.trouble is not None:
+            raise built.trouble
+        session.keep_library(built.library, scene.beyond_mocap.library_unit or None)
+        scene.beyond_mocap.library_holds = summary(built.library)
+        for note in built.library.notes:
             self.report({"INFO"}, note)
         self.report({"INFO"}, scene.beyond_mocap.library_holds.splitlines()[0])
 

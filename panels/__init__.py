@@ -8,6 +8,7 @@ import bpy
 from . import library, menus, players, preferences, result, synthesis
 
 CLASSES = (
+    library.BEYOND_MOCAP_UL_clips,
     library.BEYOND_MOCAP_PT_library,
     players.BEYOND_MOCAP_UL_players,
     players.BEYOND_MOCAP_PT_players,

@@ -4,35 +4,95 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import Step, table
+from .tab import Step, paragraph, table
+
+MARKS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
+
+
+class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
+    """The clips of the library that fit what is looked for: quality, name, words, length, and a button that imports."""
+
+    def draw_item(self, _context, layout, _data, clip, _icon, _active_data, _active_property):
+        """One clip."""
+        row = layout.row(align=True)
+        names = row.split(factor=0.5, align=True)
+        names.label(text=clip.name, icon=MARKS[clip.mark])
+        names.label(text=clip.words or "no words")
+        row.operator("beyond_mocap.import_clip", text="", icon="IMPORT", emboss=False).path = clip.path
+
+    def draw_filter(self, _context, _layout):
+        """Filter and order stand above the list, and work there for any number of clips."""
 
 
 class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
-    """The library's folder, what it holds, and single clips."""
+    """The library's folder, what it holds, its clips, and tools."""
 
     bl_label = "1  Library"
     bl_order = 1
 
     def draw(self, context):
-        """Folder, button, what was found."""
+        """Folder, button, what was found, the clips."""
         layout, settings = self.layout, context.scene.beyond_mocap
+        listing = context.window_manager.beyond_mocap_clips
         layout.prop(settings, "library_folder", text="")
+        if listing.missing:
+            box = layout.box()
+            paragraph(box, "This folder is not there.", "ERROR")
+            box.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.build_library", icon="ASSET_MANAGER")
         self.progress(context, "library")
+        current = listing.folder == settings.library_folder
+        if current and listing.news:
+            box = layout.box()
+            paragraph(box, f"{listing.news}. Building reads the whole folder anew.", "INFO")
+            box.operator("beyond_mocap.build_library", text="Build Anew", icon="FILE_REFRESH")
         first, *held = settings.library_holds.splitlines() or ("",)
         if held:
             header, body = layout.panel("beyond_mocap_library_holds", default_closed=True)
             header.label(text=first)
             if body:
                 table(body, held)
-        header, body = layout.panel("beyond_mocap_library_more", default_closed=True)
-        header.label(text="Clips")
+        header, body = layout.panel("beyond_mocap_library_clips", default_closed=True)
+        header.label(text=f"Clips ({listing.total})" if current and listing.total else "Clips")
         if body:
-            body.use_property_split, body.use_property_decorate = True, False
-            body.prop(settings, "library_unit")
-            body.operator("beyond_mocap.build_library", text="Build from Scratch", icon="FILE_REFRESH").rebuild = True
-            body.operator("beyond_mocap.import_clips", icon="IMPORT")
-            body.operator("beyond_mocap.mirror", icon="MOD_MIRROR")
-            body.operator("beyond_mocap.export_bvh", icon="EXPORT")
+            draw_clips(body, settings, listing, current)
+        header, body = layout.panel("beyond_mocap_library_more", default_closed=True)
+        header.label(text="Tools")
+        if body:
+            draw_tools(body, settings)
+
+
+def draw_clips(layout, settings, listing, current) -> None:
+    """The list and what it says of the chosen clip."""
+    if not current or not listing.total:
+        layout.operator("beyond_mocap.list_clips", icon="PRESET")
+        return
+    row = layout.row(align=True)
+    row.prop(listing, "find", text="", icon="VIEWZOOM")
+    row.prop(listing, "order", text="", icon="SORTALPHA", icon_only=True)
+    row.operator("beyond_mocap.list_clips", text="", icon="FILE_REFRESH")
+    layout.template_list("BEYOND_MOCAP_UL_clips", "", listing, "shown", listing, "active", rows=6)
+    if not 0 <= listing.active < len(listing.shown):
+        layout.label(text="No clip fits", icon="INFO")
+        return
+    clip = listing.shown[listing.active]
+    column = layout.column(align=True)
+    paragraph(column, clip.path, "FILE")
+    paragraph(column, clip.words.replace("_", " ") or "no words: the library does not use it", "BOOKMARKS")
+    paragraph(column, clip.figures, "TIME")
+    table(column, clip.told.splitlines())
+    layout.operator("beyond_mocap.import_clip", icon="IMPORT").path = clip.path
+
+
+def draw_tools(body, settings) -> None:
+    """What is seldom needed."""
+    body.use_property_split, body.use_property_decorate = True, False
+    body.prop(settings, "library_unit")
+    body.prop(settings, "library_watch")
+    body.operator("beyond_mocap.build_library", text="Build from Scratch", icon="FILE_REFRESH").rebuild = True
+    body.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
+    body.operator("beyond_mocap.import_clips", icon="IMPORT")
+    body.operator("beyond_mocap.mirror", icon="MOD_MIRROR")
+    body.operator("beyond_mocap.export_bvh", icon="EXPORT")

@@ -10,15 +10,22 @@
 - `bake`        a take becomes all of that
 - `result`, `preview`, `set_aside`, `blocks`   a take is shown, kept or put away again; as one action or as NLA strips
 - `background`  long work in a thread
+- `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
 The classes are registered in the order of CLASSES: what others point to comes first.
 """
 
 import bpy
 
-from . import background, result, session, settings
+from . import background, clips, result, session, settings, watch
 
-CLASSES = (*result.CLASSES, settings.BeyondMocapPlayer, settings.BeyondMocapSettings, settings.BeyondMocapWork)
+CLASSES = (
+    *result.CLASSES,
+    settings.BeyondMocapPlayer,
+    settings.BeyondMocapSettings,
+    settings.BeyondMocapWork,
+    *clips.CLASSES,
+)
 
 
 def register():
@@ -27,12 +34,16 @@ def register():
         bpy.utils.register_class(cls)
     bpy.types.Scene.beyond_mocap = bpy.props.PointerProperty(type=settings.BeyondMocapSettings)
     bpy.types.WindowManager.beyond_mocap_work = bpy.props.PointerProperty(type=settings.BeyondMocapWork)
+    bpy.types.WindowManager.beyond_mocap_clips = bpy.props.PointerProperty(type=clips.BeyondMocapClips)
+    watch.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
     background.stop()
+    watch.unregister()
     session.clear()
+    del bpy.types.WindowManager.beyond_mocap_clips
     del bpy.types.WindowManager.beyond_mocap_work
     del bpy.types.Scene.beyond_mocap
     for cls in reversed(CLASSES):

@@ -86,6 +86,11 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Metres per unit", default=0.0, min=0.0, precision=5,
         description="Size of one unit of the clips in metres; 0 guesses it from the height of the hips",
     )
+    library_watch: BoolProperty(
+        name="Watch Folder", default=False,
+        description="Look every few seconds whether clips or words in the folder are new or changed, and say so; "
+        "nothing is built by itself",
+    )
     library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
     players: CollectionProperty(type=BeyondMocapPlayer)
     active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")

@@ -22,10 +22,11 @@ from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .clusters import Clusters
 from .features import Frames
+from .repair import Mended
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 22
+VERSION = 23
 _FRAME_ARRAYS = (
     "clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean",
     "basis", "words",
@@ -104,7 +105,7 @@ def _header(key: str, library) -> dict:
         "clips": [
             [
                 clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
-                clip.recorded,
+                clip.recorded, asdict(clip.mended) if clip.mended else None,
             ]
             for clip in library.clips
         ],
@@ -130,11 +131,12 @@ def _restore(header: dict, arrays: dict):
         header["names"], header["parents"], arrays["offsets"], header["end_parents"], arrays["end_offsets"]
     )
     clips, start = [], 0
-    for path, mirrored, fps, count, rows, recorded in header["clips"]:
+    for path, mirrored, fps, count, rows, recorded, mended in header["clips"]:
         part = slice(start, start + count)
         motion = Motion(skeleton, arrays["root"][part], arrays["rotations"][part], fps)
         rows = tuple(ClipAnnotation(row["start"], row["end"], row["key"], tuple(row["words"])) for row in rows)
-        clips.append(Clip(path, mirrored, motion, rows, arrays["standing"][part], recorded))
+        mended = mended and Mended(**mended)
+        clips.append(Clip(path, mirrored, motion, rows, arrays["standing"][part], recorded, mended))
         start += count
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}

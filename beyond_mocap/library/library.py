@@ -28,7 +28,7 @@ from .features import Frames, describe, joined
 from .keys import Key, keys_of
 from .landings import LANDING_FOLDER
 from .made import MADE_FOLDER, gaps, kick_speed, locomotion, made_clips
-from .scan import CACHE_FOLDER, Annotations, find_clips
+from .scan import CACHE_FOLDER, Annotations, readable_clips
 
 FPS = 30.0
 Progress = Callable[[float, str], None]
@@ -41,7 +41,8 @@ class Clip:
     path: below the library's folder, with slashes. motion: at its own rate, metres, the floor (2nd percentile of its
     toe heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
     standing: (T, 2, 2) bool, left and right foot, whether heel and toe stand on the ground. recorded: number of frames
-    that are recorded, where landing and getting up were made behind them (`library.landings`); None: all.
+    that are recorded, where landing and getting up were made behind them (`library.landings`); None: all. mended: what
+    the repair found and left; None of made clips.
     """
 
     path: str
@@ -50,6 +51,7 @@ class Clip:
     annotations: tuple[ClipAnnotation, ...]
     standing: np.ndarray
     recorded: int | None = None
+    mended: repair.Mended | None = None
 
     @property
     def made(self) -> bool:
@@ -65,7 +67,9 @@ class Clip:
         """The file that shows `frame` (the clip's own rate), as a path below the library: the recording, or behind its
         end the file of the same frames that was made."""
         made = self.recorded is not None and frame > self.recorded - 1
-        return LANDING_FOLDER + self.path if made else self.path
+        if not made:
+            return self.path
+        return LANDING_FOLDER + self.path + ("" if self.path.lower().endswith(".bvh") else ".bvh")
 
     @property
     def contacts(self) -> np.ndarray:
@@ -79,7 +83,8 @@ class Clip:
     def twin(self) -> "Clip":
         """The same clip with left and right exchanged (Faustino §3.1.2), words too."""
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
-        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, self.standing[:, ::-1], self.recorded)
+        standing = self.standing[:, ::-1]
+        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, standing, self.recorded, self.mended)
 
 
 @dataclass(frozen=True)
@@ -214,19 +219,20 @@ def build(
     """
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
-    paths = find_clips(folder)
+    place, where = cache.place(folder, cache_dir)
+    paths, conversions, waiting = readable_clips(folder, place)
+    files = [conversions.readable(path) for path in paths]
     annotations = Annotations(folder, paths)
     chosen = Path(skeleton) if skeleton else None
-    key = cache.fingerprint(folder, paths, annotations.sources(paths), chosen, unit=unit, seed=seed)
-    place, where = cache.place(folder, cache_dir)
+    key = cache.fingerprint(folder, files, annotations.sources(paths), chosen, unit=unit, seed=seed)
     if not rebuild:
         report(0.0, "Reading the cache")
         found = cache.load(place, key)
         if found is not None:
             _keep_made(place, _completed(found.clips), missing_only=True)
-            return replace(found, folder=str(folder), kept=(place, key))
+            return replace(found, folder=str(folder), kept=(place, key), notes=(*found.notes, *waiting))
     notes: list[str] = [where] if where else []
-    clips = _read_clips(folder, paths, annotations, chosen, unit, threads, notes, report, cancelled)
+    clips = _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled)
     built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
     _keep_made(place, _completed(built.clips))
     if not cache.save(place, key, built):
@@ -236,7 +242,7 @@ def build(
         )
         built = replace(built, notes=(*built.notes, told))
     report(1.0, "Library ready")
-    return replace(built, kept=(place, key))
+    return replace(built, kept=(place, key), notes=(*built.notes, *waiting))
 
 
 def _made(library: Library) -> Library:
@@ -271,9 +277,9 @@ def _keep_made(place: Path, made: Iterable[Clip], missing_only: bool = False) ->
         return
 
 
-def _read_clips(folder, paths, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
+def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
     """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
-    read, unpopped, level = zip(*_read_files(paths, unit, threads, report, cancelled))
+    read, unpopped, level = zip(*_read_files(paths, files, unit, threads, report, cancelled))
     notes += _unit_notes(read)
     carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
     mended, rows = [], []
@@ -285,6 +291,8 @@ def _read_clips(folder, paths, annotations, chosen, unit, threads, notes, report
         rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
     notes += repair.told([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
     originals = _landed([path.relative_to(folder).as_posix() for path in paths], mended, rows, notes)
+    told = [repair.Mended(pops, one.drift, *one.slide) for one, (_, pops) in zip(mended, unpopped)]
+    originals = [replace(clip, mended=what) for clip, what in zip(originals, told)]
     clips = [clip for original in originals for clip in (original, original.twin())]
     if not any(clip.annotations for clip in clips):
         raise InputError(
@@ -294,17 +302,18 @@ def _read_clips(folder, paths, annotations, chosen, unit, threads, notes, report
     return tuple(clips)
 
 
-def _read_files(paths, unit, threads, report, cancelled) -> list[tuple]:
-    """Each file as read, without pops (and their number), and without drift (and its metres); some at once."""
+def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
+    """Each file as read, without pops (and their number), and without drift (and its metres); some at once. files: what
+    to read for each of `paths` (`converted`); the unit is that of the user's own files."""
 
-    def read_one(path: Path):
-        source = bvh.read(path, unit)
+    def read_one(path: Path, file: Path):
+        source = bvh.read(file, unit if file == path else None)
         unpopped = repair.without_pops(source.motion)
         return source, unpopped, repair.without_drift(unpopped[0])
 
     read = []
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        waiting = [pool.submit(read_one, path) for path in paths]
+        waiting = [pool.submit(read_one, *both) for both in zip(paths, files)]
         try:
             for number, (path, one) in enumerate(zip(paths, waiting)):
                 _check(cancelled)

@@ -62,6 +62,17 @@ class Repaired:
     slid: bool
 
 
+@dataclass(frozen=True)
+class Mended:
+    """What mending one clip found and left: pops, rotations replaced; drift, metres between the lowest and the highest
+    floor; slid and slides, m/s of standing heels and toes before and after."""
+
+    pops: int
+    drift: float
+    slid: float
+    slides: float
+
+
 def without_pops(motion: Motion) -> tuple[Motion, int]:
     """The motion without rotations that jump for one or two frames and return, and the number of rotations replaced.
 

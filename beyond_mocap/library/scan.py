@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
 from ..errors import InputError
+from .converted import FOREIGN, Conversions, is_foreign, told
 
 CACHE_FOLDER = ".beyond_mocap"
 TABLE_NAME = "annotations.csv"
@@ -17,6 +18,15 @@ def find_clips(folder: str | Path) -> list[Path]:
 
     Raises InputError where the folder is missing, holds no BVH file, or one whose name cannot be written into a table.
     """
+    found = find_recordings(folder, (".bvh",))
+    if not found:
+        raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
+    return found
+
+
+def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOREIGN)) -> list[Path]:
+    """All files below `folder` with one of these endings, as `find_clips`, converted or not; none where there are
+    none."""
     folder = Path(folder)
     if not folder.is_dir():
         found = "no folder but a file" if folder.is_file() else "no such folder"
@@ -30,13 +40,31 @@ def find_clips(folder: str | Path) -> list[Path]:
             continue
         seen.add((status.st_dev, status.st_ino))
         folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
-        found += [Path(here) / name for name in files if name.lower().endswith(".bvh")]
-    if not found:
-        raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
+        found += [Path(here) / name for name in files if name.lower().endswith(endings)]
     for path in found:
         if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
             raise InputError(ascii(str(path)), "a name that is not UTF-8", "one that tables can hold", "rename it")
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
+
+
+def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
+    """The recordings of a library that can be read now, their conversions, and a line about those that wait for theirs.
+
+    place: the library's cache. Two recordings of one name (`kick.bvh` beside `kick.fbx`) are one clip: the BVH file.
+    InputError where there is none that can be read.
+    """
+    found = find_recordings(folder)
+    plain = {path.with_suffix("") for path in found if not is_foreign(path)}
+    found = [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
+    conversions = Conversions(folder, place)
+    waiting = conversions.waiting(found)
+    ready = [path for path in found if path not in set(waiting)]
+    if not ready and waiting:
+        what = f"no BVH file below it, but {len(waiting)} that only Blender reads ({waiting[0].name})"
+        raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender, which converts them")
+    if not ready:
+        raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
+    return ready, conversions, told(waiting)
 
 
 def find_tables(folder: Path, clips: list[Path]) -> list[Path]:

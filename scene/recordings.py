@@ -1,0 +1,52 @@
+"""Single recordings of the library in the scene: read as they were recorded, on an armature of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ..beyond_mocap.errors import InputError
+from . import action, armature, body, preferences
+from .settings import absolute
+
+if TYPE_CHECKING:
+    from ..beyond_mocap.motion.motion import Motion
+
+PATH, FOLDER = "beyond_mocap_clip", "beyond_mocap_library"  # custom properties of an armature that shows a clip
+SHIRT = (0.75, 0.05, 0.06)
+
+
+def read(settings, path: str) -> tuple["Motion", tuple[str, ...]]:
+    """The motion of a clip and what its reader decided. path: below the library's folder; InputError where it cannot be
+    read, or waits to be converted."""
+    from ..beyond_mocap.files import bvh
+    from ..beyond_mocap.library import cache
+    from ..beyond_mocap.library.converted import Conversions, is_foreign
+
+    folder = Path(absolute(settings.library_folder))
+    file = folder / path
+    conversions = Conversions(folder, cache.place(folder, preferences.cache_folder(str(folder)))[0])
+    if not file.is_file():
+        raise InputError(file, "no such file", "a clip of the library", "press Build Library to list its clips anew")
+    if not conversions.stands(file):
+        raise InputError(file, "not converted yet", "a clip that was converted", "press Build Library")
+    unit = None if is_foreign(file) else settings.library_unit or None
+    clip = bvh.read(conversions.readable(file), unit)
+    return clip.motion, clip.notes
+
+
+def show(context: bpy.types.Context, motion: "Motion", path: str, dressed: bool) -> bpy.types.Object:
+    """A new armature that plays a clip from the scene's first frame, chosen and active; returns it."""
+    scene, name = context.scene, Path(path).stem
+    rig = armature.create(context, motion.skeleton, name, context.collection)
+    rig[PATH], rig[FOLDER] = path, scene.beyond_mocap.library_folder
+    action.write(rig, motion, scene, name=name)
+    if dressed:
+        body.create(rig, name, SHIRT, context.collection, scene, motion)
+    for other in context.selected_objects:
+        other.select_set(False)
+    rig.select_set(True)
+    context.view_layer.objects.active = rig
+    return rig

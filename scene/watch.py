@@ -1,0 +1,155 @@
+"""Looks from time to time whether a library's folder has changed, in a thread, and says so; it never builds by itself.
+
+The folder is only listed (names, sizes, times). Where it is gone, it is looked for beside the file: a project that was
+copied elsewhere as a whole still finds its library.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import clips
+from .settings import absolute
+
+SECONDS = 4.0  # between two looks
+
+_look: dict = {}  # the thread that is looking, and what it saw
+
+
+def look(folder: str) -> dict[str, tuple[int, int]] | None:
+    """All recordings and words below a folder: path -> (size, time of change in ns); None where there is no folder."""
+    from ..beyond_mocap.errors import InputError
+    from ..beyond_mocap.library.converted import FOREIGN
+    from ..beyond_mocap.library.scan import find_recordings
+
+    try:
+        paths = find_recordings(folder, (".bvh", ".txt", "annotations.csv", *FOREIGN))
+    except (InputError, OSError):
+        return None if not os.path.isdir(folder) else {}
+    found = {}
+    for path in paths:
+        try:
+            status = os.stat(path)
+        except OSError:
+            continue
+        found[os.path.relpath(path, folder)] = (status.st_size, status.st_mtime_ns)
+    return found
+
+
+def news(before: dict, now: dict) -> str:
+    """What is new, changed or gone between two looks, in a line; empty where all is as it was."""
+    kinds = {"clip": lambda name: not name.lower().endswith((".txt", ".csv")),
+             "words file": lambda name: name.lower().endswith((".txt", ".csv"))}
+    told = []
+    for kind, is_kind in kinds.items():
+        new = [name for name in now if name not in before and is_kind(name)]
+        gone = [name for name in before if name not in now and is_kind(name)]
+        changed = [name for name in now if name in before and now[name] != before[name] and is_kind(name)]
+        for names, what in ((new, "new"), (changed, "changed"), (gone, "gone")):
+            if names:
+                told.append(f"{len(names)} {what} {kind}{'' if len(names) == 1 else 's'}")
+    return ", ".join(told)
+
+
+def found_again(folder: str, blend: str) -> str:
+    """Where a missing folder may be now: its own last parts, as many as fit, beside the file or above it; empty where
+    there is no such folder with recordings. folder, blend: absolute paths."""
+    parts = Path(folder).parts[1:]
+    for count in range(len(parts), 0, -1):
+        for place in list(Path(blend).parents)[:4]:
+            tried = place.joinpath(*parts[-count:])
+            if tried.is_dir() and look(str(tried)):
+                return str(tried)
+    return ""
+
+
+def check(scene: bpy.types.Scene) -> None:
+    """Notes whether the scene's library folder is there."""
+    folder = absolute(scene.beyond_mocap.library_folder)
+    listing = bpy.context.window_manager.beyond_mocap_clips
+    listing.missing = bool(folder) and not os.path.isdir(folder)
+
+
+def relink(scene: bpy.types.Scene) -> str:
+    """Where the scene's library folder is missing and lies beside the file, set it so; returns the new place or ""."""
+    settings = scene.beyond_mocap
+    folder = absolute(settings.library_folder)
+    if not folder or os.path.isdir(folder) or not bpy.data.filepath:
+        return ""
+    found = found_again(folder, bpy.data.filepath)
+    if found:
+        settings.library_folder = bpy.path.relpath(found)
+    return found
+
+
+@persistent
+def _after_load(*_):
+    manager = bpy.context.window_manager
+    clips.clear(manager)
+    for scene in bpy.data.scenes:
+        found = relink(scene)
+        if found:
+            print(f"Beyond Mocap: the library of {scene.name} was moved and found again in {found}")
+    check(bpy.context.scene)
+
+
+def _tick():
+    """Start a look where one is asked for and none runs; take in what it saw."""
+    scene, manager = bpy.context.scene, bpy.context.window_manager
+    if scene is None or not scene.beyond_mocap.library_watch:
+        _look.clear()
+        return SECONDS
+    thread = _look.get("thread")
+    if thread is None:
+        _begin(absolute(scene.beyond_mocap.library_folder))
+        return 0.5
+    if thread.is_alive():
+        return 0.5
+    _take_in(manager, scene.beyond_mocap.library_folder)
+    _look.clear()
+    return SECONDS
+
+
+def _begin(folder: str) -> None:
+    def work():
+        saw["files"] = look(folder) if folder else {}
+
+    saw: dict = {}
+    _look.update(saw=saw, folder=folder, thread=threading.Thread(target=work, name="beyond-mocap watch", daemon=True))
+    _look["thread"].start()
+
+
+def _take_in(manager: bpy.types.WindowManager, setting: str) -> None:
+    """Writes what was seen, where it is news, and has it drawn."""
+    listing, saw = manager.beyond_mocap_clips, _look["saw"].get("files")
+    if _look["folder"] != absolute(setting):
+        return
+    missing = saw is None
+    told = news(clips.files(), saw) if not missing and listing.folder == setting else ""
+    if (listing.missing, listing.news) != (missing, told):
+        listing.missing, listing.news = missing, told
+        for window in manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.tag_redraw()
+
+
+def register():
+    """Look for moved libraries after a file is opened; with a window also look from time to time."""
+    bpy.app.handlers.load_post.append(_after_load)
+    if not bpy.app.background:
+        bpy.app.timers.register(_tick, first_interval=SECONDS, persistent=True)
+
+
+def unregister():
+    """Look no more."""
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    bpy.app.handlers.load_post.remove(_after_load)
+    _look.clear()
+    clips.clear()
