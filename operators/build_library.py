@@ -22,10 +22,22 @@ if TYPE_CHECKING:
 class Order:
     """What a build needs to know."""
 
+    setting: str
     folder: str
     unit: float | None
     rebuild: bool
     preferences: dict  # arguments of the core's build
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """What came of it: the library (or what is wrong with it), its clips one by one, and the folder as it was read."""
+
+    setting: str
+    library: "Library | None"
+    trouble: InputError | None
+    listing: tuple
+    files: dict
 
 
 class BEYOND_MOCAP_OT_build_library(BackgroundVerb, bpy.types.Operator):

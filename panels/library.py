@@ -15,9 +15,9 @@ class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
     def draw_item(self, _context, layout, _data, clip, _icon, _active_data, _active_property):
         """One clip."""
         row = layout.row(align=True)
-        names = row.split(factor=0.5, align=True)
+        names = row.split(factor=0.66, align=True)
         names.label(text=clip.name, icon=MARKS[clip.mark])
-        names.label(text=clip.words or "no words")
+        names.label(text=clip.brief)
         row.operator("beyond_mocap.import_clip", text="", icon="IMPORT", emboss=False).path = clip.path
 
     def draw_filter(self, _context, _layout):

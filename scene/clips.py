@@ -46,6 +46,7 @@ class BeyondMocapClip(bpy.types.PropertyGroup):
 
     path: StringProperty(name="File", description="Below the library's folder")
     words: StringProperty(name="Words", description="All words that it carries")
+    brief: StringProperty(name="Shows", description="The first of its words")
     seconds: FloatProperty(name="Length", unit="TIME_ABSOLUTE", description="Seconds")
     figures: StringProperty(name="Figures", description="Length and speeds")
     mark: IntProperty(name="Quality", description="0 good, 1 fair, 2 poor, 3 not measured")
@@ -105,6 +106,7 @@ def fill(manager: bpy.types.WindowManager) -> None:
     for clip in sorted(chosen, key=_KEYS[listing.order]):
         row = listing.shown.add()
         row.name, row.path, row.words = Path(clip.path).stem, clip.path, " ".join(clip.words)
+        row.brief = clip.words[0].replace("_", " ") if clip.words else "no words"
         row.seconds, row.mark = clip.seconds, clip.mark
         row.figures, row.told = _figures(clip), "\n".join(clip.told)
     paths = [row.path for row in listing.shown]

@@ -7,7 +7,6 @@ recording jerks beside the library's others of the same speed.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +31,8 @@ _HEAD = 1 << 16  # bytes of a file's head in which its number of frames stands
 
 @dataclass(frozen=True)
 class Listed:
-    """One clip. path: below the library's folder. words: all that it carries, the longest first. moments: number of
+    """One clip. path: below the library's folder. words: all that it carries, key moments'
+    first. moments: number of
     key moments. seconds: its length. speed, fastest: m/s, mean and highest, NaN where nobody has measured. mark: GOOD,
     FAIR, POOR or UNKNOWN; told: lines 'name: value' behind the mark."""
 
@@ -85,12 +85,10 @@ def scanned(folder: str | Path, cache_dir: str | Path | None = None) -> tuple[Li
 
 
 def _words(rows: Sequence[ClipAnnotation]) -> tuple[tuple[str, ...], int]:
-    """Key moments' words first, then those of the longest rows; and the number of key moments."""
-    weight: Counter = Counter()
-    for row in rows:
-        for word in spoken(row.words):
-            weight[word] += (row.end - row.start) + (1e9 if row.key is not None else 0)
-    return tuple(word for word, _ in weight.most_common()), sum(row.key is not None for row in rows)
+    """Key moments' words first, as one says them, then those of the longest rows; and the number of key moments."""
+    ordered = sorted(rows, key=lambda row: (row.key is None, row.start - row.end))
+    words = dict.fromkeys(word for row in ordered for word in spoken(row.words))
+    return tuple(words), sum(row.key is not None for row in rows)
 
 
 def _quality(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, ...]]:
