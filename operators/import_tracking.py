@@ -1,4 +1,4 @@
-"""Import Tracking: files of dots become players in the list; nothing else in the scene changes."""
+"""Import Tracking: files of dots become players in the list, each with a dot that runs and strips for its words."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.tracking import PROVIDERS
-from ..scene import tracks
+from ..scene import dots, plans, strips, tracks
 from ..scene.settings import as_setting
 from .verb import ImportVerb
 
@@ -58,6 +58,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
             for note in notes:
                 self.report({"INFO"}, note)
         settings.active_player = len(settings.players) - sum(len(found) for _, found, _ in read)
+        for player in list(settings.players)[settings.active_player :]:
+            self.place(context, player)
         self.report({"INFO"}, f"players in the list: {len(settings.players)}")
 
     @staticmethod
@@ -67,6 +69,17 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
         if any(player.feed_id for player in found):
             settings.section_start = settings.start_time
             settings.section_end = min(settings.start_time + SECTION, max(player.end for player in found))
+
+    def place(self, context, player):
+        """The player's dot, and his words as strips; a player without a track in the section or with words that cannot
+        be read stays in the list and is told."""
+        try:
+            dots.ensure(context, player)
+            if player.annotation_file:
+                track = tracks.read_track(context.scene.beyond_mocap, player)
+                strips.write(context, player, plans.written_words(player, context.scene.beyond_mocap.rate, track))
+        except InputError as error:
+            self.report({"WARNING"}, str(error))
 
     def add(self, settings, path: str, found: tracks.Found, provider: str):
         """One more player in the list; of a whole match only the first is ticked."""

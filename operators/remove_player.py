@@ -1,15 +1,17 @@
-"""Remove Player: take one off the list; what was made stays."""
+"""Remove Player: take one off the list with his dot and strips; what was made stays."""
 
 from __future__ import annotations
 
 import bpy
 
+from ..scene import dots
 from ..scene.settings import active_player
 from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_remove_player(Verb, bpy.types.Operator):
-    """Take the active player off the list; armature and action stay in the scene"""
+    """Take the active player off the list, with his dot and the strips of his words; armature and action stay in the
+scene"""
 
     bl_idname = "beyond_mocap.remove_player"
     bl_label = "Remove Player"
@@ -23,5 +25,6 @@ class BEYOND_MOCAP_OT_remove_player(Verb, bpy.types.Operator):
     def do(self, context):
         """Remove it and choose its neighbour."""
         settings = context.scene.beyond_mocap
+        dots.remove(context.scene, settings.players[settings.active_player])
         settings.players.remove(settings.active_player)
         settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))

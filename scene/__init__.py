@@ -9,6 +9,9 @@
 - `tracks`, `plans`   the settings as tracks and plans of the core
 - `bake`        a take becomes all of that
 - `result`, `preview`, `set_aside`, `blocks`   a take is shown, kept or put away again; as one action or as NLA strips
+- `dots`        an Empty for each player that runs along the track; `clock` its seconds against frames
+- `strips`      a player's timeline as NLA strips on his dot; `lanes` reads, `lay_strips` writes those of any object,
+                `strip_lines` is what one of them says
 - `background`  long work in a thread
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -17,24 +20,35 @@ The classes are registered in the order of CLASSES: what others point to comes f
 
 import bpy
 
-from . import background, clips, result, session, settings, watch
+from . import background, clips, dots, lanes, result, session, settings, strip_lines, watch
 
 CLASSES = (
     *result.CLASSES,
+    strip_lines.BeyondMocapLine,
+    lanes.BeyondMocapLanes,
+    dots.BeyondMocapDot,
     settings.BeyondMocapPlayer,
     settings.BeyondMocapSettings,
     settings.BeyondMocapWork,
     *clips.CLASSES,
 )
+KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
+    ("Action", "beyond_mocap", strip_lines.BeyondMocapLine),
+    ("TimelineMarker", "beyond_mocap", strip_lines.BeyondMocapLine),
+    ("Object", "beyond_mocap_lanes", lanes.BeyondMocapLanes),
+    ("Object", "beyond_mocap_dot", dots.BeyondMocapDot),
+    ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
+    ("WindowManager", "beyond_mocap_work", settings.BeyondMocapWork),
+    ("WindowManager", "beyond_mocap_clips", clips.BeyondMocapClips),
+)
 
 
 def register():
-    """Register the data classes, in order, and hang the settings on every scene."""
+    """Register the data classes, in order, and hang them on Blender's own data."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Scene.beyond_mocap = bpy.props.PointerProperty(type=settings.BeyondMocapSettings)
-    bpy.types.WindowManager.beyond_mocap_work = bpy.props.PointerProperty(type=settings.BeyondMocapWork)
-    bpy.types.WindowManager.beyond_mocap_clips = bpy.props.PointerProperty(type=clips.BeyondMocapClips)
+    for owner, name, cls in KEPT_WITH:
+        setattr(getattr(bpy.types, owner), name, bpy.props.PointerProperty(type=cls))
     watch.register()
 
 
@@ -43,8 +57,7 @@ def unregister():
     background.stop()
     watch.unregister()
     session.clear()
-    del bpy.types.WindowManager.beyond_mocap_clips
-    del bpy.types.WindowManager.beyond_mocap_work
-    del bpy.types.Scene.beyond_mocap
+    for owner, name, _ in reversed(KEPT_WITH):
+        delattr(getattr(bpy.types, owner), name)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -6,6 +6,7 @@ from ..beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion.track import Track, clean
 from ..beyond_mocap.plan import Plan, gait_choices
+from . import strips
 from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 from .tracks import read_track
 
@@ -44,17 +45,29 @@ def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> tuple[P
 
 
 def timeline_of(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
-    """The player's words: from the text of this file, else from the file on disk, else none (all automatic)."""
-    start, text = float(track.times[0]), player.annotation_text
-    if text is not None:
-        return parse_timeline(text.as_string(), words_from(player), fps, start)
+    """The player's words: from his strips, else from the text of this file, else from the file on disk, else none (all
+    automatic)."""
+    asked = strips.read(player, player.id_data)
+    return written_words(player, fps, track) if asked is None else asked
+
+
+def written_words(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
+    """The words of the player's text or file, as they are before they become strips; fps: of times in frames."""
+    start = float(track.times[0])
+    if player.annotation_text is not None:
+        return parse_timeline(player.annotation_text.as_string(), written_in(player), fps, start)
     if player.annotation_file:
-        return read_timeline(words_from(player), fps, start)
+        return read_timeline(written_in(player), fps, start)
     return Timeline()
 
 
 def words_from(player: BeyondMocapPlayer) -> str:
-    """Where the player's words are written, for messages."""
+    """Where the words that count are written, for messages."""
+    return written_in(player) if strips.dot_of(player, player.id_data) is None else strips.where(player)
+
+
+def written_in(player: BeyondMocapPlayer) -> str:
+    """The text or file with the player's words, for messages."""
     if player.annotation_text is not None:
         return f"text {player.annotation_text.name}"
     return absolute(player.annotation_file) or f"player {player.name}"

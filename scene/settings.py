@@ -32,9 +32,17 @@ def is_armature(_settings, candidate: bpy.types.Object) -> bool:
     return candidate.type == "ARMATURE"
 
 
+def show_on_dot(player, _context) -> None:
+    """A player's new name or colour is his dot's too."""
+    if player.dot is not None:
+        player.dot.name, player.dot.color = f"{player.name} dot", (*player.shirt, 1.0)
+        player.dot.beyond_mocap_dot.player, player.dot.beyond_mocap_dot.shirt = player.name, player.shirt
+
+
 class BeyondMocapPlayer(bpy.types.PropertyGroup):
     """One player: the dots, the words, and the body that came of them."""
 
+    name: StringProperty(name="Name", update=show_on_dot, description="What this player is called")
     use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
     tracking_file: StringProperty(
         name="Tracking", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
@@ -58,7 +66,11 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     shirt: FloatVectorProperty(
         name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
-        description="Colour of the player's shirt",
+        description="Colour of the player's shirt", update=show_on_dot,
+    )
+    dot: PointerProperty(
+        name="Dot", type=bpy.types.Object,
+        description="The Empty that runs along the track and carries the strips of the player's words",
     )
     body: PointerProperty(
         name="Body", type=bpy.types.Object, poll=is_armature,

@@ -28,7 +28,7 @@ class Found(NamedTuple):
 def players_in(path: str, metadata: str = "", provider: str = "") -> tuple[list[Found], tuple[str, ...]]:
     """The players of a tracking file, and notes on what was guessed; InputError where it cannot be read."""
     if is_plain(path):
-        track = tracking.read_track_csv(path)
+        track = _plain(path)
         return [Found(Path(path).stem, "", "home", float(track.times.min()), float(track.times.max()))], ()
     match = _match(path, metadata, provider)
     start, end = float(match.times[0]), float(match.times[-1])
@@ -42,7 +42,7 @@ def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> "Tra
     if not path:
         raise InputError(f"player {player.name}", "no tracking file", "a file with positions", "choose one in step 2")
     if not player.feed_id:
-        return tracking.read_track_csv(path)
+        return _plain(path)
     match = _match(path, absolute(player.metadata_file), player.provider)
     end = settings.section_end if settings.section_end > settings.section_start else None
     return match.track(player.feed_id, settings.section_start, end)
@@ -57,13 +57,27 @@ def is_plain(path: str) -> bool:
         raise InputError(path, error.strerror or "cannot be read", "a tracking file", "check the path") from None
 
 
+def _plain(path: str) -> "Track":
+    return _read_plain(path, _stamp(path))
+
+
+@lru_cache(maxsize=32)
+def _read_plain(path: str, _changed: tuple[int, int]) -> "Track":
+    return tracking.read_track_csv(path)
+
+
 def _match(path: str, metadata: str, provider: str) -> tracking.Match:
-    changed = os.stat(path).st_mtime_ns if os.path.exists(path) else 0
-    return _read_match(path, metadata or None, provider or None, changed)
+    return _read_match(path, metadata or None, provider or None, _stamp(path))
+
+
+def _stamp(path: str) -> tuple[int, int]:
+    """What changes when a file is written anew."""
+    found = os.stat(path) if os.path.exists(path) else None
+    return (found.st_mtime_ns, found.st_size) if found else (0, 0)
 
 
 @lru_cache(maxsize=1)
-def _read_match(path: str, metadata: str | None, provider: str | None, _changed: int) -> tracking.Match:
+def _read_match(path: str, metadata: str | None, provider: str | None, _changed) -> tracking.Match:
     return tracking.read_match(path, metadata, provider)
 
 

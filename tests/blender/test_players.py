@@ -88,9 +88,15 @@ def test_words_of_a_text_count_more_than_those_on_disk(extension, ready, core):
     text = bpy.data.texts.new("Words")
     text.write("3.0 kick right running low inside\n")
     ready.players[0].annotation_text = text
+    assert plans.plan_of(ready, ready.players[0])[0].timeline.keys[0].time == 6.0  # strips count more than either
+    bpy.ops.beyond_mocap.read_words()
     assert plans.plan_of(ready, ready.players[0])[0].timeline.keys[0].time == 3.0
     text.clear()
     text.write("3.0 kik right\n")
+    bpy.ops.beyond_mocap.read_words()
+    with pytest.raises(RuntimeError, match="strips of player1: the word 'kik'"):
+        bpy.ops.beyond_mocap.synthesize()
+    bpy.data.objects.remove(ready.players[0].dot)  # without strips the text itself counts
     with pytest.raises(RuntimeError, match="text Words:1: the word 'kik'"):
         bpy.ops.beyond_mocap.synthesize()
 
@@ -161,6 +167,7 @@ def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, 
     bpy.ops.beyond_mocap.synthesize()
     before = [session.made(player.take) for player in ready.players]
     (match / "player1.txt").write_text(WORDS.replace("6.0", "6.2"))
+    bpy.ops.beyond_mocap.read_words()
     assert_one_step(bpy.ops.beyond_mocap.update)
     settings = bpy.context.scene.beyond_mocap
     after = [session.made(player.take) for player in settings.players]
@@ -287,7 +294,8 @@ def test_bad_tracking(tmp_path, content, found):
 
 def test_words_that_the_library_lacks(ready, match):
     (match / "player1.txt").write_text("6.0 header\n")
-    refused(bpy.ops.beyond_mocap.synthesize, r"player1\.txt: line 1, 6 s: .*header")
+    bpy.ops.beyond_mocap.read_words()
+    refused(bpy.ops.beyond_mocap.synthesize, "strips of player1: .*6 s: .*header")
     ready.nearest = True
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     assert ready.players[0].moments.startswith("6.0 s  header, shown as ")
