@@ -16,7 +16,7 @@ import pytest
 TOP = pathlib.Path(__file__).resolve().parents[2]
 CORE = "beyond_mocap"
 BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui", "bl_operators", "bmesh", "addon_utils",
-           "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop"}
+           "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}
 ARRAYS = {"numpy", "scipy"}
 FORBIDDEN = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve"}
 DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc"}
