@@ -29,6 +29,7 @@ from . import (
 CLASSES = (
     import_clips.BEYOND_MOCAP_OT_import_clips,
     import_clips.BEYOND_MOCAP_FH_clips,
+    import_clips.BEYOND_MOCAP_FH_foreign_clips,
     mirror.BEYOND_MOCAP_OT_mirror,
     export_bvh.BEYOND_MOCAP_OT_export_bvh,
     import_tracking.BEYOND_MOCAP_OT_import_tracking,

@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..beyond_mocap.errors import InputError
-from ..scene import clips, preferences, session, watch
+from ..scene import clips, foreign, preferences, session, watch
 from ..scene.settings import absolute
 from .verb import BackgroundVerb
 
@@ -42,11 +42,15 @@ class Built:
 
 class BEYOND_MOCAP_OT_build_library(BackgroundVerb, bpy.types.Operator):
     """Read all clips of the library folder, their words and foot contacts, and sort them for the search.
-The result is kept in a cache, so that the next time takes a moment"""
+The result is kept in a cache, so that the next time takes a moment; when anything in the folder has changed, all of it
+is read again. FBX, glTF and USD clips are converted first, each once"""
 
     bl_idname = "beyond_mocap.build_library"
     bl_label = "Build Library"
     kind = "library"
+    queue = None  # foreign.Queue while a window waits for conversions
+    job = None
+    notes = ()
 
     rebuild: BoolProperty(
         name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"}
@@ -65,7 +69,64 @@ The result is kept in a cache, so that the next time takes a moment"""
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
         folder = absolute(settings.library_folder)
         unit = settings.library_unit or None
+        queue = self.queue or self.waiting(context)
+        while queue.todo:  # by a script; in a window `modal` has converted them one by one
+            queue.step()
+        self.notes = queue.notes
         return Order(settings.library_folder, folder, unit, self.rebuild, preferences.for_build(folder))
+
+    def waiting(self, context):
+        """The clips that are to be converted."""
+        folder = absolute(context.scene.beyond_mocap.library_folder)
+        return foreign.Queue(folder, preferences.cache_folder(folder))
+
+    def start(self, context):
+        """Convert first, if there is anything to convert, then hand the build to a thread."""
+        self.queue = self.waiting(context)
+        self.scene = context.scene.session_uid
+        if not self.queue.todo:
+            super().start(context)
+
+    def modal(self, context, event):
+        """One conversion at each tick, since only the main thread may import; then as every work in the background."""
+        if self.job is not None:
+            return super().modal(context, event)
+        if event.type == "ESC" and event.value == "PRESS":
+            self.ended(context)
+            self.report({"WARNING"}, f"{self.bl_label}: cancelled, what is converted is kept")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        outcome = self.attempt(lambda: self.convert_next(context))
+        if outcome == {"CANCELLED"}:
+            self.ended(context)
+            return outcome
+        self.show(context)
+        return {"RUNNING_MODAL"}
+
+    def convert_next(self, context):
+        """The next one, or the thread where there is none."""
+        if self.queue.todo:
+            self.queue.step()
+        else:
+            super().start(context)
+
+    def show(self, context):
+        """The conversions' progress while they run."""
+        if self.job is not None:
+            return super().show(context)
+        running, queue = context.window_manager.beyond_mocap_work, self.queue
+        done = queue.total - len(queue.todo)
+        text = f"Converting {queue.todo[0].name}" if queue.todo else "Converted"
+        running.kind, running.fraction, running.text = self.kind, done / max(queue.total, 1), text
+        context.workspace.status_text_set(f"{text}   {done} of {queue.total}   ESC: cancel")
+        self.redraw(context)
+
+    def cancel(self, context):
+        """Blender takes the operator away."""
+        if self.job is not None:
+            self.job.cancel()
+        self.ended(context)
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
@@ -84,6 +145,8 @@ The result is kept in a cache, so that the next time takes a moment"""
     def apply(self, scene, built):
         """Keep it, and say what it holds."""
         clips.keep(bpy.context.window_manager, built.setting, built.listing, built.files)
+        for note in self.notes:
+            self.report({"WARNING"}, note)
         if built.trouble is not None:
             raise built.trouble
         session.keep_library(built.library, scene.beyond_mocap.library_unit or None)

@@ -7,7 +7,7 @@ import bpy
 
 def draw_import(self, _context):
     """File > Import."""
-    self.layout.operator("beyond_mocap.import_clips", text="Beyond Mocap Clips (.bvh)")
+    self.layout.operator("beyond_mocap.import_clips", text="Beyond Mocap Clips (.bvh, .fbx ...)")
     self.layout.operator("beyond_mocap.import_tracking", text="Beyond Mocap Tracking (.csv ...)")
 
 

@@ -61,6 +61,42 @@ def as_clip(motion: Motion) -> "BvhClip":
         return bvh.read(file)
 
 
+class Queue:
+    """The foreign recordings of a library that are to be converted, one at a time, so that a window stays alive.
+
+    todo: those that wait; total: how many there were; notes: what came of it, one line for each that asks for a look.
+    """
+
+    def __init__(self, folder: str | Path, cache_dir: str | None):
+        """Looks which recordings below `folder` wait; InputError where there is no folder."""
+        from ..beyond_mocap.library import cache
+        from ..beyond_mocap.library.converted import Conversions
+        from ..beyond_mocap.library.scan import find_recordings
+
+        folder = Path(folder)
+        self.conversions = Conversions(folder, cache.place(folder, cache_dir)[0])
+        self.todo = self.conversions.waiting(find_recordings(folder))
+        self.total, self.notes = len(self.todo), []
+
+    def step(self) -> None:
+        """Convert the next one; one that cannot be converted is told and left out."""
+        path = self.todo.pop(0)
+        try:
+            takes = read(path)
+            self._keep(path, takes)
+        except InputError as error:
+            self.notes.append(f"left out: {error}")
+
+    def _keep(self, path: Path, takes: list[Take]) -> None:
+        from ..beyond_mocap.files import bvh
+
+        bvh.write(self.conversions.prepare(path), takes[0].motion)
+        self.conversions.keep(path)
+        if len(takes) > 1:
+            others = ", ".join(take.name for take in takes[1:4])
+            self.notes.append(f"{path.name}: the longest of {len(takes)} animations is its clip, left out {others}")
+
+
 def _bring_in(path: Path) -> None:
     """Import by the first of Blender's importers for this ending that it has and that reads the file."""
     importers = [operator for operator in _importers(path.suffix.lower()) if _exists(operator)]

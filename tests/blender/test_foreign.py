@@ -6,7 +6,7 @@ import bpy
 import made
 import numpy as np
 import pytest
-from undo import state
+from undo import assert_one_step, state
 
 
 @pytest.fixture
@@ -75,3 +75,61 @@ def test_files_without_a_motion_are_told(rooms, tmp_path):
         with pytest.raises(Exception, match=told):
             rooms["foreign"].read(path)
     assert state() == before
+
+
+def test_the_operator_gives_what_the_functions_give(core, rooms, tmp_path):
+    path = tmp_path / "clip.glb"
+    motion = exported(core, rooms, path)
+    bpy.context.scene.render.fps = 30
+    assert_one_step(bpy.ops.beyond_mocap.import_clips, filepath=str(path))
+    rig = bpy.context.object
+    assert rig.name == "clip" and [o.type for o in bpy.data.objects] == ["ARMATURE"]
+    read = rooms["action"].read(rig, bpy.context.scene)
+    apart = np.linalg.norm(places_of(core, read, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1)
+    assert apart.max() < 1e-3
+
+
+@pytest.fixture
+def mixed(core, rooms, tmp_path):
+    """A library of a BVH, an FBX and a GLB clip with words beside them, and a broken FBX."""
+    folder = tmp_path / "library"
+    (folder / "below").mkdir(parents=True)
+    core("files.bvh").write(folder / "walk.bvh", made.motion(core, 91))
+    exported(core, rooms, folder / "below" / "jog.fbx")
+    exported(core, rooms, folder / "low.glb")
+    (folder / "broken.fbx").write_bytes(b"Kaydara FBX Binary  \0\x1a\0" + b"\1" * 300)
+    (folder / "walk.txt").write_text("0 3 walking front\n")
+    (folder / "below/jog.txt").write_text("0 2 jogging front\n")
+    (folder / "low.txt").write_text("0 2 kick right low\n1.2 kick right low\n")
+    bpy.context.scene.beyond_mocap.library_folder = str(folder)
+    return folder
+
+
+def test_a_library_of_foreign_clips_is_built_and_a_broken_one_left_out(core, mixed):
+    before = state()
+    assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
+    listing = bpy.context.window_manager.beyond_mocap_clips
+    paths = {clip.path: clip.words for clip in listing.shown}
+    assert set(paths) == {"walk.bvh", "below/jog.fbx", "low.glb"} and paths["below/jog.fbx"].startswith("jogging")
+    assert (mixed / ".beyond_mocap/converted/below/jog.fbx.bvh").is_file()
+    after = state()
+    assert {key for key in before if before[key] != after[key]} <= {"settings", "scenes"}
+    core("library.library").build(mixed)  # as the command line does, afterwards
+    bpy.ops.beyond_mocap.import_clip(path="below/jog.fbx", dressed=False)
+    assert bpy.context.object.name == "jog"
+
+
+def test_a_clip_is_converted_once_and_again_when_it_changes(core, rooms, mixed):
+    foreign = rooms["foreign"]
+    assert len(foreign.Queue(mixed, None).todo) == 3
+    bpy.ops.beyond_mocap.build_library()
+    assert [path.name for path in foreign.Queue(mixed, None).todo] == ["broken.fbx"]
+    exported(core, rooms, mixed / "low.glb", 60)
+    assert sorted(path.name for path in foreign.Queue(mixed, None).todo) == ["broken.fbx", "low.glb"]
+
+
+def test_a_folder_of_broken_clips_alone(tmp_path):
+    (tmp_path / "a.fbx").write_bytes(b"no FBX")
+    bpy.context.scene.beyond_mocap.library_folder = str(tmp_path)
+    with pytest.raises(RuntimeError, match="no BVH file below it"):
+        bpy.ops.beyond_mocap.build_library()
