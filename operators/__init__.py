@@ -18,10 +18,14 @@ from . import (
     import_tracking,
     keymap,
     list_clips,
+    load_video,
     mirror,
+    move_video,
     read_words,
     relink_library,
     remove_player,
+    remove_video,
+    show_video,
     synthesize,
     update,
 )
@@ -46,6 +50,10 @@ CLASSES = (
     accept.BEYOND_MOCAP_OT_accept,
     discard.BEYOND_MOCAP_OT_discard,
     add_stage.BEYOND_MOCAP_OT_add_stage,
+    load_video.BEYOND_MOCAP_OT_load_video,
+    show_video.BEYOND_MOCAP_OT_show_video,
+    move_video.BEYOND_MOCAP_OT_move_video,
+    remove_video.BEYOND_MOCAP_OT_remove_video,
 )
 
 

@@ -5,13 +5,14 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 
 import bpy
 
-from . import library, menus, players, preferences, result, synthesis
+from . import library, menus, players, preferences, result, synthesis, video
 
 CLASSES = (
     library.BEYOND_MOCAP_UL_clips,
     library.BEYOND_MOCAP_PT_library,
     players.BEYOND_MOCAP_UL_players,
     players.BEYOND_MOCAP_PT_players,
+    video.BEYOND_MOCAP_PT_video,
     synthesis.BEYOND_MOCAP_PT_synthesis,
     result.BEYOND_MOCAP_PT_result,
     preferences.BeyondMocapPreferences,

@@ -20,10 +20,11 @@ The classes are registered in the order of CLASSES: what others point to comes f
 
 import bpy
 
-from . import background, clips, dots, lanes, result, session, settings, strip_lines, watch
+from . import background, clips, dots, lanes, result, session, settings, strip_lines, video, watch
 
 CLASSES = (
     *result.CLASSES,
+    video.BeyondMocapVideo,
     strip_lines.BeyondMocapLine,
     lanes.BeyondMocapLanes,
     dots.BeyondMocapDot,

@@ -13,6 +13,7 @@ from bpy.props import (
 )
 
 from .result import BeyondMocapResult, BeyondMocapShared
+from .video import BeyondMocapVideo, renew
 
 METHODS = (
     ("path", "On the path", "The player's body is laid on the track, with the sway of the clips kept"),
@@ -169,16 +170,18 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         description="Frames per second that are synthesized; the scene keeps its own rate",
     )
     start_frame: IntProperty(
-        name="Start Frame", default=1, description="Scene frame on which the clock below stands at its start"
+        name="Start Frame", default=1, update=renew,
+        description="Scene frame on which the clock below stands at its start",
     )
     start_time: FloatProperty(
-        name="Clock at Start", default=0.0, unit="TIME_ABSOLUTE", precision=2,
+        name="Clock at Start", default=0.0, unit="TIME_ABSOLUTE", precision=2, update=renew,
         description="Seconds on the tracking file's clock at the start frame",
     )
     make_bodies: BoolProperty(name="Bodies", default=True, description="Make a low-poly body for each player")
     make_ball: BoolProperty(name="Ball", default=True, description="Make the ball, where the tracking has one")
     make_paths: BoolProperty(name="Paths", default=True, description="Draw each player's track on the ground")
     accept_as: EnumProperty(name="Accept As", items=FORMS, default="ACTION", description="What an accepted take becomes")
+    video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
     shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
 
 
