@@ -51,11 +51,13 @@ def register():
     for owner, name, cls in KEPT_WITH:
         setattr(getattr(bpy.types, owner), name, bpy.props.PointerProperty(type=cls))
     watch.register()
+    video.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
     background.stop()
+    video.unregister()
     watch.unregister()
     session.clear()
     for owner, name, _ in reversed(KEPT_WITH):

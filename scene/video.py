@@ -15,6 +15,7 @@ import bpy
 from bpy.props import FloatProperty, PointerProperty
 
 from ..beyond_mocap.errors import InputError
+from .clock import of_scene
 from .measure import frames_per_second
 
 _EARLY = 1e-3  # of a video frame: one that begins just here is shown
@@ -22,6 +23,7 @@ _CLOCK = {  # the driver's variables and where they are in a scene
     "fps": "render.fps", "base": "render.fps_base", "first": "beyond_mocap.start_frame",
     "clock": "beyond_mocap.start_time", "begins": "beyond_mocap.video.begins", "rate": "beyond_mocap.video.rate",
 }
+_mappings: dict[int, tuple] = {}  # what each scene's clip was last read for
 _SHOWN = f"floor((clock + (frame - first) * base / fps - begins) * rate + {_EARLY})"
 
 
@@ -85,7 +87,8 @@ def drive(scene: bpy.types.Scene) -> None:
         variable.targets[0].id_type = "SCENE"
         variable.targets[0].id = scene
         variable.targets[0].data_path = path
-    driver.expression = f"frame - {_SHOWN}"
+    driver.expression = f"floor(frame) - {_SHOWN}"
+    _mappings[scene.session_uid] = _mapping(scene)
 
 
 def release(scene: bpy.types.Scene) -> None:
@@ -102,6 +105,42 @@ def release(scene: bpy.types.Scene) -> None:
 
 def frame_shown(scene: bpy.types.Scene, frame: float) -> int:
     """Which frame of the video, from 1, belongs to a scene frame; outside 1 to the clip's length there is none."""
+    video = scene.beyond_mocap.video
+    return 1 + math.floor((of_scene(scene).seconds(frame) - video.begins) * video.rate + _EARLY)
+
+
+@bpy.app.handlers.persistent
+def watch(scene: bpy.types.Scene, _depsgraph=None) -> None:
+    """See to it that the clip is read anew where another of its frames now belongs to a scene frame: Blender keeps
+    pictures by the scene's frame. A changed scene rate comes by here too."""
+    known, mapping = _mappings.get(scene.session_uid), _mapping(scene)
+    _mappings[scene.session_uid] = mapping
+    if known != mapping and None not in (known, mapping) and not bpy.app.background:
+        bpy.app.timers.register(_reread, first_interval=0.0)  # what a handler tags is forgotten
+
+
+def _mapping(scene: bpy.types.Scene) -> tuple | None:
+    """All that decides which picture belongs to which frame; None without a video."""
     settings = scene.beyond_mocap
-    seconds = settings.start_time + (frame - settings.start_frame) / frames_per_second(scene)
-    return 1 + math.floor((seconds - settings.video.begins) * settings.video.rate + _EARLY)
+    video, fps = settings.video, frames_per_second(scene)
+    if video.clip is None:
+        return None
+    return video.clip.session_uid, settings.start_frame, settings.start_time, fps, video.begins, video.rate
+
+
+def _reread() -> None:
+    """Let all scenes' clips be read anew; any writing of a clip's path brings that about."""
+    for scene in bpy.data.scenes:
+        if clip := scene.beyond_mocap.video.clip:
+            clip.filepath = clip.filepath
+
+
+def register() -> None:
+    """Begin to watch."""
+    bpy.app.handlers.depsgraph_update_post.append(watch)
+
+
+def unregister() -> None:
+    """Watch no longer."""
+    bpy.app.handlers.depsgraph_update_post.remove(watch)
+    _mappings.clear()
