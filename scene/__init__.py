@@ -2,6 +2,7 @@
 
 - `measure`     metres and seconds against the scene's units and frames
 - `armature`, `action`   skeletons and motions, both ways
+- `linked`    refuses what belongs to another file
 - `channels`    curves in bulk; alone knows slots and channelbags
 - `body`, `ball`, `curve`, `stage`, `material`   what is seen
 - `settings`    what the panels show, per scene; `session` what lives as long as Blender runs

@@ -13,7 +13,7 @@ import numpy as np
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
 from ..beyond_mocap.motion.motion import Motion, at_frames
-from . import armature, channels
+from . import armature, channels, linked
 from .measure import frames_per_second, whole_frames
 
 
@@ -26,6 +26,7 @@ def write(
     start: scene frame (may be fractional) at which the motion's first frame is played; the scene's first if None. The
     armature needs a bone for every joint. generated: as for `channels.animate`. Returns the action.
     """
+    linked.refuse(body)
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:
         raise InputError(f"armature {body.name}", f"no bone {', '.join(missing[:3])}", "a bone for every joint")

@@ -105,7 +105,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         "nothing is built by itself",
     )
     library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
-    players: CollectionProperty(type=BeyondMocapPlayer)
+    players: CollectionProperty(type=BeyondMocapPlayer, description="Who is animated, in the order of the list")
     active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
     section_start: FloatProperty(
         name="From", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1,

@@ -81,7 +81,7 @@ def _content(path: Path) -> bytes:
     except IsADirectoryError:
         raise InputError(path, "a folder", "a BVH file", "name a file in it") from None
     except (OSError, ValueError) as error:
-        raise InputError(path, f"cannot be read ({error})", "a readable BVH file") from None
+        raise InputError(path, f"cannot be read ({getattr(error, 'strerror', None) or error})", "a readable BVH file") from None
     if not data or data.isspace():
         raise InputError(path, "empty file", "a BVH file", _EXPORT_AGAIN)
     if data.startswith(b"\xef\xbb\xbf"):

@@ -1,0 +1,191 @@
+"""Every operator of the extension, in every awkward situation: it works, or says what to do and changes nothing.
+
+The operators are found in Blender, not listed by hand; each needs a row in ROWS that says how it is called where all is
+well. A new operator without a row fails here.
+"""
+
+import importlib
+import re
+import shutil
+from collections.abc import Callable
+from typing import NamedTuple
+
+import bpy
+import pytest
+import worlds
+from undo import press, state
+
+SAYS_NOTHING = re.compile(
+    r"Traceback|failed, context is incorrect|\w+Error: '|has no attribute|NoneType|StructRNA|<bpy|^\W*$|Errno|object is not"
+)
+
+
+class Row(NamedTuple):
+    """How an operator is called.
+
+    begin: the stage of `worlds` that it needs. arguments(places): of the call. prepare(): brings the scene into the
+    state that it needs beside that. changes: whether it changes the file, in one step of undo. window: it works by
+    pointing and pressing keys only, so that without a window it says so.
+    """
+
+    begin: str
+    arguments: Callable = lambda places: {}
+    prepare: Callable = lambda: None
+    changes: bool = True
+    window: bool = False
+
+
+def files(*names):
+    return lambda places: {"directory": f"{places.match}/", "files": [{"name": name} for name in names]}
+
+
+def moved(folder):
+    """A second copy of a folder, beside it."""
+    other = folder.with_name(f"{folder.name} moved")
+    if not other.exists():
+        shutil.copytree(folder, other)
+    return other
+
+
+ROWS = {
+    "accept": Row("synthesized"),
+    "add_stage": Row("imported"),
+    "build_library": Row("imported", lambda places: {"rebuild": True}),
+    "cancel": Row("imported", changes=False),
+    "discard": Row("synthesized"),
+    "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
+    "import_clip": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.list_clips()),
+    "import_clips": Row("imported", lambda places: {"filepath": f"{places.clips}/walking_1_2.bvh"}),
+    "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
+    "list_clips": Row("imported", changes=False),
+    "mirror": Row("accepted"),
+    "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
+    "remove_player": Row("imported"),
+    "synthesize": Row("imported"),
+    "update": Row("synthesized"),
+}
+
+
+def operators():
+    """Names of all operators of the extension, from Blender itself."""
+    return sorted(name for name in dir(bpy.ops.beyond_mocap) if not name.startswith("_"))
+
+
+@pytest.fixture(scope="module")
+def session(extension):
+    module = importlib.import_module(f"{extension.__name__}.scene.session")
+    yield module
+    module.clear()
+
+
+@pytest.fixture(scope="module")
+def stages(extension, session, tmp_path_factory):
+    """The folders, and a file for each stage."""
+    top = tmp_path_factory.mktemp("worlds")
+    places = worlds.make_places(top)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    for name, go_on in worlds.STAGES.items():
+        go_on(places)
+        bpy.ops.wm.save_as_mainfile(filepath=str(top / f"{name}.blend"))
+    return top, places
+
+
+@pytest.fixture
+def begin(stages):
+    """begin(name) opens the file in which this operator can be called; returns folders and arguments."""
+    top, places = stages
+
+    def opened(name):
+        (places.clips / ".beyond_mocap").is_file() and (places.clips / ".beyond_mocap").unlink()
+        row = ROWS[name]
+        bpy.ops.wm.open_mainfile(filepath=str(top / f"{row.begin}.blend"))
+        row.prepare()
+        return places, row.arguments(places)
+
+    return opened
+
+
+def call(name, arguments):
+    """Call it as its button would; returns "" where it worked, else what it said."""
+    try:
+        result = press(getattr(bpy.ops.beyond_mocap, name), **arguments)
+    except RuntimeError as error:
+        return str(error)
+    return "" if result == {"FINISHED"} else f"{result} without a word"
+
+
+def linked_motions():
+    """What every linked object plays."""
+    return {thing.name: thing.animation_data and thing.animation_data.action and thing.animation_data.action.name
+            for thing in bpy.data.objects if thing.library}
+
+
+def test_every_operator_has_a_row():
+    assert sorted(ROWS) == operators()
+
+
+@pytest.mark.parametrize("name", sorted(ROWS))
+def test_where_all_is_well_it_works_and_is_one_step_of_undo(name, begin, capfd):
+    _, arguments = begin(name)
+    bpy.ops.ed.undo_push(message="before")
+    before = state()
+    said = call(name, arguments)
+    if ROWS[name].window:
+        assert said and not SAYS_NOTHING.search(said), said
+        assert state() == before
+        return
+    assert said == ""
+    after = state()
+    if not ROWS[name].changes:
+        assert after == before
+        return
+    assert after != before
+    bpy.ops.ed.undo()
+    assert state() == before
+    bpy.ops.ed.redo()
+    assert state() == after
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("wrong", worlds.WRONG, ids=lambda wrong: wrong.__name__)
+def test_in_an_awkward_situation_it_works_or_says_what_to_do(wrong, begin, capfd):
+    complaints = []
+    for name in sorted(ROWS):
+        places, arguments = begin(name)
+        arguments = wrong(places, arguments)
+        bpy.ops.ed.undo_push(message="before")
+        before, linked = state(), linked_motions()
+        capfd.readouterr()
+        said = call(name, arguments)
+        printed = "".join(capfd.readouterr())
+        if said and SAYS_NOTHING.search(said):
+            complaints.append(f"{name}: says {said!r}")
+        if said and state() != before:
+            now = state()
+            complaints.append(f"{name}: failed and changed {[key for key in now if now[key] != before[key]]}; said {said!r}")
+        if linked_motions() != linked:
+            complaints.append(f"{name}: wrote to what is linked from another file, which is lost with the next load")
+        if "Traceback" in printed and not said:
+            complaints.append(f"{name}: printed {printed}")
+    assert not complaints, "\n".join(complaints)
+
+
+@pytest.mark.parametrize("name", sorted(ROWS))
+def test_it_says_what_it_is(name):
+    operator = getattr(bpy.ops.beyond_mocap, name).get_rna_type()
+    cls = getattr(bpy.types, f"BEYOND_MOCAP_OT_{name}")
+    assert operator.name and operator.description and not operator.description.endswith(".")
+    assert cls.bl_options & {"REGISTER", "INTERNAL"}
+    assert not ROWS[name].changes or "UNDO" in cls.bl_options
+    unnamed = [known.identifier for known in operator.properties if known.identifier != "rna_type" and not known.is_hidden
+               and not (known.name and known.description)]
+    assert not unnamed
+
+
+def test_every_setting_says_what_it_is():
+    groups = [cls for base in (bpy.types.PropertyGroup, bpy.types.AddonPreferences) for cls in base.__subclasses__()
+              if cls.__module__.startswith("bl_ext.user_default.beyond_mocap") and cls.is_registered]
+    assert groups
+    silent = [f"{cls.__name__}.{known.identifier}" for cls in groups for known in cls.bl_rna.properties
+              if known.identifier not in {"rna_type", "name", "bl_idname"} and not known.is_hidden and not known.description]
+    assert not silent

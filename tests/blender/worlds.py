@@ -1,0 +1,217 @@
+"""Files in which every operator can be tried: how far a user has come, and what can then be wrong with the scene."""
+
+import pathlib
+import shutil
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
+CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside",
+         "receive_foot", "dribble_jogging")
+FOREIGN = "foreign.blend"
+
+
+class Places(NamedTuple):
+    """Folders of one round: where the clips are, where the tracks, a folder to write to, and one that cannot exist."""
+
+    clips: pathlib.Path
+    match: pathlib.Path
+    out: pathlib.Path
+    nowhere: pathlib.Path
+
+
+def make_places(top):
+    """The folders, filled."""
+    places = Places(*(top / name for name in ("clips", "match", "out")), top / "match" / "player1.csv" / "nowhere")
+    for folder in places[:3]:
+        folder.mkdir()
+    for name in CLIPS:
+        for suffix in (".bvh", ".txt"):
+            shutil.copy(SAMPLE / f"{name}{suffix}", places.clips)
+    time = np.arange(0.0, 4.01, 0.1)
+    for number, speed in enumerate((2.0, 1.3), 1):
+        x, y = speed * time, 0.3 * number * np.sin(time)
+        lines = ["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m"]
+        lines += [f"{t:.1f},{a:.3f},{b:.3f},{a + 0.6:.3f},{b:.3f},0.11" for t, a, b in zip(time, x, y)]
+        (places.match / f"player{number}.csv").write_text("\n".join(lines) + "\n")
+    (places.match / "player1.txt").write_text("0.5 1.5 walking\n2.4 kick right running low inside\n")
+    return places
+
+
+# How far a user has come; each begins where the one before it ends.
+
+
+def imported(places):
+    """A library's folder is chosen and two players are in the list."""
+    bpy.context.scene.beyond_mocap.library_folder = str(places.clips)
+    files = [{"name": "player1.csv"}, {"name": "player2.csv"}]
+    bpy.ops.beyond_mocap.import_tracking(directory=str(places.match), files=files)
+
+
+def synthesized(places):
+    """Both have a take, shown as a preview."""
+    bpy.ops.beyond_mocap.build_library()
+    bpy.ops.beyond_mocap.synthesize()
+
+
+def accepted(places):
+    """Both have a body that moves; the first one's is the active object, and another file has it too."""
+    bpy.ops.beyond_mocap.accept()
+    body = bpy.context.scene.beyond_mocap.players[0].body
+    bpy.data.libraries.write(str(places.out / FOREIGN), {body})
+    choose(body)
+
+
+STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted}
+
+
+def choose(*things):
+    """Select these and nothing else; the last one is active."""
+    for thing in bpy.context.view_layer.objects:
+        thing.select_set(False)
+    for thing in things:
+        thing.select_set(True)
+    bpy.context.view_layer.objects.active = things[-1] if things else None
+
+
+# What can be wrong. Each changes the scene, or the arguments of the call, which it gets and gives back.
+
+
+def nothing_selected(places, arguments):
+    choose()
+    return arguments
+
+
+def a_camera_selected(places, arguments):
+    camera = bpy.data.objects.new("Wrong", bpy.data.cameras.new("Wrong"))
+    bpy.context.scene.collection.objects.link(camera)
+    choose(camera)
+    return arguments
+
+
+def _foreign(places):
+    """A player's body, linked from another file."""
+    with bpy.data.libraries.load(str(places.out / FOREIGN), link=True) as (there, wanted):
+        wanted.objects = [name for name in there.objects if name == "player1"]
+    linked, = wanted.objects
+    bpy.context.scene.collection.objects.link(linked)
+    return linked
+
+
+def add_bones(body, bones):
+    """Bones with these names and parents, one above the other, and a key so that the armature moves."""
+    choose(body)
+    bpy.ops.object.mode_set(mode="EDIT")
+    for height, (name, parent) in enumerate(bones.items()):
+        bone = body.data.edit_bones.new(name)
+        bone.head, bone.tail = (0, 0, height), (0, 0, height + 1)
+        bone.parent = body.data.edit_bones[parent] if parent else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    body.pose.bones[0].keyframe_insert("location", frame=1)
+
+
+def _as_body(body):
+    """Make it the active object and the active player's body."""
+    choose(body)
+    settings = bpy.context.scene.beyond_mocap
+    if len(settings.players):
+        settings.players[settings.active_player].body = body
+
+
+def a_linked_armature(places, arguments):
+    _as_body(_foreign(places))
+    return arguments
+
+
+def a_library_override(places, arguments):
+    _as_body(_foreign(places).override_create(remap_local_usages=True))
+    return arguments
+
+
+def a_rig_without_legs(places, arguments):
+    body = bpy.data.objects.new("Legless", bpy.data.armatures.new("Legless"))
+    bpy.context.scene.collection.objects.link(body)
+    add_bones(body, {"Hips": None, "Spine": "Hips", "Head": "Spine"})
+    _as_body(body)
+    return arguments
+
+
+def missing_files(places, arguments):
+    """Every path of the settings and of the call leads nowhere."""
+    settings = bpy.context.scene.beyond_mocap
+    settings.library_folder = str(places.out / "no such folder")
+    for player in settings.players:
+        player.tracking_file = str(places.out / "no such file.csv")
+    return {name: _moved(value, places.out / "no such folder") for name, value in arguments.items()}
+
+
+def nothing_can_be_written(places, arguments):
+    """Every path of the call lies below a file, and so does the library's cache."""
+    cache = places.clips / ".beyond_mocap"
+    shutil.rmtree(cache, ignore_errors=True)
+    cache.write_text("not a folder")
+    return {name: _moved(value, places.nowhere) for name, value in arguments.items()}
+
+
+def _moved(value, folder):
+    """A path moved to a folder; anything else as it is."""
+    return str(folder / pathlib.Path(value).name) if isinstance(value, str) and "/" in value else value
+
+
+def a_film_s_frame_rate(places, arguments):
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 24, 1.001
+    return arguments
+
+
+def centimetres(places, arguments):
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    return arguments
+
+
+def edit_mode(places, arguments):
+    return _in_mode("EDIT", arguments)
+
+
+def pose_mode(places, arguments):
+    return _in_mode("POSE", arguments)
+
+
+def _in_mode(mode, arguments):
+    if bpy.context.object is None or bpy.context.object.type != "ARMATURE":
+        body = bpy.data.objects.new("Spare", bpy.data.armatures.new("Spare"))
+        bpy.context.scene.collection.objects.link(body)
+        add_bones(body, {"Hips": None})
+    bpy.ops.object.mode_set(mode=mode)
+    return arguments
+
+
+def everything_hidden(places, arguments):
+    for thing in bpy.context.view_layer.objects:
+        thing.hide_viewport = True
+        thing.hide_set(True)
+    return arguments
+
+
+def an_excluded_collection(places, arguments):
+    """The active collection, and that of the results, are excluded from the view layer."""
+    excluded = bpy.data.collections.new("Excluded")
+    bpy.context.scene.collection.children.link(excluded)
+    layers = bpy.context.view_layer.layer_collection.children
+    bpy.context.view_layer.active_layer_collection = layers["Excluded"]
+    for layer in layers:
+        layer.exclude = True
+    return arguments
+
+
+def bodies_deleted(places, arguments):
+    """What was made is deleted by hand, and the list still names it."""
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    return arguments
+
+
+WRONG = (nothing_selected, a_camera_selected, a_linked_armature, a_library_override, a_rig_without_legs, missing_files,
+         nothing_can_be_written, a_film_s_frame_rate, centimetres, edit_mode, pose_mode, everything_hidden,
+         an_excluded_collection, bodies_deleted)
