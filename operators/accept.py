@@ -55,6 +55,7 @@ Accepted results can be turned from one form into the other"""
         for player in unseen:
             preview.show(context, player, player.take, {})
         bodies = [preview.keep(context, player, self.form) for player in players]
-        context.view_layer.objects.active = bodies[-1]
+        if bodies[-1].name in context.view_layer.objects:  # else its collection is excluded
+            context.view_layer.objects.active = bodies[-1]
         kind = "one action each" if self.form == "ACTION" else "NLA strips"
         self.report({"INFO"}, f"accepted as {kind}: {', '.join(player.name for player in players)}")

@@ -57,7 +57,7 @@ class BeyondMocapClips(bpy.types.PropertyGroup):
     """The list of clips, and how it is looked through."""
 
     folder: StringProperty(description="The setting of the library's folder when the list was filled")
-    shown: CollectionProperty(type=BeyondMocapClip)
+    shown: CollectionProperty(type=BeyondMocapClip, description="The clips that fit what is looked for")
     active: IntProperty(name="Clip", min=0, description="The clip that is described below the list")
     total: IntProperty(description="Number of clips, shown or not")
     find: StringProperty(

@@ -11,6 +11,6 @@ def refuse(*things: bpy.types.ID | None) -> None:
     """InputError where one of these belongs to another file and is no library override."""
     for thing in things:
         if thing is not None and thing.library is not None:
-            found = f"is linked from {thing.library.filepath}"
+            found = f"linked from {thing.library.filepath}"
             step = "use Object > Library Override > Make, or Object > Relations > Make Local"
             raise InputError(thing.name, found, "one of this file", step)

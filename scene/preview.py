@@ -74,7 +74,7 @@ def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bp
 def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     """Plain names for what has been kept, now that what had them before is gone."""
     playing = channels.playing(player.body)[0]
-    if playing is not None:
+    if playing is not None and playing.get(MARK) and playing.library is None:
         playing.name = f"{player.name} take"
     room = bake.collection(context.scene)
     ribbon, ball = room.objects.get(bake.track_name(player)), room.objects.get(bake.BALL)
@@ -220,7 +220,10 @@ def _undress(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
 
 
 def _remove_armature(body: bpy.types.Object) -> None:
-    """Remove an armature that a preview made, with its action; one to which the user has tied things stays."""
+    """Remove an armature that a preview made, with its action; one to which the user has tied things stays, and so does
+    one of another file."""
+    if body.library is not None:
+        return
     channels.discard(body, MARK)
     if not body.children and body.get(MARK):
         _remove(body)
