@@ -35,6 +35,8 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         row = layout.row()
         row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, "active_player", rows=3)
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
+        if any(player.dot is None for player in settings.players):
+            layout.operator("beyond_mocap.place_players", icon="NLA")
         player = active_player(settings)
         if player is None:
             paragraph(layout, "Import a file with positions, or drop it into the view", "INFO")

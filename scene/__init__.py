@@ -13,6 +13,7 @@
 - `dots`        an Empty for each player that runs along the track; `clock` its seconds against frames
 - `strips`      a player's timeline as NLA strips on his dot; `lanes` reads, `lay_strips` writes those of any object,
                 `strip_lines` is what one of them says
+- `migrate`   what earlier versions have saved
 - `background`  long work in a thread
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -21,7 +22,7 @@ The classes are registered in the order of CLASSES: what others point to comes f
 
 import bpy
 
-from . import background, clips, dots, lanes, result, session, settings, strip_lines, video, watch
+from . import background, clips, dots, lanes, migrate, result, session, settings, strip_lines, video, watch
 
 CLASSES = (
     *result.CLASSES,
@@ -53,12 +54,14 @@ def register():
         setattr(getattr(bpy.types, owner), name, bpy.props.PointerProperty(type=cls))
     watch.register()
     video.register()
+    migrate.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
     background.stop()
     video.unregister()
+    migrate.unregister()
     watch.unregister()
     session.clear()
     for owner, name, _ in reversed(KEPT_WITH):

@@ -7,6 +7,7 @@ nothing, and the panel says which step to press.
 from __future__ import annotations
 
 import itertools
+import uuid
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ if TYPE_CHECKING:  # the library's modules are slow to import, and switching the
 KEPT_TAKES = 200
 KEPT_LIBRARIES = 3
 
+_session = uuid.uuid4().hex[:8]  # names of takes are saved in files, and another session counts from 1 too
 _numbers = itertools.count(1)
 _libraries: dict[tuple[str, float | None], "Library"] = {}
 _takes: dict[str, "Made"] = {}
@@ -45,7 +47,7 @@ def library(folder: str, unit: float | None) -> "Library | None":
 
 def keep_take(plan: "Plan", take: "Take", report: dict | None = None) -> str:
     """Keep a take with its plan and its report; returns its name."""
-    name = f"take-{next(_numbers)}"
+    name = f"take-{_session}-{next(_numbers)}"
     _keep(_takes, name, Made(plan, take, report), KEPT_TAKES)
     return name
 

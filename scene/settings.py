@@ -91,6 +91,9 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
 class BeyondMocapSettings(bpy.types.PropertyGroup):
     """All steps of one scene."""
 
+    version: IntProperty(
+        name="Version", options={"HIDDEN"}, description="Form of what is kept here, see scene/migrate.py; 0: not saved yet"
+    )
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Folder of BVH clips with their annotations; may be relative to this file",

@@ -39,6 +39,14 @@ def files(*names):
     return lambda places: {"directory": f"{places.match}/", "files": [{"name": name} for name in names]}
 
 
+def forget_dots():
+    """As in a file of the time before dots."""
+    for player in bpy.context.scene.beyond_mocap.players:
+        dot, player.dot = player.dot, None
+        bpy.data.objects.remove(dot)
+    bpy.context.view_layer.update()
+
+
 def moved(folder):
     """A second copy of a folder, beside it."""
     other = folder.with_name(f"{folder.name} moved")
@@ -58,6 +66,8 @@ ROWS = {
     "import_clips": Row("imported", lambda places: {"filepath": f"{places.clips}/walking_1_2.bvh"}),
     "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
     "list_clips": Row("imported", changes=False),
+    "place_players": Row("imported", prepare=lambda: forget_dots()),
+    "read_words": Row("imported", prepare=lambda: forget_dots()),
     "mirror": Row("accepted"),
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_player": Row("imported"),
