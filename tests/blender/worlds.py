@@ -10,6 +10,7 @@ import numpy as np
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
 CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside",
          "receive_foot", "dribble_jogging")
+PICTURE = "video_0001.png"
 FOREIGN = "foreign.blend"
 
 
@@ -37,6 +38,9 @@ def make_places(top):
         lines += [f"{t:.1f},{a:.3f},{b:.3f},{a + 0.6:.3f},{b:.3f},0.11" for t, a, b in zip(time, x, y)]
         (places.match / f"player{number}.csv").write_text("\n".join(lines) + "\n")
     (places.match / "player1.txt").write_text("0.5 1.5 walking\n2.4 kick right running low inside\n")
+    picture = bpy.data.images.new("Picture", 16, 9)
+    picture.filepath_raw, picture.file_format = str(places.match / PICTURE), "PNG"
+    picture.save()
     return places
 
 
@@ -64,7 +68,12 @@ def accepted(places):
     choose(body)
 
 
-STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted}
+def video(places):
+    """A reference video runs beside."""
+    bpy.ops.beyond_mocap.load_video(filepath=str(places.match / PICTURE))
+
+
+STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "video": video}
 
 
 def choose(*things):
