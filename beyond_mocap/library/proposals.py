@@ -1,0 +1,264 @@
+"""Words for a recording that nobody has annotated yet, proposed by rules from its motion alone.
+
+Locomotion follows from the pelvis's speed and from where the body faces while it travels. Actions are found by what
+stands out: a foot that swings faster than any stride of that speed would (a kick: the key moment is the foot's highest
+speed, the side the faster foot's), a body that falls freely for longer than a run does (a jump: its highest point), a
+head that strikes forward in the air (a header), a body that turns on the spot, one that gets up from the ground. There is
+no ball in a recording, so what only a ball shows (dribbling, receiving) is not proposed.
+
+`propose` is all that others call: another way of finding words takes its place behind the same call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import find_peaks
+
+from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, automatic_gaits
+from ..annotation.gaits import without_short_runs
+from ..motion import contacts, quaternion
+from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
+from ..motion.motion import Motion, forward_kinematics
+from ..motion.runs import runs
+from ..motion.striking import surfaces
+from .library import Library
+
+GAITS = (("standing", 0.0), ("walking", 0.4), ("jogging", 2.0), ("running", 4.0), ("sprinting", 5.5))
+"""Each gait and the speed in m/s from which on it holds, where no library says its own."""
+
+_WAYS = ("front", "left", "back", "right")
+_GAIT_SECONDS, _SHORTEST = 0.5, 0.5  # over which speed is averaged; of a stretch
+_FOOT_SECONDS = 0.012  # over which a foot's speed is averaged: a kick's peak is short
+# a kick's foot is faster against the pelvis than this, and than a stride at the pelvis's speed v: m/s, share of v, m/s
+_KICK, _STRIDE, _ABOVE_STRIDE = 6.5, 1.25, 3.5
+_KICK_BEFORE, _KICK_AFTER = 0.25, 0.25  # seconds of a kick around its key moment
+_RUNNING, _HIGH, _INSIDE = 2.0, 0.40, 0.65  # m/s of the pelvis; m above the floor; cosine of way and inner side
+_UPRIGHT = 0.5  # of the trunk's direction that points up
+_FLIGHT, _FALLS = 0.26, 0.6  # seconds without ground; of the pelvis's rise and fall as gravity would have it
+_NOD = 1.0  # m/s of the head against the chest, forward: jumps without a ball have up to 0.5
+_TURN_RATE, _TURN = np.radians(45.0), np.radians(50.0)
+_TURN_SPEED = 2.0  # m/s: a body that travels faster goes round a curve
+_LYING, _UP = 0.45, 0.85  # of the leg's length: the pelvis of a body on the ground, of one that has got up
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Words for a stretch of a recording, in its own frames; confidence: 0 to 1; why: what was seen, for a person."""
+
+    annotation: ClipAnnotation
+    confidence: float
+    why: str
+
+
+def propose(motion: Motion, gaits: Sequence[tuple[str, float]] = GAITS) -> tuple[Proposal, ...]:
+    """What a recording may show, ordered by its first frame. gaits: each gait's word and the m/s from which on it
+    holds, slow to fast (`gaits_of` a library). InputError where the skeleton has no legs."""
+    seen = _Seen.of(motion)
+    kicks = _kicks(seen)
+    low = _on_ground(seen)
+    found = [*_locomotion(seen, gaits), *kicks, *_jumps(seen, kicks), *_turns(seen), *low]
+    return tuple(sorted(found, key=lambda one: (one.annotation.start, one.annotation.end)))
+
+
+def gaits_of(library: Library) -> tuple[tuple[str, float], ...]:
+    """The gaits of a library with the speeds at which its own annotations change; InputError where it has none."""
+    return tuple(zip([gait.word for gait in library.gaits], [0.0, *library.gait_thresholds.tolist()]))
+
+
+def as_timeline(proposals: Sequence[Proposal], fps: float) -> Timeline:
+    """The proposals in the form in which words are edited: seconds from the recording's first frame."""
+    rows = [one.annotation for one in proposals]
+    spans = [Span(row.start / fps, max(row.end, row.start + 1) / fps, row.words) for row in rows]
+    return Timeline(tuple(spans), tuple(KeyMoment(row.key / fps, row.words) for row in rows if row.key is not None))
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What the rules look at. places (T, J, 3) m; speed (T,) m/s of the pelvis over the ground; path (T, 2) m/s its
+    velocity; facing (T,) radians; leg, floor: m; upright (T,): share of the trunk's direction that points up."""
+
+    motion: Motion
+    body: Humanoid
+    places: np.ndarray
+    world: np.ndarray
+    speed: np.ndarray
+    path: np.ndarray
+    facing: np.ndarray
+    leg: float
+    floor: float
+    upright: np.ndarray
+
+    @classmethod
+    def of(cls, motion: Motion) -> "_Seen":
+        body = identify(motion.skeleton)
+        places, world = forward_kinematics(motion)
+        path = _velocity(places[:, body.hips, :2], motion.fps, _GAIT_SECONDS / 4.0)
+        trunk = places[:, body.neck if body.neck is not None else body.chest] - places[:, body.hips]
+        upright = trunk[:, 2] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9)
+        facing = np.unwrap(heading_from_positions(motion.skeleton, places))
+        floor = contacts.ground_height(motion)
+        return cls(motion, body, places, world, np.linalg.norm(path, axis=1), path, facing,
+                   leg_length(motion.skeleton), floor, upright)
+
+    def row(self, start: float, end: float, words, key: int | None = None) -> ClipAnnotation:
+        last = len(self.motion) - 1
+        return ClipAnnotation(int(max(0, round(start))), int(min(last, round(end))), key, tuple(words))
+
+    def frames(self, seconds: float) -> float:
+        return seconds * self.motion.fps
+
+
+def _velocity(places: np.ndarray, fps: float, seconds: float) -> np.ndarray:
+    """(T, n) m/s of places (T, n) m, smoothed over about so many seconds."""
+    if len(places) < 2:
+        return np.zeros_like(places)
+    return np.gradient(gaussian_filter1d(places, max(seconds * fps, 0.5), axis=0, mode="nearest"), axis=0) * fps
+
+
+def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
+    """Stretches of one gait and one direction."""
+    fps, words = seen.motion.fps, [word for word, _ in gaits]
+    limits = np.array([speed for _, speed in gaits][1:])
+    middle = np.concatenate([[0.0], 0.5 * (limits[1:] + limits[:-1]), [limits[-1] + 1.0]]) if len(limits) else [0.0]
+    gait = automatic_gaits(seen.speed, fps, middle, limits, hysteresis=0.1, minimum=_SHORTEST)
+    off = quaternion.wrapped(np.arctan2(seen.path[:, 1], seen.path[:, 0]) - seen.facing)
+    quarter = without_short_runs(np.round(off / (np.pi / 2.0)).astype(int) % 4, int(_SHORTEST * fps))
+    way = np.where(np.array([words[g] == "standing" for g in gait]), -1, quarter)
+    kind = without_short_runs(gait * 5 + way + 1, int(_SHORTEST * fps))
+    edges = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
+    out = []
+    for start, stop in zip(edges, edges[1:]):
+        number, facing = divmod(int(kind[start]), 5)
+        said = (words[number],) if facing == 0 else (words[number], _WAYS[facing - 1])
+        speed = float(seen.speed[start:stop].mean())
+        near = float(np.min(np.abs(limits - speed))) if len(limits) else 1.0
+        sure = float(np.clip(0.5 + near, 0.5, 0.95))
+        out.append(Proposal(seen.row(start, stop - 1, said), sure, f"{speed:.1f} m/s"))
+    return out
+
+
+def _kicks(seen: _Seen) -> list[Proposal]:
+    """Feet that swing faster than a stride; of two within the same half second the faster."""
+    fps, found = seen.motion.fps, []
+    for side, limb in (("left", seen.body.left), ("right", seen.body.right)):
+        toe = seen.places[:, limb.toe_or_foot]
+        swing = _velocity(toe - seen.places[:, seen.body.hips], fps, _FOOT_SECONDS)
+        over = np.linalg.norm(swing, axis=1) - np.maximum(_KICK, _STRIDE * seen.speed + _ABOVE_STRIDE)
+        speed = np.linalg.norm(_velocity(toe, fps, _FOOT_SECONDS), axis=1)
+        for peak in find_peaks(np.pad(over, 1, constant_values=-np.inf), height=0.0)[0] - 1:
+            near = slice(max(0, peak - int(seen.frames(0.1))), peak + int(seen.frames(0.1)) + 1)
+            key = near.start + int(np.argmax(speed[near]))
+            if seen.upright[key] > _UPRIGHT:
+                found.append((float(over[peak]), key, side, float(speed[key])))
+    found.sort(reverse=True)
+    kept: list = []
+    for one in found:
+        if all(abs(one[1] - other[1]) > seen.frames(0.5) for other in kept):
+            kept.append(one)
+    return [_kick(seen, *one) for one in kept]
+
+
+def _kick(seen: _Seen, over: float, key: int, side: str, speed: float) -> Proposal:
+    limb = getattr(seen.body, side)
+    ankle, toe = seen.places[:, limb.foot], seen.places[:, limb.toe_or_foot]
+    words = ["kick", side, "running" if seen.speed[key] >= _RUNNING else "standing"]
+    height = float(ankle[key, 2] - seen.floor)
+    words.append("high" if height > _HIGH else "low")
+    words.append("inside" if _inner_share(seen, side, key) > _INSIDE else "top")
+    words.append(_WAYS[_kicked_way(seen, toe, key)])
+    start, end = key - seen.frames(_KICK_BEFORE), key + seen.frames(_KICK_AFTER)
+    return Proposal(seen.row(start, end, words, key), float(np.clip(0.5 + 0.15 * over, 0.5, 0.95)),
+                    f"{side} foot at {speed:.1f} m/s")
+
+
+def _inner_share(seen: _Seen, side: str, key: int) -> float:
+    """Cosine between where the foot goes and where its inner side looks: across the plane of shin and foot."""
+    ankle, tip = surfaces(seen.motion.skeleton, ("kick", side))[0].line(seen.places, seen.world)
+    shin = ankle[key] - seen.places[key, getattr(seen.body, side).lower_leg]
+    inner = np.cross(tip[key] - ankle[key], shin) * (1.0 if side == "right" else -1.0)
+    way = _velocity(ankle, seen.motion.fps, _FOOT_SECONDS)[key]
+    return float(way @ inner / max(np.linalg.norm(way) * np.linalg.norm(inner), 1e-9))
+
+
+def _kicked_way(seen: _Seen, toe: np.ndarray, key: int) -> int:
+    """Index into _WAYS: where the foot swings, against the body's facing."""
+    way = _velocity(toe, seen.motion.fps, _FOOT_SECONDS)[key]
+    off = quaternion.wrapped(np.arctan2(way[1], way[0]) - seen.facing[key])
+    return int(np.round(off / (np.pi / 2.0))) % 4
+
+
+def _jumps(seen: _Seen, kicks: list[Proposal]) -> list[Proposal]:
+    """Flights longer than a run's, and higher; those of kicks are kicks. With a head that strikes: headers."""
+    fps, hips = seen.motion.fps, seen.places[:, seen.body.hips, 2]
+    feet = seen.places[:, [seen.body.left.toe_or_foot, seen.body.right.toe_or_foot], 2]
+    rest = np.percentile(feet, 10, axis=0)
+    air = np.all(feet > rest + 0.05, axis=1)
+    found = []
+    for start, stop in runs(air):
+        if stop - start < seen.frames(_FLIGHT):
+            continue
+        key = start + int(np.argmax(hips[start:stop]))
+        rise = float(hips[key] - 0.5 * (hips[start] + hips[stop - 1]))
+        taken = any(abs(key - one.annotation.key) < seen.frames(0.5) for one in kicks)
+        if rise < _FALLS * 9.81 / 8.0 * ((stop - start) / fps) ** 2 or taken:
+            continue
+        head = _nod(seen, key)
+        words = ("header", "jump") if head > _NOD else ("jump",)
+        why = f"{(stop - start) / fps:.2f} s in the air" + (f", head at {head:.1f} m/s" if head > _NOD else "")
+        row = seen.row(start - seen.frames(0.4), stop + seen.frames(0.4), words, key)
+        found.append(Proposal(row, 0.6 if head > _NOD else 0.8, why))
+    return found
+
+
+def _nod(seen: _Seen, key: int) -> float:
+    """m/s of the head against the chest, forward, at its highest within a quarter of a second of `key`."""
+    if seen.body.head is None:
+        return 0.0
+    way = seen.places[:, seen.body.head] - seen.places[:, seen.body.chest]
+    speed = _velocity(way, seen.motion.fps, 0.03)[:, :2]
+    ahead = np.stack([np.cos(seen.facing), np.sin(seen.facing)], axis=1)
+    near = slice(max(0, key - int(seen.frames(0.25))), key + int(seen.frames(0.25)) + 1)
+    return float(np.max(np.sum(speed * ahead, axis=1)[near]))
+
+
+def _turns(seen: _Seen) -> list[Proposal]:
+    """Stretches in which the body turns by more than _TURN without travelling fast."""
+    rate = _velocity(seen.facing[:, None], seen.motion.fps, 0.1)[:, 0]
+    out = []
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        turning = (sign * rate > _TURN_RATE) & (seen.speed < _TURN_SPEED) & (seen.upright > _UPRIGHT)
+        for start, stop in runs(turning):
+            angle = abs(float(seen.facing[stop - 1] - seen.facing[start]))
+            if angle >= _TURN and stop - start >= seen.frames(0.25):
+                sure = float(np.clip(0.4 + angle / np.pi, 0.5, 0.95))
+                out.append(Proposal(seen.row(start, stop - 1, ("turning", side)), sure, f"{np.degrees(angle):.0f} degrees"))
+    return out
+
+
+def _on_ground(seen: _Seen) -> list[Proposal]:
+    """Lying, and getting up from it."""
+    height = seen.places[:, seen.body.hips, 2] - seen.floor
+    low, up = height < _LYING * seen.leg, height > _UP * seen.leg
+    out = []
+    for start, stop in runs(low):
+        if stop - start < seen.frames(0.3):
+            continue
+        out.append(Proposal(seen.row(start, stop - 1, ("ground",)), 0.7, "pelvis on the ground"))
+        risen = np.flatnonzero(up[stop:])
+        if len(risen) and risen[0] < seen.frames(4.0):
+            words = ("getting_up", "front" if _belly_down(seen, start, stop) else "back")
+            out.append(Proposal(seen.row(max(start, stop - seen.frames(1.0)), stop + risen[0], words), 0.7, "rises"))
+    return out
+
+
+def _belly_down(seen: _Seen, start: int, stop: int) -> bool:
+    """Whether the body lies on its front: across the hips times up the spine looks down."""
+    at = slice(start, stop)
+    body, places = seen.body, seen.places
+    across = places[at, body.left.upper_leg] - places[at, body.right.upper_leg]
+    spine = places[at, body.chest] - places[at, body.hips]
+    return float(np.mean(np.cross(across, spine)[:, 2])) < 0.0
