@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .errors import InputError
 from .lay_out import aimed, faced, footed, leaning, met, smoothed, touches, towards_ball
 from .library.library import Library
 from .motion import quaternion
@@ -38,7 +39,8 @@ from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch, shown
 from .synthesis.offer import SLOT
 from .synthesis.path_search import Between, PathSearch
-from .synthesis.touched import Stretch, kept_keys, lies_elsewhere, stretches, to_search
+from .synthesis.touched import Stretch, asked_anew, joined, kept_keys, lies_elsewhere, stretches, to_search
+from .synthesis.used import Used, used_in
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
     Progress, key_result, sources_shown, synthesize, with_made_gaits, with_warnings, words_shown,
@@ -58,6 +60,16 @@ OFFSET_SECONDS = 1.0
 """Seconds within a stretch over which the root forgets how far off the laid-out place the old one was at its end."""
 
 
+@dataclass(frozen=True)
+class Anew:
+    """A stretch, seconds on the track's clock, of which another solution is wanted, and footage to do without where
+    that can be (`shown_footage` of what is shown there now)."""
+
+    start: float
+    end: float
+    used: tuple[Used, ...] = ()
+
+
 def resynthesize(
     library: Library,
     plan: Plan,
@@ -65,19 +77,45 @@ def resynthesize(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
     hurry: Callable[[], bool] | None = None,
+    anew: Anew | None = None,
 ) -> Take:
     """The take `before` after its plan has become `plan`: searched and built anew only where the change touches it.
 
     A whole synthesis where the change is not one of words, track or ball (another method, rate, length or choice),
     where `before` was made from another library or by another method than "path", or where all of it is touched. The
-    same library, plan and take give the same bits. progress, cancelled, hurry and what is raised: as for `synthesize`.
+    same library, plan and take give the same bits. anew: a stretch of which another solution is wanted, whether or not
+    its plan has changed; InputError where it lies outside the take, or for another method than "path". progress,
+    cancelled, hurry and what is raised: as for `synthesize`.
     """
     from threadpoolctl import threadpool_limits
 
     report = progress or (lambda fraction, text: None)
+    if anew is not None:
+        _check(plan, before, anew)
     with threadpool_limits(limits=1):
-        taken = _updated(library, plan, before, report, cancelled, hurry) if _comparable(plan, before) else None
-    return synthesize(library, plan, progress, cancelled, hurry) if taken is None else taken
+        comparable = _comparable(plan, before)
+        taken = _updated(library, plan, before, report, cancelled, hurry, anew) if comparable else None
+    used = anew.used if anew is not None else ()
+    return synthesize(library, plan, progress, cancelled, hurry, used) if taken is None else taken
+
+
+def shown_footage(library: Library, take: Take, start: float, end: float) -> tuple[Used, ...]:
+    """The footage that a take of method "path" shows from second `start` to second `end`, for `Anew`; nothing where the
+    take was made from another library."""
+    library = _library_of_both(library, take.plan, take, lambda fraction, text: None)
+    if take.edit is None or not _made_from(library, take, len(take.edit)):
+        return ()
+    first, last = (int(round((second - take.start_time) * library.fps)) for second in (start, end))
+    return used_in(library, take.edit, max(0, first), min(len(take.edit), max(last, first + 1)))
+
+
+def _check(plan: Plan, before: Take, anew: Anew) -> None:
+    low, high = before.start_time, before.start_time + before.motion.duration
+    if plan.method != "path":
+        raise InputError("a stretch made anew", f"method {plan.method}", "method path", "synthesize the whole take")
+    if not low <= anew.start < anew.end <= high + 0.5 / before.motion.fps:
+        found, expected = f"{anew.start:g} to {anew.end:g} s", f"a stretch within {low:g} to {high:g} s"
+        raise InputError("a stretch made anew", found, expected)
 
 
 def _comparable(plan: Plan, before: Take) -> bool:
@@ -88,7 +126,9 @@ def _comparable(plan: Plan, before: Take) -> bool:
     return same_choices and np.array_equal(plan.track.times[[0, -1]], old.track.times[[0, -1]])
 
 
-def _updated(library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry) -> Take | None:
+def _updated(
+    library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
+) -> Take | None:
     """The take, or None where it has to be made as a whole."""
     clock = [time.perf_counter()]
     recordings, library = library, _library_of_both(library, plan, before, report)
@@ -96,6 +136,10 @@ def _updated(library: Library, plan: Plan, before: Take, report: Progress, cance
     if not _made_from(library, before, len(old)):
         return None
     again = to_search(library, before.edit, old, new, SLOT)
+    if anew is not None:
+        frames = [int(round((second - before.start_time) * library.fps)) for second in (anew.start, anew.end)]
+        again = joined([*again, asked_anew(library, before.edit, new, *frames)], int(round(HAND_OVER * library.fps)))
+    used = anew.used if anew is not None else ()
     if again == [(0, len(new))]:
         return None
     edit = replace(before.edit, keys=_outside(kept_keys(before.edit, old, new), new, again))
@@ -104,7 +148,7 @@ def _updated(library: Library, plan: Plan, before: Take, report: Progress, cance
         def tell(fraction, text, number=number):
             report(0.8 * (number + fraction) / len(again), text)
 
-        search = PathSearch(library, new, balanced(plan.alpha), tell, cancelled, hurry, Between(edit, first, end))
+        search = PathSearch(library, new, balanced(plan.alpha), tell, cancelled, hurry, Between(edit, first, end), used)
         edit = search.run()
         hurried += [search.hurried] if search.hurried is not None else []
     clock.append(time.perf_counter())

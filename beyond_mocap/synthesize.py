@@ -38,6 +38,7 @@ from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch
 from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
+from .synthesis.used import Used
 from .synthesis.wanted import Wanted, wanted
 from .take import BallPath, KeyResult, Take
 
@@ -63,13 +64,15 @@ def synthesize(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
     hurry: Callable[[], bool] | None = None,
+    used: tuple[Used, ...] = (),
 ) -> Take:
     """A player's motion for `plan` out of `library`.
 
     progress(fraction, text) is called now and then. Raises NotInLibrary for a key moment that no clip can serve (unless
     plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so,
     method "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on;
-    before anything is found, and by the other methods, that is Cancelled too. The same library, plan and numpy give the
+    before anything is found, and by the other methods, that is Cancelled too. used: footage that another solution is to
+    do without where it can (method "path"; the others differ by their seed). The same library, plan and numpy give the
     same bits: linear algebra is held to one thread, since more add up in another order.
     """
     if plan.method not in METHODS:
@@ -77,14 +80,14 @@ def synthesize(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled, hurry)
+        return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled, hurry, used)
 
 
-def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry) -> Take:
+def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
     recordings, library = library, with_made_gaits(library, plan, report)
     clock = [time.perf_counter()]
     order = wanted(library, plan)
-    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry)
+    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry, used)
     clock.append(time.perf_counter())
     report(0.8, "Constructing")
     track = order.track if plan.fps == library.fps else sample(plan.track, plan.fps, plan.track_window)
@@ -123,9 +126,11 @@ def _lacks(library: Library, plan: Plan) -> bool:
     return library.lacks(track.speed, np.interp(moments, track.times, track.speed))
 
 
-def _search(library: Library, plan: Plan, order: Wanted, report: Progress, cancelled, hurry) -> Found:
+def _search(
+    library: Library, plan: Plan, order: Wanted, report: Progress, cancelled, hurry, used: tuple[Used, ...]
+) -> Found:
     if plan.method == "path":
-        search = PathSearch(library, order, balanced(plan.alpha), report, cancelled, hurry)
+        search = PathSearch(library, order, balanced(plan.alpha), report, cancelled, hurry, used=used)
         return Found(search.run(), hurried=search.hurried)
     stops = [stop for stop in (cancelled, hurry) if stop]
     search = BlockSearch(library, order, plan.alpha, report, lambda: any(stop() for stop in stops))

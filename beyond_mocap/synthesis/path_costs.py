@@ -13,6 +13,7 @@ import numpy as np
 from ..annotation.gaze import wanted_offset
 from ..library.library import Library
 from .offer import RATES, SLOT, Offer, Traits
+from .used import Used, price
 from .wanted import Wanted
 
 
@@ -56,8 +57,12 @@ AVOIDED = 1000.0
 class PathCosts:
     """The costs of one order on one library of N frames."""
 
-    def __init__(self, library: Library, wanted: Wanted, weights: Weights = Weights()):
+    def __init__(
+        self, library: Library, wanted: Wanted, weights: Weights = Weights(), used: tuple[Used, ...] = ()
+    ):
+        """used: footage that another solution is to do without where it can."""
         self.library, self.wanted, self.weights = library, wanted, weights
+        self.price = price(library, used) if used else None
         self.frames, self.offer = library.frames, Offer.of(library, wanted.allowed)
         self.wanted_offset = wanted_offset(wanted.track)
 
@@ -101,7 +106,8 @@ class PathCosts:
         cost += (w.rate * np.abs(RATES - 1.0)).astype(np.float32)[what.number]
         cost += w.words * what.missing
         cost += np.float32(w.unasked) * what.unasked
-        return cost + np.float32(w.made) * what.made
+        cost += np.float32(w.made) * what.made
+        return cost if self.price is None else cost + self.price[what.frame]
 
     def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held
@@ -119,6 +125,7 @@ class PathCosts:
         off = np.abs(rate - 1.0)
         cost += self.weights.rate * off + self.weights.stretch * np.maximum(off - 0.15, 0.0) + self.weights.held * held
         cost += self.weights.made_key * self.offer.made[self.inside(start)]
+        cost += 0.0 if self.price is None else self.price[middle]
         cost *= length / SLOT
         return cost + AVOIDED * self._avoided_between(first, end, a, b) if self.wanted.avoided else cost
 

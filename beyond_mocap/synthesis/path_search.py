@@ -22,6 +22,7 @@ from .key_fit import ball_at, misfit, strikes
 from .offer import RATES, SLOT
 from .path_costs import PathCosts, Weights
 from .slots import key_pieces, slot_edges, slot_of
+from .used import Used
 from .wanted import Wanted
 
 MEMORY_SLOTS = 15
@@ -74,7 +75,7 @@ class States:
 class PathSearch:
     """One search; `run()` gives the edit list.
 
-    between: search this stretch only and keep the rest. hurry: when it says so the rest is searched by a narrow beam,
+    between: search this stretch only and keep the rest. used: footage to do without where that can be. hurry: when it says so the rest is searched by a narrow beam,
     and `hurried` is the frame from which on, else None; before the first slot is filled it ends the search as
     `cancelled` does.
     """
@@ -88,10 +89,11 @@ class PathSearch:
         cancelled: Callable[[], bool] | None = None,
         hurry: Callable[[], bool] | None = None,
         between: Between | None = None,
+        used: tuple[Used, ...] = (),
     ):
         self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
         self.frames = library.frames
-        self.costs = PathCosts(library, wanted, weights)
+        self.costs = PathCosts(library, wanted, weights, used)
         self.offer = self.costs.offer
         self.edges = slot_edges(library, wanted, *((between.first, between.end) if between else ()))
         self.pieces = key_pieces(library, wanted, self.edges)

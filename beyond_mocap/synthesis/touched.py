@@ -19,6 +19,7 @@ from .edit_list import EditList, PlacedKey
 from .wanted import Wanted, WantedKey, needed
 
 RUN_UP = 1.0
+SHORTEST = 0.8  # s
 SPEED, TURN, FACING, PLACE, BALL = 0.05, 0.05, 0.3, 0.001, 0.15
 NEAR = 6
 
@@ -80,16 +81,26 @@ def to_search(library: Library, edit: EditList, before: Wanted, after: Wanted, s
     stays = [_played(library, after.keys[key.wanted], key) for key in kept_keys(edit, before, after)]
     run_up = int(round(RUN_UP * library.fps))
     found = [_widened(core, run_up, stays, edit) for core in stretches(touched, run_up)]
-    return _joined(found, run_up)
+    return joined(found, run_up)
+
+
+def asked_anew(library: Library, edit: EditList, after: Wanted, first: int, end: int) -> Stretch:
+    """The stretch (first, end) that has to be searched where just these frames are to be another solution: no shorter
+    than it takes to leave and come back, ending neither within a key moment nor just beside a seam."""
+    missing = max(0, int(round(SHORTEST * library.fps)) - (end - first))
+    first, end = max(0, first - missing // 2), min(len(edit), end + missing - missing // 2)
+    same = kept_keys(edit, after, after)
+    return _widened((first, end), 0, [_played(library, after.keys[key.wanted], key) for key in same], edit)
 
 
 def stretches(touched: np.ndarray, gap: int) -> list[Stretch]:
     """(first, end) of the stretches in which `touched` (T,) is true, those less than `gap` frames apart taken
     together."""
-    return _joined(runs(touched), gap)
+    return joined(runs(touched), gap)
 
 
-def _joined(found: list[Stretch], gap: int) -> list[Stretch]:
+def joined(found: list[Stretch], gap: int) -> list[Stretch]:
+    """Stretches in the order of time, those less than `gap` frames apart taken together."""
     out: list[Stretch] = []
     for first, end in sorted(found):
         if out and first - out[-1][1] < gap:
