@@ -69,12 +69,10 @@ class BackgroundVerb(Verb):
     `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled,
     hurry)`, a static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called
     from a script (`execute`) all three run at once; pressed as a button (`invoke`) the work goes to a thread. ESC
-    cancels it; where the work `keeps` what it has found, the first ESC lets it come to an early end, and the second
-    cancels.
+    cancels it.
     """
 
     kind = ""
-    keeps = False
 
     def do(self, context):
         """Order, work and apply in one go."""
@@ -98,7 +96,7 @@ class BackgroundVerb(Verb):
         """Collect the order and hand it to a thread."""
         order, work = self.order(context), self.work
         self.scene = context.scene.session_uid
-        self.job = background.Job(self.kind, lambda *asking: work(order, *asking), self.keeps)
+        self.job = background.Job(self.kind, lambda *asking: work(order, *asking))
 
     def started(self, context):
         """Begin to poll."""
@@ -112,7 +110,7 @@ class BackgroundVerb(Verb):
     def modal(self, context, event):
         """Poll, pass on all other events, and write the result once it is there."""
         if event.type == "ESC" and event.value == "PRESS":
-            self.job.end()
+            self.job.cancel()
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
         ended = self.job.poll()
@@ -143,8 +141,7 @@ class BackgroundVerb(Verb):
         text = self.job.text or f"{self.bl_label} ..."
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
-        keys = "ESC: end here" if self.keeps and not self.job.ending else "ESC: cancel"
-        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   {keys}")
+        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
         self.redraw(context)
 
     def ended(self, context):

@@ -20,7 +20,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         row.scale_y = 1.3
         row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
-        self.progress(context, "synthesis")
+        self.queue(context)
         header, body = layout.panel("beyond_mocap_synthesis_more", default_closed=True)
         header.label(text="Choices")
         if body:
@@ -31,6 +31,23 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
             for name in ("mirror", "nearest", "rate"):
                 body.prop(settings, name)
             self.fine_tuning(body, settings)
+
+    def queue(self, context):
+        """What is being made, how far it is, and who waits."""
+        running = context.window_manager.beyond_mocap_work
+        if running.kind != "synthesis":
+            return
+        box = self.layout.box().column(align=True)
+        box.progress(factor=running.fraction, text=running.text)
+        row = box.row(align=True)
+        early = row.row(align=True)
+        early.enabled = not running.ending
+        early.operator("beyond_mocap.cancel", text="Finish Early", icon="CHECKMARK").keep = True
+        row.operator("beyond_mocap.cancel", text="Cancel", icon="X")
+        for name in running.waiting.splitlines():
+            row = box.row(align=True)
+            row.label(text=f"{name} waits", icon="TIME")
+            row.operator("beyond_mocap.cancel", text="", icon="X", emboss=False).player = name
 
     def fine_tuning(self, layout, settings):
         """What seldom needs another value, closed at first."""

@@ -84,7 +84,7 @@ def prepare(bpy) -> None:
 def synthesize(load, settings, steps) -> list[dict]:
     """Library and takes, kept for Accept; returns the players' reports."""
     plans, session = load("scene.plans"), load("scene.session")
-    order, recipe = load("operators.synthesize"), load("beyond_mocap.synthesize")
+    order, recipe = load("operators.written"), load("beyond_mocap.synthesize")
     steps.enter("Library")
     begun = time.perf_counter()
     clips = load("beyond_mocap.library.library").build(settings.library_folder, progress=steps.progress)

@@ -7,6 +7,7 @@ what a job brings is dropped.
 from __future__ import annotations
 
 import queue
+import sys
 import threading
 from typing import Any, Callable
 
@@ -15,6 +16,8 @@ from ..beyond_mocap.errors import Cancelled
 Work = Callable[[Callable[[float, str], None], Callable[[], bool], Callable[[], bool]], Any]
 
 _newest: dict[str, "Job"] = {}
+_usual = sys.getswitchinterval()  # seconds for which a thread keeps the interpreter to itself
+POLITE = 0.0005  # the same while work runs: Blender's own thread, which draws, asks for it a dozen times a picture
 
 
 class Job:
@@ -31,7 +34,7 @@ class Job:
         stop(kind)
         self.kind, self.keeps = kind, keeps
         self.fraction, self.text = 0.0, ""
-        self.result, self.error = None, None
+        self.result, self.error, self._ended = None, None, False
         self._stop, self._soon, self._news = threading.Event(), threading.Event(), queue.SimpleQueue()
         _newest[kind] = self
         threading.Thread(target=self._run, args=(work,), name=f"beyond-mocap {kind}", daemon=True).start()
@@ -44,6 +47,7 @@ class Job:
                 self.fraction, self.text = value
                 continue
             setattr(self, what, value)
+            self._ended = True
             return True
         return False
 
@@ -64,6 +68,11 @@ class Job:
         return self._soon.is_set()
 
     @property
+    def ended(self) -> bool:
+        """Whether `poll` has found its end."""
+        return self._ended
+
+    @property
     def stale(self) -> bool:
         """Whether nobody waits for this job's result any more."""
         return self._stop.is_set() or _newest.get(self.kind) is not self
@@ -72,12 +81,16 @@ class Job:
         self._news.put(("progress", (fraction, text)))
 
     def _run(self, work: Work) -> None:
+        sys.setswitchinterval(POLITE)
         try:
             result = work(self._tell, self._stop.is_set, self._soon.is_set)
         except BaseException as error:  # carried to the main thread, which reports or raises it
             self._news.put(("error", error))
         else:
             self._news.put(("result", result))
+        finally:
+            if all(job is self or job.ended for job in _newest.values()):
+                sys.setswitchinterval(_usual)
 
 
 def stop(kind: str | None = None) -> None:

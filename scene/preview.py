@@ -14,6 +14,7 @@ from .result import BeyondMocapResult
 from .set_aside import bring_back, drop, play_as_before, put_aside
 from .settings import BeyondMocapPlayer
 
+STEPS = ("recipe", "made_of")
 LINES = ("take", "quality", "moments", "warnings")
 
 
@@ -33,7 +34,7 @@ def check(player: BeyondMocapPlayer) -> None:
 
 def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines: dict[str, str]) -> bpy.types.Object:
     """Put the session's take of that name onto the player's armature, made where it is missing, and set aside what was
-    there; lines: `quality`, `moments` and `warnings` of the take. Returns the armature."""
+    there; lines: `quality`, `moments`, `warnings`, `recipe` and `made_of` of the take. Returns the armature."""
     made, result = session.made(take), player.result
     check(player)
     if result.state != "NONE" and not shown(context.scene, player):
@@ -42,7 +43,7 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
         _remember(context, player, made)
     player.take = take
     for name, text in lines.items():
-        setattr(player, name, text)
+        setattr(result if name in STEPS else player, name, text)
     with _shared_length(context.scene):
         body = bake.player(context, player, made)
     blocks.note(channels.playing(body)[0], made.take, context.scene)
@@ -99,6 +100,8 @@ def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
         player.body = result.body
     for name in LINES:
         setattr(player, name, getattr(result, name))
+    for name in STEPS:
+        setattr(result, name, getattr(result, f"{name}_before"))
     _settle(player)
     result.state = "ACCEPTED" if accepted else "NONE"
     share(context)
@@ -182,6 +185,8 @@ def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: sessi
     result.body = body
     for name in LINES:
         setattr(result, name, getattr(player, name))
+    for name in STEPS:
+        setattr(result, f"{name}_before", getattr(result, name))
     fits = body is not None and bake.fits(body, made.take, context.scene)
     result.mesh_made = not fits or not any(child.type == "MESH" for child in body.children)
     ribbon = room.objects.get(bake.track_name(player))
@@ -198,7 +203,8 @@ def _settle(player: BeyondMocapPlayer) -> None:
     track, result.track = result.track, None
     if track is not None and not track.users:
         bpy.data.curves.remove(track)
-    for name in ("body", "mesh_made", "track_made", "was_accepted", *LINES):
+    result.variants.clear()
+    for name in ("body", "mesh_made", "track_made", "was_accepted", *LINES, *(f"{name}_before" for name in STEPS)):
         result.property_unset(name)
 
 

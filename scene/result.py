@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import (
-    BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty,
+    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty,
 )
 
 STATES = (
@@ -29,10 +29,24 @@ class BeyondMocapBefore(bpy.types.PropertyGroup):
     stance: StringProperty(description="How it stood, object and bones, as JSON")
 
 
+class BeyondMocapVariant(bpy.types.PropertyGroup):
+    """One of several takes to choose from; its name is the take's."""
+
+    quality: StringProperty(description="Lines about the take")
+    moments: StringProperty(description="Lines about its key moments")
+    warnings: StringProperty(description="Warnings about it")
+    recipe: StringProperty(description="The steps that make it again, as JSON")
+    summary: StringProperty(description="Its figures in a few words")
+
+
 class BeyondMocapResult(bpy.types.PropertyGroup):
     """A player's result. The fields behind `state` say what was there before the preview."""
 
     state: EnumProperty(name="Result", items=STATES, default="NONE", description="How far this player's result is")
+    recipe: StringProperty(description="The steps that make the newest take again, as JSON")
+    made_of: StringProperty(description="Fingerprints of what the newest take was made of, as JSON")
+    hand_keys: IntProperty(description="How many hand-made keys the newest take has kept")
+    variants: CollectionProperty(type=BeyondMocapVariant)
     body: PointerProperty(type=bpy.types.Object, description="The player's body before the preview")
     motion: PointerProperty(type=BeyondMocapBefore, description="What the body played before the preview")
     track: PointerProperty(type=bpy.types.Curve, description="The track on the ground before the preview")
@@ -43,6 +57,8 @@ class BeyondMocapResult(bpy.types.PropertyGroup):
     quality: StringProperty(description="Lines about that take")
     moments: StringProperty(description="Lines about that take's key moments")
     warnings: StringProperty(description="Warnings about that take")
+    recipe_before: StringProperty(description="The steps that make that take again")
+    made_of_before: StringProperty(description="Fingerprints of what that take was made of")
 
 
 class BeyondMocapShared(bpy.types.PropertyGroup):
@@ -54,4 +70,4 @@ class BeyondMocapShared(bpy.types.PropertyGroup):
     end_set: IntProperty(description="The scene's last frame as previews have set it; 0 where they have not")
 
 
-CLASSES = (BeyondMocapBefore, BeyondMocapResult, BeyondMocapShared)
+CLASSES = (BeyondMocapBefore, BeyondMocapVariant, BeyondMocapResult, BeyondMocapShared)

@@ -194,6 +194,8 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
     kind: StringProperty(description="Name of the running step; empty while nothing runs")
     text: StringProperty(description="What it is doing")
     fraction: FloatProperty(min=0.0, max=1.0, description="How far it is")
+    waiting: StringProperty(description="The players that wait for their turn, a line each")
+    ending: BoolProperty(description="Whether it has been asked to finish early")
 
 
 def absolute(path: str) -> str:

@@ -182,35 +182,6 @@ def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, 
     assert np.array_equal(before[1].take.motion.rotations, after[1].take.motion.rotations)
 
 
-def test_in_a_hurry_players_that_are_not_begun_stay_as_they_are(extension, ready, core, session):
-    module = importlib.import_module(f"{extension.__name__}.operators.synthesize")
-    plans = importlib.import_module(f"{extension.__name__}.scene.plans")
-    bpy.ops.beyond_mocap.build_library()
-    built = session.library(ready.library_folder, None)
-    asked = tuple((player.name, plans.plan_of(ready, player)[0], "", (), None) for player in ready.players)
-    told = []
-
-    def work(fraction_of_hurry):
-        told.clear()
-        order = module.Order(asked, ready.library_folder, None, built)
-        in_a_hurry = lambda: max(told, default=0.0) >= fraction_of_hurry  # noqa: E731
-        return module.SynthesisVerb.work(order, lambda fraction, text: told.append(fraction), lambda: False, in_a_hurry)
-
-    class Verb(module.SynthesisVerb):
-        def report(self, kind, text):
-            said.append((kind, text))
-
-    said = []
-    result = work(0.2)
-    assert (len(result.made), result.asked) == (1, 2)
-    Verb().apply(bpy.context.scene, result)
-    assert said == [({"WARNING"}, "ended early, 1 left as before; players synthesized: 1; Accept keeps them")]
-    assert "cut short" in "".join(result.made[0][2].warnings)
-    assert len(work(2.0).made) == 2
-    with pytest.raises(core("errors").Cancelled):
-        work(0.0)
-
-
 def test_accepting_again_replaces_the_take_only(extension, ready, session):
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.accept()

@@ -1,0 +1,269 @@
+"""One player after the other: the verbs that make takes share a queue, a thread and one modal operator.
+
+Called from a script everything is made at once. Pressed as a button, players queue: the first verb that is pressed works the
+queue off, those pressed meanwhile only add to it. Each player's result is written as it arrives, with an undo step of
+its own, and only where the player still asks for what it was made of.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import bpy
+
+from ..beyond_mocap.errors import BeyondMocapError
+from ..scene import background, orders, plans, queue, session
+from .verb import Verb
+from .written import written
+
+KIND = "synthesis"
+BETWEEN = 0.2  # seconds between two pictures of the progress
+TRIES = 3  # how often a player whose wishes keep changing is begun anew
+HOLDING = ("TRANSFORM_OT", "PAINT_OT", "SCULPT_OT", "POSE_OT", "VIEW3D_OT_select", "MESH_OT", "ARMATURE_OT")
+
+
+class TurnsVerb(Verb):
+    """A verb that makes takes. `wanted(context)`: pairs of a player and `orders.How`."""
+
+    @classmethod
+    def poll(cls, context):
+        """A library and a player."""
+        settings = context.scene.beyond_mocap
+        if not settings.library_folder:
+            cls.poll_message_set("Choose the library's folder in step 1 first")
+            return False
+        cls.poll_message_set("Import tracking and tick a player in step 2 first")
+        return any(player.use for player in settings.players)
+
+    def wanted(self, context):
+        """Every ticked player, as a whole."""
+        return [(player, orders.How()) for player in plans.chosen(context.scene.beyond_mocap)]
+
+    def entries(self, context) -> list[queue.Entry]:
+        """What is wanted, as orders."""
+        settings = context.scene.beyond_mocap
+        found = []
+        for player, how in self.wanted(context):
+            order = orders.order_of(settings, player, how)
+            found.append(queue.Entry(context.scene.session_uid, player.name, how, order, order.fingerprint))
+        return found
+
+    def do(self, context):
+        """All players in one go: first everything is made, then everything is written."""
+        window = context.window_manager
+        window.progress_begin(0, 100)
+        try:
+            entries = self.entries(context)
+            made = []
+            for number, entry in enumerate(entries):
+                def tell(done, text, number=number):
+                    window.progress_update(int(100 * (number + done) / len(entries)))
+
+                library = made[0].library if made else _library(entry)
+                made.append(orders.work(entry.order, library, tell, lambda: False, lambda: False))
+        finally:
+            window.progress_end()
+        for entry, result in zip(entries, made):
+            written(context, context.scene.beyond_mocap.players[entry.player], entry.order, result)
+        self.report({"INFO"}, f"made: {', '.join(entry.player for entry in entries)}; Accept keeps, Discard undoes")
+
+    def invoke(self, context, event):
+        """Let the players wait, and work the queue off where nobody does it yet."""
+        if bpy.app.background:
+            return self.execute(context)
+        try:
+            entries = self.entries(context)
+        except (BeyondMocapError, OSError) as error:
+            return self.failed(str(error))
+        for entry in entries:
+            queue.add(entry)
+        running = context.window_manager.beyond_mocap_work
+        if running.kind == KIND:
+            running.waiting = "\n".join(queue.names())
+            self.report({"INFO"}, f"waiting: {', '.join(queue.names())}")
+            return {"CANCELLED"}  # nothing has changed yet, so no step for undo
+        windows = context.window_manager
+        self.entry, self.job, self.told, self.wrote = None, None, [], 0
+        self.seen, self.drawn = None, 0.0
+        self.timer = windows.event_timer_add(0.05, window=context.window)
+        windows.progress_begin(0, 100)
+        windows.modal_handler_add(self)
+        self.show(context, "Beginning")
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Poll, pass on all other events, write what has arrived and begin the next."""
+        if event.type == "ESC" and event.value == "PRESS":
+            queue.clear()
+            if self.job is not None:
+                self.job.cancel()
+        elif event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if self.job is not None and not self.job.poll() and not self.job.ended and not self.job.stale:
+            self.show(context, self.job.text)
+            return {"RUNNING_MODAL"}
+        if self.job is not None and not self.arrived(context):
+            return {"RUNNING_MODAL"}
+        self.next(context)
+        if self.job is not None:
+            return {"RUNNING_MODAL"}
+        return self.over(context)
+
+    def next(self, context):
+        """Begin the next one that waits and still asks."""
+        self.job = None
+        while self.job is None and (entry := queue.take()) is not None:
+            self.last = False
+            scene = _scene(entry)
+            player = _found(scene, entry) if scene is not None else None
+            if player is None:
+                self.tell(f"{entry.player} is not in the list any more and was left out")
+                continue
+            try:
+                entry.order = orders.order_of(scene.beyond_mocap, player, entry.how)
+            except (BeyondMocapError, OSError) as error:
+                self.tell(f"{entry.player}: {error}", "ERROR")
+                continue
+            entry.player, entry.fingerprint = player.name, entry.order.fingerprint
+            self.entry, order, library = entry, entry.order, _library(entry)
+            self.job = background.Job(KIND, lambda *asking: orders.work(order, library, *asking), keeps=True)
+            self.show(context, "Beginning")
+
+    def arrived(self, context) -> bool:
+        """Write what the thread brings; False where that has to wait a moment."""
+        job, entry, self.last = self.job, self.entry, False
+        if background.cancelled(job):
+            self.tell(f"{entry.player}: cancelled, nothing has changed")
+            return True
+        if job.error is not None:
+            if not isinstance(job.error, (BeyondMocapError, OSError)):
+                self.close(context)
+                raise job.error
+            self.tell(str(job.error), "ERROR")
+            return True
+        scene = _scene(entry)
+        if scene is None:
+            self.tell(f"{entry.player}: its scene is gone, the take is dropped")
+            return True
+        window = next((window for window in context.window_manager.windows if window.scene == scene), None)
+        if window is None or _holds(context):
+            self.show(context, f"made; waits for scene {scene.name}" if window is None else "made; waits for your hand")
+            return False
+        player = _asking(scene, entry)
+        if player is None:
+            self.again(scene)
+            return True
+        if job.ending:
+            queue.clear()
+        with context.temp_override(window=window):
+            ok = self.attempt(lambda: written(bpy.context, player, entry.order, job.result)) == {"FINISHED"}
+            if ok and queue.names():  # the last one's step is the operator's own
+                bpy.ops.ed.undo_push(message=f"{self.bl_label} {player.name}")
+        self.wrote += ok
+        self.last = ok
+        if ok:
+            self.tell(f"{player.name}: made; Accept keeps it, Discard undoes it")
+        return True
+
+    last = False  # whether the newest result was written and has no step for undo yet
+
+    def again(self, scene):
+        """The player asks for something else by now: order it once more, or drop it."""
+        entry = self.entry
+        player = _found(scene, entry)
+        if player is None:
+            self.tell(f"{entry.player} is not in the list any more, its take is dropped")
+        elif entry.tries >= TRIES:
+            self.tell(f"{entry.player} keeps changing, its take is dropped; press {self.bl_label} again", "WARNING")
+        else:
+            self.tell(f"{entry.player} has changed meanwhile and is made again")
+            queue.add(queue.Entry(entry.scene, player.name, entry.how, None, "", entry.tries + 1))
+
+    def over(self, context):
+        """Nothing waits any more."""
+        self.close(context)
+        for kind, text in self.told[-1:]:
+            self.report({kind}, text if len(self.told) == 1 else f"{text} ({self.wrote} written)")
+        return {"FINISHED"} if self.last else {"CANCELLED"}
+
+    def tell(self, text, kind="INFO"):
+        """Report a line now, and keep it for the end."""
+        self.told.append((kind, text))
+        self.report({kind}, text)
+
+    def cancel(self, context):
+        """Blender takes the operator away (a file is loaded, the window closes): let the thread end unheard."""
+        queue.clear()
+        if self.job is not None:
+            self.job.cancel()
+        self.close(context)
+
+    def show(self, context, text):
+        """Progress in the status bar, at the pointer and for the panel."""
+        running, fraction = context.window_manager.beyond_mocap_work, self.job.fraction if self.job else 0.0
+        name = self.entry.player if self.entry else ""
+        running.kind, running.fraction, running.text = KIND, fraction, f"{name}: {text}" if name else text
+        running.waiting = "\n".join(queue.names())
+        running.ending = self.job is not None and self.job.ending
+        seen = (running.text, int(100 * fraction), running.waiting, running.ending)
+        if seen == self.seen or perf_counter() < self.drawn + BETWEEN:
+            return
+        self.seen, self.drawn = seen, perf_counter()
+        context.window_manager.progress_update(int(100 * fraction))
+        waiting = f"   then {', '.join(queue.names())}" if queue.names() else ""
+        if context.workspace is not None:
+            context.workspace.status_text_set(f"{running.text}   {fraction:.0%}{waiting}   ESC: cancel")
+        _redraw(context)
+
+    def close(self, context):
+        """Take progress display and timer away."""
+        windows = context.window_manager
+        windows.beyond_mocap_work.kind = windows.beyond_mocap_work.waiting = ""
+        windows.event_timer_remove(self.timer)
+        windows.progress_end()
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
+        _redraw(context)
+
+
+def _library(entry: queue.Entry):
+    return session.library(entry.order.folder, entry.order.unit)
+
+
+def _scene(entry: queue.Entry):
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == entry.scene), None)
+
+
+def _found(scene, entry: queue.Entry):
+    """The player that an entry means, under its new name where it has been renamed; None where it is gone."""
+    players = scene.beyond_mocap.players
+    return players[entry.player] if entry.player in players else _asking(scene, entry)
+
+
+def _asking(scene, entry: queue.Entry):
+    """The player that asks for just what the entry was made of; None where none does."""
+    players, busy = scene.beyond_mocap.players, queue.names()
+    named = players.get(entry.player)
+    for player in [named] if named is not None else [player for player in players if player.name not in busy]:
+        try:
+            if orders.order_of(scene.beyond_mocap, player, entry.how).fingerprint == entry.fingerprint:
+                return player
+        except (BeyondMocapError, OSError):
+            continue
+    return None
+
+
+def _holds(context) -> bool:
+    """Whether the user is in the middle of moving, painting or choosing something."""
+    running = [operator.bl_idname for window in context.window_manager.windows for operator in window.modal_operators]
+    return any(name.startswith(HOLDING) for name in running)
+
+
+def _redraw(context) -> None:
+    """Let the sidebars of all 3D views be drawn again."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                for region in area.regions:
+                    if region.type == "UI":
+                        region.tag_redraw()

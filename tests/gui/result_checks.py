@@ -1,0 +1,216 @@
+"""Making takes with the window alive: players queue, each arrives as it is made, and nothing stale is ever written."""
+
+import importlib
+import sys
+import time
+
+import bpy
+from tab import EXTENSION, PICTURES, TAB, output, sample, window
+
+LIMIT = 400
+
+
+def room(name):
+    """One of the extension's modules."""
+    return importlib.import_module(f"{EXTENSION}.{name}")
+
+
+def settings():
+    """The settings of the window's scene; looked up each time, since undo replaces them."""
+    return window.window.scene.beyond_mocap
+
+
+def work():
+    """What runs just now."""
+    return bpy.context.window_manager.beyond_mocap_work
+
+
+def run(name, how="INVOKE_DEFAULT", **arguments):
+    """An operator as its button in the 3D view runs it."""
+    area = window.area("VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window.window, area=area, region=region):
+        group, verb = name.split(".")
+        return getattr(getattr(bpy.ops, group), verb)(how, True, **arguments)
+
+
+def states():
+    """How far each player's result is."""
+    return [player.result.state for player in settings().players]
+
+
+def until(true, limit=60.0):
+    """Wait until something is true."""
+    start = time.monotonic()
+    while not true():
+        assert time.monotonic() - start < limit, f"not so after {limit} s: {work().kind} {work().text!r} {states()}"
+        yield 0.02
+
+
+def idle():
+    """Nothing is being made."""
+    return not work().kind and not window.window.modal_operators
+
+
+class slowly:
+    """Work that takes `seconds` longer than it does, in small naps, and notices a cancel."""
+
+    def __init__(self, seconds):
+        self.orders, self.seconds = room("scene.orders"), seconds
+
+    def __enter__(self):
+        self.before = self.orders.work
+
+        def slow(order, library, progress, cancelled, hurry):
+            end = time.monotonic() + self.seconds
+            while time.monotonic() < end and not cancelled() and not hurry():
+                progress(0.1, "waiting on purpose")
+                time.sleep(0.01)
+            return self.before(order, library, progress, cancelled, lambda: False)
+
+        self.orders.work = slow
+
+    def __exit__(self, *error):
+        self.orders.work = self.before
+
+
+def opened():
+    """The sample, freshly opened, its library built, with the tab in front."""
+    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
+    yield 1.0
+    area = window.area("VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    if room("scene.session").library(bpy.path.abspath(settings().library_folder), None) is None:
+        run("beyond_mocap.build_library")
+        yield from until(idle)
+    run("ed.undo_push", "EXEC_DEFAULT", message="opened")
+
+
+def check_players_queue_and_each_has_its_own_step():
+    yield from opened()
+    settings().players[1].use = False
+    with slowly(0.6):
+        run("beyond_mocap.synthesize")
+        yield 0.2
+        settings().players[0].use, settings().players[1].use = False, True
+        run("beyond_mocap.synthesize")
+        yield from until(lambda: work().waiting)
+        assert work().waiting == settings().players[1].name and len(window.window.modal_operators) == 1
+        window.picture(PICTURES / "result-queue.png")
+        yield from until(lambda: states() == ["PREVIEW", "NONE"])
+        assert work().kind, "the second is not being made any more"
+        yield from until(idle)
+    assert states() == ["PREVIEW", "PREVIEW"]
+    yield 0.5
+    window.picture(PICTURES / "result-preview.png")
+    run("ed.undo")
+    assert states() == ["PREVIEW", "NONE"], states()
+    run("ed.undo")
+    assert states() == ["NONE", "NONE"], states()
+    run("ed.redo")
+    run("ed.redo")
+    assert states() == ["PREVIEW", "PREVIEW"], states()
+    settings().players[0].use = True
+    run("beyond_mocap.accept", "EXEC_DEFAULT", form="STRIPS")
+    yield 0.5
+    window.picture(PICTURES / "result-accepted.png")
+    assert states() == ["ACCEPTED", "ACCEPTED"]
+
+
+def check_the_window_is_alive_while_takes_are_made():
+    yield from opened()
+
+    def ticks(seconds):
+        start, count, longest, last = time.monotonic(), 0, 0.0, time.monotonic()
+        while time.monotonic() - start < seconds and (seconds < 2.5 or not idle()):
+            yield 0.01
+            now = time.monotonic()
+            count, longest, last = count + 1, max(longest, now - last), now
+        return count / (time.monotonic() - start), longest
+
+    yield 1.0
+    quiet, _ = yield from ticks(2.0)
+    run("beyond_mocap.synthesize")
+    yield 0.05
+    begun = time.monotonic()
+    busy, longest = yield from ticks(60.0)
+    output.say(f"     ticks a second: {quiet:.0f} idle, {busy:.0f} while making ({busy / quiet:.0%}) for "
+               f"{time.monotonic() - begun:.1f} s; longest wait {longest:.2f} s")
+    assert states() == ["PREVIEW", "PREVIEW"]
+    assert busy > 0.25 * quiet
+
+
+def check_escape_cancels_and_finish_early_keeps():
+    yield from opened()
+    with slowly(5.0):
+        run("beyond_mocap.synthesize")
+        yield 0.5
+        window.picture(PICTURES / "result-running.png")
+        yield from window.move(900, 500)
+        yield from window.press("ESC")
+        yield from until(idle, 3.0)
+        assert states() == ["NONE", "NONE"]
+        run("beyond_mocap.synthesize")
+        yield 0.3
+        run("beyond_mocap.cancel", "EXEC_DEFAULT", keep=True)
+        yield from until(idle, 20.0)
+        assert states() == ["PREVIEW", "NONE"], states()
+        run("beyond_mocap.synthesize")
+        yield 0.3
+        run("beyond_mocap.cancel", "EXEC_DEFAULT")
+        yield from until(idle, 3.0)
+        assert states() == ["PREVIEW", "NONE"], states()
+
+
+def check_undo_in_the_middle():
+    """The words are changed, a take is begun, the change is undone: what is written was made of the words that are there."""
+    yield from opened()
+    settings().players[1].use = False
+    settings().alpha = 0.6
+    run("ed.undo_push", "EXEC_DEFAULT", message="changed")
+    with slowly(1.0):
+        run("beyond_mocap.synthesize")
+        yield 0.4
+        run("ed.undo")
+        assert settings().alpha < 0.5
+        yield from until(lambda: states()[0] == "PREVIEW")
+        yield from until(idle)
+    plan = room("scene.session").made(settings().players[0].take).plan
+    assert abs(plan.alpha - settings().alpha) < 1e-6, plan.alpha
+
+
+def check_whatever_happens_in_the_middle():
+    """The player renamed or removed, its rig deleted, another scene shown, another file opened."""
+    yield from opened()
+    with slowly(0.8):
+        run("beyond_mocap.synthesize")
+        yield 0.2
+        settings().players[0].name = "Another name"
+        settings().players.remove(1)
+        yield from until(idle)
+    assert states() == ["PREVIEW"] and settings().players[0].take
+    with slowly(0.8):
+        run("beyond_mocap.synthesize")
+        yield 0.2
+        bpy.data.objects.remove(settings().players[0].body)
+        yield from until(idle)
+    assert states() == ["PREVIEW"] and settings().players[0].body is not None
+    first = window.window.scene.name
+    with slowly(0.8):
+        take = settings().players[0].take
+        run("beyond_mocap.synthesize")
+        yield 0.2
+        window.window.scene = bpy.data.scenes.new("Elsewhere")
+        yield 2.5
+        assert bpy.data.scenes[first].beyond_mocap.players[0].take == take and "Elsewhere" in bpy.data.scenes
+        window.window.scene = bpy.data.scenes[first]
+        yield from until(idle)
+        assert settings().players[0].take != take
+    with slowly(3.0):
+        run("beyond_mocap.synthesize")
+        yield 0.2
+        bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
+        yield 0.5
+        assert idle() and states() == ["NONE", "NONE"]
+        yield 3.5
+        assert states() == ["NONE", "NONE"] and not room("scene.queue").names()
