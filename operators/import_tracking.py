@@ -111,7 +111,7 @@ class BEYOND_MOCAP_FH_tracking(bpy.types.FileHandler):
     bl_idname = "BEYOND_MOCAP_FH_tracking"
     bl_label = "Player tracking"
     bl_import_operator = "beyond_mocap.import_tracking"
-    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat;.txt"
+    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"
 
     @classmethod
     def poll_drop(cls, context):

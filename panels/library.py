@@ -58,6 +58,8 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
         header.label(text=f"Clips ({listing.total})" if current and listing.total else "Clips")
         if body:
             draw_clips(body, settings, listing, current)
+        if context.object is not None and "beyond_mocap_clip" in context.object:
+            draw_opened(layout, context.object)
         header, body = layout.panel("beyond_mocap_library_more", default_closed=True)
         header.label(text="Tools")
         if body:
@@ -83,7 +85,19 @@ def draw_clips(layout, settings, listing, current) -> None:
     paragraph(column, clip.words.replace("_", " ") or "no words: the library does not use it", "BOOKMARKS")
     paragraph(column, clip.figures, "TIME")
     table(column, clip.told.splitlines())
-    layout.operator("beyond_mocap.import_clip", icon="IMPORT").path = clip.path
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.import_clip", text="Import", icon="IMPORT").path = clip.path
+    row.operator("beyond_mocap.annotate_clip", text="Annotate", icon="GREASEPENCIL").path = clip.path
+
+
+def draw_opened(layout, thing) -> None:
+    """What can be done with a clip that is in the scene."""
+    box = layout.box()
+    box.label(text=thing.name, icon="ARMATURE_DATA")
+    column = box.column(align=True)
+    column.operator("beyond_mocap.propose_words", icon="LIGHT")
+    column.operator("beyond_mocap.save_words", icon="FILE_TICK")
+    column.operator("beyond_mocap.remove_clip", icon="TRASH")
 
 
 def draw_tools(body, settings) -> None:

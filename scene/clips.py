@@ -7,7 +7,7 @@ change it when they are set, so that drawing it costs nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,6 +78,17 @@ def keep(manager: bpy.types.WindowManager, folder: str, clips, files) -> None:
     manager.beyond_mocap_clips.folder = folder
     manager.beyond_mocap_clips.news = ""
     manager.beyond_mocap_clips.missing = False
+    fill(manager)
+
+
+def say(manager: bpy.types.WindowManager, path: str, rows) -> None:
+    """Show the words of a clip as they were just written: `ClipAnnotation`s."""
+    from ..beyond_mocap.library.listing import words_of
+
+    words, moments = words_of(rows)
+    _kept.clips = tuple(
+        replace(clip, words=words, moments=moments) if clip.path == path else clip for clip in _kept.clips
+    )
     fill(manager)
 
 

@@ -18,16 +18,23 @@ PATH, FOLDER = "beyond_mocap_clip", "beyond_mocap_library"  # custom properties 
 SHIRT = (0.75, 0.05, 0.06)
 
 
-def read(settings, path: str) -> tuple["Motion", tuple[str, ...]]:
-    """The motion of a clip and what its reader decided. path: below the library's folder; InputError where it cannot be
-    read, or waits to be converted."""
+def folder_of(settings) -> Path:
+    """The library's folder."""
+    return Path(absolute(settings.library_folder))
+
+
+def read(settings, path: str, folder: str = "") -> tuple["Motion", tuple[str, ...]]:
+    """The motion of a clip and what its reader decided; InputError where it cannot be read, or waits to be converted.
+
+    path: below the library's folder; folder: as a setting spells it, the scene's own where empty.
+    """
     from ..beyond_mocap.files import bvh
     from ..beyond_mocap.library import cache
     from ..beyond_mocap.library.converted import Conversions, is_foreign
 
-    folder = Path(absolute(settings.library_folder))
-    file = folder / path
-    conversions = Conversions(folder, cache.place(folder, preferences.cache_folder(str(folder)))[0])
+    where = Path(absolute(folder)) if folder else folder_of(settings)
+    file = where / path
+    conversions = Conversions(where, cache.place(where, preferences.cache_folder(str(where)))[0])
     if not file.is_file():
         raise InputError(file, "no such file", "a clip of the library", "press Build Library to list its clips anew")
     if not conversions.stands(file):

@@ -59,7 +59,7 @@ def listed(library: Library) -> tuple[Listed, ...]:
         mean, fastest = float(speed[part].mean()), float(speed[part].max())
         mark, told = _quality(clip, mean, float(np.median(ratio[part])))
         seconds = clip.recording.duration
-        out.append(Listed(clip.path, *_words(clip.annotations), seconds, mean, fastest, mark, told))
+        out.append(Listed(clip.path, *words_of(clip.annotations), seconds, mean, fastest, mark, told))
     return tuple(out)
 
 
@@ -80,11 +80,11 @@ def scanned(folder: str | Path, cache_dir: str | Path | None = None) -> tuple[Li
         waits = is_foreign(path) and not conversions.stands(path)
         told = ("waits for: conversion (Build Library)",) if waits else ()
         seconds = max(frames - 1, 0) / fps if fps else 0.0
-        out.append(Listed(path.relative_to(folder).as_posix(), *_words(rows), seconds, told=told))
+        out.append(Listed(path.relative_to(folder).as_posix(), *words_of(rows), seconds, told=told))
     return tuple(out)
 
 
-def _words(rows: Sequence[ClipAnnotation]) -> tuple[tuple[str, ...], int]:
+def words_of(rows: Sequence[ClipAnnotation]) -> tuple[tuple[str, ...], int]:
     """Key moments' words first, as one says them, then those of the longest rows; and the number of key moments."""
     ordered = sorted(rows, key=lambda row: (row.key is None, row.start - row.end))
     words = dict.fromkeys(word for row in ordered for word in spoken(row.words))

@@ -1,0 +1,128 @@
+"""Words written back to where a library reads them: `NAME.txt` beside the clip, or the rows of an `annotations.csv`.
+
+Files are written beside their place and renamed, so that nobody finds one half-written. Nothing that is there is
+replaced unless the caller says so.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, read_annotation_csv
+from ..annotation.text import read_text
+from ..errors import InputError
+from .scan import TABLE_NAME, Annotations
+
+TEXT, TABLE = "TEXT", "TABLE"
+
+
+def as_timeline(rows: Sequence[ClipAnnotation], fps: float) -> Timeline:
+    """A clip's rows in the form in which words are edited: seconds from its first frame. A row of one frame that is a
+    key moment is that moment alone."""
+    spans = [
+        Span(row.start / fps, max(row.end, row.start + 0.5) / fps, row.words)
+        for row in rows if row.key is None or row.end > row.start
+    ]
+    return Timeline(tuple(spans), tuple(KeyMoment(row.key / fps, row.words) for row in rows if row.key is not None))
+
+
+def within(rows: Sequence[ClipAnnotation], count: int) -> tuple[ClipAnnotation, ...]:
+    """Rows cut to a clip of `count` frames; those that lie outside are left out."""
+    out = []
+    for row in rows:
+        start, end = max(0, row.start), min(count - 1, row.end)
+        if start <= end and (row.key is None or start <= row.key <= end):
+            out.append(ClipAnnotation(start, end, row.key, row.words))
+    return tuple(out)
+
+
+def read_words(clip: Path, folder: Path, fps: float) -> tuple[ClipAnnotation, ...]:
+    """What a library in `folder` reads about one clip; InputError where that is broken."""
+    return Annotations(folder, [clip]).of(clip, fps)
+
+
+def place(clip: Path, folder: Path) -> tuple[str, Path]:
+    """Where the words of a clip belong: TEXT and `NAME.txt`, or TABLE and the table that speaks of it. A text that is
+    there counts most, then a table with rows for it, then one that stands in its folder."""
+    beside = clip.with_suffix(".txt")
+    if beside.is_file():
+        return TEXT, beside
+    tables = Annotations(folder, [clip]).tables
+    absolute = Path(os.path.normpath(clip.absolute()))
+    for parent in absolute.parents:
+        if parent in tables and tables[parent].get(absolute.relative_to(parent).as_posix()):
+            return TABLE, parent / TABLE_NAME
+    return (TABLE, absolute.parent / TABLE_NAME) if absolute.parent in tables else (TEXT, beside)
+
+
+def text_of(rows: Sequence[ClipAnnotation]) -> str:
+    """The rows in the text form, in frames of the clip."""
+    lines = []
+    for row in rows:
+        words = " ".join(row.words)
+        if row.key is None or row.end > row.start:
+            lines.append((row.start, f"{row.start}f {max(row.end, row.start + 1)}f {words}"))
+        if row.key is not None:
+            lines.append((row.key, f"{row.key}f {words}"))
+    return "".join(line + "\n" for _, line in sorted(lines, key=lambda line: line[0]))
+
+
+def keep(clip: Path, folder: Path, rows: Sequence[ClipAnnotation], fps: float, overwrite: bool = False) -> Path:
+    """Write a clip's rows where they belong (`place`); returns the file.
+
+    InputError where words that differ are there and `overwrite` does not say that they may go, or where the file cannot
+    be written.
+    """
+    form, target = place(clip, folder)
+    if has_words(clip, folder, fps) and not overwrite:
+        what = "has other words for this clip already"
+        raise InputError(target, what, "a clip without words", "say that they may be overwritten")
+    if form == TEXT:
+        _write(target, text_of(rows))
+    else:
+        name = Path(os.path.normpath(clip.absolute())).relative_to(target.parent).as_posix()
+        _write(target, _table(target, name, rows, fps))
+    return target
+
+
+def has_words(clip: Path, folder: Path, fps: float) -> bool:
+    """Whether anything is written about a clip where its words belong; a text that cannot be read counts too."""
+    form, target = place(clip, folder)
+    if form == TEXT:
+        return target.is_file() and bool(target.read_bytes().strip())
+    return bool(read_words(clip, folder, fps))
+
+
+def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float) -> str:
+    """The table's text with these rows in place of those of the clip; other rows and columns stay as they are."""
+    read_annotation_csv(table)  # one that is broken is told, not made worse
+    text = read_text(table)
+    reader = csv.DictReader(io.StringIO(text, newline=""))
+    out = io.StringIO(newline="")
+    ending = "\r\n" if "\r\n" in text else "\n"
+    writer = csv.DictWriter(out, reader.fieldnames, restval="", extrasaction="ignore", lineterminator=ending)
+    writer.writeheader()
+    old = list(reader)
+    first = next((number for number, row in enumerate(old) if row["file"].strip() == name), len(old))
+    kept = [row for row in old if row["file"].strip() != name]
+    new = [{"file": name, "fps": f"{fps:g}", "start_frame": row.start, "end_frame": row.end,
+            "key_frame": "" if row.key is None else row.key, "labels": " ".join(row.words)} for row in rows]
+    before = len([row for row in old[:first] if row["file"].strip() != name])
+    writer.writerows([*kept[:before], *new, *kept[before:]])
+    return out.getvalue()
+
+
+def _write(target: Path, text: str) -> None:
+    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        beside.write_text(text, "utf-8", newline="")
+        os.replace(beside, target)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror})"
+        raise InputError(target, found, "a folder of yours", "copy the library to a place that can be written") from None
+    finally:
+        beside.unlink(missing_ok=True)

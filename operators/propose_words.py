@@ -1,0 +1,60 @@
+"""Propose Words: what the active clip may show, by rules, as strips to be looked through."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty
+
+from ..beyond_mocap.errors import InputError
+from ..scene import clip_annotation, lanes, recordings, session
+from ..scene.settings import absolute
+from .verb import Verb
+
+
+class BEYOND_MOCAP_OT_propose_words(Verb, bpy.types.Operator):
+    """Propose words for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
+headers, turns, getting up. Look through them; what only a ball shows (dribbling, receiving) is yours to add"""
+
+    bl_idname = "beyond_mocap.propose_words"
+    bl_label = "Propose Words"
+
+    least: FloatProperty(
+        name="At Least", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
+        description="Proposals that are less sure than this are left out",
+    )
+    replace: BoolProperty(
+        name="Replace", default=True,
+        description="In place of the strips that are there; else they stay, and proposals are put beside them",
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """An armature that shows a clip."""
+        cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
+        return bool(clip_annotation.shown(context.object))
+
+    def do(self, context):
+        """Look at the recording itself, then lay the strips."""
+        from ..beyond_mocap.annotation import Timeline
+        from ..beyond_mocap.library.proposals import GAITS, as_timeline, gaits_of, propose
+
+        settings, rig = context.scene.beyond_mocap, context.object
+        motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
+        built = session.library(absolute(settings.library_folder), settings.library_unit or None)
+        try:
+            gaits = gaits_of(built) if built is not None else GAITS
+        except InputError:  # a library without locomotion says nothing of gaits
+            gaits = GAITS
+        found = [one for one in propose(motion, gaits) if one.confidence >= self.least]
+        before = None if self.replace else lanes.read(rig)
+        told = as_timeline(found, motion.fps)
+        if before is not None:
+            told = Timeline((*before.spans, *told.spans), (*before.keys, *told.keys))
+        clip_annotation.lay(rig, context.scene, motion, told)
+        for one in found:
+            row = one.annotation
+            if row.key is not None or one.confidence < 0.6:
+                when = f"{(row.start if row.key is None else row.key) / motion.fps:.2f} s"
+                self.report({"INFO"}, f"{when} {' '.join(row.words)}: {one.why}, {one.confidence:.0%} sure")
+        keys = sum(one.annotation.key is not None for one in found)
+        self.report({"INFO"}, f"{rig.name}: {len(found) - keys} stretches and {keys} key moments proposed")

@@ -1,0 +1,73 @@
+"""Words of a library's clip as NLA strips on the armature that shows it: opened, proposed, read back.
+
+The strips are a player's own (`lanes`, `lay_strips`); their clock stands at 0 seconds on the frame on which the armature
+plays the recording's first.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ..beyond_mocap.annotation import ClipAnnotation, Timeline, clip_annotations
+from ..beyond_mocap.errors import InputError
+from . import action, lanes, lay_strips
+from .clock import Clock
+from .measure import frames_per_second
+from .recordings import FOLDER, PATH
+from .settings import absolute
+
+if TYPE_CHECKING:
+    from ..beyond_mocap.motion.motion import Motion
+
+RATE, COUNT = "beyond_mocap_fps", "beyond_mocap_frames"  # custom properties: the recording's own
+
+
+def shown(thing: bpy.types.Object | None) -> str:
+    """The clip (below its library's folder) that an object shows; "" where it shows none."""
+    return thing.get(PATH, "") if thing is not None and thing.type == "ARMATURE" else ""
+
+
+def clip_file(rig: bpy.types.Object) -> tuple[Path, Path]:
+    """The file of the clip that an armature shows, and its library's folder."""
+    folder = Path(absolute(rig[FOLDER]))
+    return folder / rig[PATH], folder
+
+
+def lay(rig: bpy.types.Object, scene: bpy.types.Scene, motion: "Motion", timeline: Timeline) -> None:
+    """Let the armature's strips say `timeline`: seconds from the recording's first frame."""
+    rig[RATE], rig[COUNT] = motion.fps, len(motion)
+    lay_strips.write(rig, timeline, _clock(rig, scene), (0.0, motion.duration))
+
+
+def said(rig: bpy.types.Object) -> tuple[ClipAnnotation, ...]:
+    """What the armature's strips say, as rows in frames of the recording; InputError where it has no strips, or where
+    they say nothing."""
+    from ..beyond_mocap.library.keep_words import within
+
+    timeline = lanes.read(rig, f"strips of {rig.name}")
+    if timeline is None or RATE not in rig:
+        raise InputError(rig.name, "no strips with words", "a clip opened with Annotate Clip")
+    rows = within(clip_annotations(timeline, rig[RATE]), rig[COUNT])
+    if not rows:
+        raise InputError(rig.name, "strips that say nothing", "at least one strip or marker", "press Propose Words")
+    return rows
+
+
+def remove(rig: bpy.types.Object) -> None:
+    """Take the armature, its body and its actions out of the file, where nobody else uses them."""
+    things = [rig, *rig.children_recursive]
+    data = [thing.data for thing in things if thing.data is not None and thing.data.users == 1]
+    strips = [strip.action for _, strip in lanes.strips(rig)] if lanes.has(rig) else []
+    playing = rig.animation_data.action if rig.animation_data is not None else None
+    actions = {item.name: item for item in [*strips, playing] if item is not None}
+    bpy.data.batch_remove(things)
+    bpy.data.batch_remove(data)
+    bpy.data.batch_remove([item for item in actions.values() if item.users - item.use_fake_user <= 0])
+
+
+def _clock(rig: bpy.types.Object, scene: bpy.types.Scene) -> Clock:
+    first = action.first_frame(rig)
+    return Clock(float(scene.frame_start if first is None else first), 0.0, frames_per_second(scene))
