@@ -1,4 +1,5 @@
-"""The core's small family of errors: each knows the exit status that `../shared/contract.md` promises for it.
+"""The core's small family of errors: each knows the exit status that `../shared/contract.md` promises for it; and lines
+that are told without being errors.
 
 A message is one line: what was found where, what was expected, and the next step. The command line prints it to stderr,
 an operator puts it into Blender's report; nobody else formats it again.
@@ -42,3 +43,23 @@ class Cancelled(BeyondMocapError):
     """The user stopped the work (exit status 130)."""
 
     exit_status = 130
+
+
+class TimedLine(str):
+    """A line of a report, with the seconds it is about, so that whoever shows it can go there.
+
+    spans: (first, last) seconds on the track's clock, in the order of the line; () where it is about no time.
+    """
+
+    spans: tuple[tuple[float, float], ...]
+
+    def __new__(cls, text: str, *spans: tuple[float, float]):
+        """`text`: the line; `spans`: see above."""
+        line = super().__new__(cls, text)
+        line.spans = tuple((float(first), float(last)) for first, last in spans)
+        return line
+
+
+def spans_of(line: str) -> tuple[tuple[float, float], ...]:
+    """The seconds that a line is about; () for a plain text."""
+    return getattr(line, "spans", ())

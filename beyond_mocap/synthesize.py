@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .annotation import avoided_per_frame, spoken
-from .errors import InputError
+from .errors import InputError, TimedLine
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
 from .lay_out import as_far, chained, faced, footed, leaning, met, on_track, smoothed, touches
@@ -213,7 +213,8 @@ def with_warnings(take: Take, recordings: Library, order: Wanted, hurried: int |
     library's rate from which on the search was cut short, or None."""
     told = [*recordings.notes, *order.warnings, *_crowded_out(order, take.edit)]
     if hurried is not None:
-        told.append(f"{take.start_time + hurried / recordings.fps:.1f} s: from here on the search was cut short")
+        since = take.start_time + hurried / recordings.fps
+        told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
     told += _shown_all_the_same(take)
     return replace(take, warnings=(*told, *_gave_way(recordings, take.plan, take)))
 
@@ -222,8 +223,10 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
     """One warning per key moment that clips could serve, but not so close to another one."""
     placed = {key.wanted for key in edit.keys}
     return [
-        f"{key.asked.time:g} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, "
-        "it is not played"
+        TimedLine(
+            f"{key.asked.time:g} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, "
+            "it is not played", (key.asked.time, key.asked.time),
+        )  # fmt: skip
         for number, key in enumerate(order.keys)
         if key.choices and number not in placed
     ]
@@ -241,9 +244,11 @@ def _shown_all_the_same(take: Take) -> list[str]:
         for time, words in asked:
             shows &= (word not in words) | (np.abs(times - time) > NEAR_KEY)
         told += [
-            f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it must not be; "
-            "no way without it was found" for first, end in runs(shows)
-        ]
+            TimedLine(
+                f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it must not "
+                "be; no way without it was found", (times[first], times[end - 1]),
+            ) for first, end in runs(shows)
+        ]  # fmt: skip
     return told
 
 

@@ -13,6 +13,7 @@ from collections import Counter
 import numpy as np
 
 from ..annotation import Timeline, words_per_frame
+from ..errors import TimedLine
 from ..library.library import Library
 from ..library.landings import LANDING_FOLDER
 from ..library.made import BLENDED, KICKED, MADE_FOLDER
@@ -43,7 +44,7 @@ def give_way(
     library: Library | None = None,
     ik_miss: np.ndarray | None = None,
     asked: Timeline | None = None,
-) -> list[str]:
+) -> list[TimedLine]:
     """A line for each kind of thing that gave way in what was played, with its seconds on the track's clock.
 
     track: the player's samples as measured; timeline: what was asked, for the key moments; library: what it was made
@@ -70,7 +71,7 @@ def give_way(
     return [line for line in lines if line]
 
 
-def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> str | None:
+def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedLine | None:
     """Seams that are harder than recordings are: times (T,) s, starts (S,) frames of seams, ratios (S,) of
     `jerk.seam_ratios`; None where there is none."""
     most = TARGETS["seam_jerk_ratio.max"].most
@@ -80,21 +81,30 @@ def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> str | No
     flags = np.zeros(len(times), bool)
     for start in starts[hard]:
         flags[max(start - jerk.REACH // 2, 0) : start + jerk.REACH // 2] = True
-    told = stretches(times, flags)
     hardest = ratios[hard].max()
-    return f"{told}: cuts jolt up to {hardest:.2f} times as hard as recordings of that speed ({most:g} wanted)"
+    return _line(times, flags, f"cuts jolt up to {hardest:.2f} times as hard as recordings of that speed ({most:g} wanted)")
 
 
 def stretches(times: np.ndarray, flags: np.ndarray) -> str:
     """Where flags (T,) hold, as text: "4.2-6.0, 7.3 s". Stretches less than JOIN_SECONDS apart are one; of more than
     MOST_STRETCHES the longest are named."""
-    first, last = np.array([(times[a], times[b - 1]) for a, b in runs(flags)]).T
-    apart = np.flatnonzero(first[1:] - last[:-1] >= JOIN_SECONDS)
-    first, last = first[np.append(0, apart + 1)], last[np.append(apart, len(last) - 1)]
+    first, last = _joined(times, flags)
     longest = np.sort(np.argsort(first - last, kind="stable")[:MOST_STRETCHES])
     named = ", ".join(_span(first[i], last[i]) for i in longest)
     left = len(first) - len(longest)
     return f"{named} s" + (f" and {left} shorter" if left else "")
+
+
+def _line(times: np.ndarray, flags: np.ndarray, what: str, more: str = "") -> TimedLine:
+    """The line "4.2-6.0 s: what", with the stretches in which flags (T,) hold; `more` stands before the colon."""
+    return TimedLine(f"{stretches(times, flags)}{more}: {what}", *zip(*_joined(times, flags)))
+
+
+def _joined(times: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First and last second (S,), (S,) of the stretches in which flags (T,) hold, near ones joined."""
+    first, last = np.array([(times[a], times[b - 1]) for a, b in runs(flags)]).T
+    apart = np.flatnonzero(first[1:] - last[:-1] >= JOIN_SECONDS)
+    return first[np.append(0, apart + 1)], last[np.append(apart, len(last) - 1)]
 
 
 def _span(first: float, last: float) -> str:
@@ -113,7 +123,7 @@ def _whose(played: Played, *begins: str) -> np.ndarray:
     return table[played.clip]
 
 
-def _made_lines(played: Played) -> list[str]:
+def _made_lines(played: Played) -> list[TimedLine]:
     """A line per kind of made clip: running, two recordings blended, kicks."""
     blends, kicks = _whose(played, MADE_FOLDER + BLENDED), _whose(played, MADE_FOLDER + KICKED)
     kinds = (
@@ -122,21 +132,26 @@ def _made_lines(played: Played) -> list[str]:
         (kicks, "a kick made on the run, since no recorded one is as fast as the player"),
     )
     return [
-        f"{stretches(played.times, there)} ({np.sum(there) / played.motion.fps:.1f} s in all): {what}"
+        _line(played.times, there, what, _in_all(played, there))
         for there, what in kinds
         if np.any(there)
     ]
 
 
-def _made_landing(played: Played) -> str | None:
+def _in_all(played: Played, there: np.ndarray) -> str:
+    """How long flags (T,) hold, as text."""
+    return f" ({np.sum(there) / played.motion.fps:.1f} s in all)"
+
+
+def _made_landing(played: Played) -> TimedLine | None:
     made = _whose(played, LANDING_FOLDER)
     if not np.any(made):
         return None
-    when = f"{stretches(played.times, made)} ({np.sum(made) / played.motion.fps:.1f} s in all)"
-    return f"{when}: made landing and getting up, since the recording ends in flight"
+    what = "made landing and getting up, since the recording ends in flight"
+    return _line(played.times, made, what, _in_all(played, made))
 
 
-def _too_fast(played: Played, track: Track | None, library: Library | None) -> str | None:
+def _too_fast(played: Played, track: Track | None, library: Library | None) -> TimedLine | None:
     """Recordings stretched to a speed that they have not, even within the limit of the warp."""
     if track is None or library is None:
         return None
@@ -144,26 +159,27 @@ def _too_fast(played: Played, track: Track | None, library: Library | None) -> s
     fast = (speed > library.fastest * REACH[1]) & ~_made(played)
     if not np.any(fast):
         return None
-    return (
-        f"{stretches(played.times, fast)}: the track asks for up to {speed[fast].max():.1f} m/s, faster than the "
-        f"library's {library.fastest:.1f} m/s x {REACH[1]:g}: strides are stretched"
-    )
+    return _line(
+        played.times, fast,
+        f"the track asks for up to {speed[fast].max():.1f} m/s, faster than the library's {library.fastest:.1f} m/s x "
+        f"{REACH[1]:g}: strides are stretched",
+    )  # fmt: skip
 
 
-def _warped(played: Played, source, starts: np.ndarray) -> str | None:
+def _warped(played: Played, source, starts: np.ndarray) -> TimedLine | None:
     rate = played_rate(*source)
     rate[starts - 1] = np.nan
     beyond = np.append((rate < REACH[0] - _TOLERANCE) | (rate > REACH[1] + _TOLERANCE), False)
     if not np.any(beyond):
         return None
     low, high = np.nanmin(rate), np.nanmax(rate)
-    return (
-        f"{stretches(played.times, beyond)}: clips are played at {low:.2f} to {high:.2f} times their recorded speed "
-        f"({REACH[0]:g} to {REACH[1]:g} wanted)"
-    )
+    return _line(
+        played.times, beyond,
+        f"clips are played at {low:.2f} to {high:.2f} times their recorded speed ({REACH[0]:g} to {REACH[1]:g} wanted)",
+    )  # fmt: skip
 
 
-def _sliding(played: Played) -> str | None:
+def _sliding(played: Played) -> TimedLine | None:
     """Stances whose toe travels farther than eyes overlook."""
     stances = feet.stances(played.contacts)
     travel = feet.stance_travel(played.feet[:, :, 1], stances)
@@ -172,43 +188,48 @@ def _sliding(played: Played) -> str | None:
         flags[first:end] = True
     if not np.any(flags):
         return None
-    return f"{stretches(played.times, flags)}: a standing foot slides, by up to {100 * travel.max():.0f} cm"
+    return _line(played.times, flags, f"a standing foot slides, by up to {100 * travel.max():.0f} cm")
 
 
-def _short_legs(played: Played, ik_miss: np.ndarray | None) -> str | None:
+def _short_legs(played: Played, ik_miss: np.ndarray | None) -> TimedLine | None:
     if ik_miss is None:
         return None
     miss = np.asarray(ik_miss).reshape(len(played.motion), -1).max(axis=1)
     if not np.any(miss > SHORT_LEG):
         return None
-    told = stretches(played.times, miss > SHORT_LEG)
-    return f"{told}: a leg cannot reach where its foot should stand and ends up to {100 * miss.max():.1f} cm short"
+    what = f"a leg cannot reach where its foot should stand and ends up to {100 * miss.max():.1f} cm short"
+    return _line(played.times, miss > SHORT_LEG, what)
 
 
-def _off_track(played: Played, track: Track | None) -> str | None:
+def _off_track(played: Played, track: Track | None) -> TimedLine | None:
     if track is None:
         return None
     error = root.root_error(played.pelvis, root.track_at(track, played.times), played.motion.fps)
     if not np.any(error > OFF_TRACK):
         return None
-    told = stretches(played.times, error > OFF_TRACK)
-    return f"{told}: the body is off the track, by up to {error.max():.2f} m"
+    return _line(played.times, error > OFF_TRACK, f"the body is off the track, by up to {error.max():.2f} m")
 
 
-def _late(played: Played, keys: list[Moment]) -> str | None:
+def _late(played: Played, keys: list[Moment]) -> TimedLine | None:
     half = 0.5 / played.motion.fps + _TOLERANCE
-    late = [(moment.asked.time, moment.played_at - moment.asked.time) for moment in keys]
-    told = [f"{time:g} s by {error:+.2f} s" for time, error in late if np.isfinite(error) and abs(error) > half]
-    return f"key moments not at their time: {', '.join(told)}" if told else None
+    errors = [(moment.asked.time, moment.played_at - moment.asked.time) for moment in keys]
+    late = [(time, error) for time, error in errors if np.isfinite(error) and abs(error) > half]
+    return _at_moments("key moments not at their time", late, "{:+.2f} s")
 
 
-def _out_of_reach(played: Played, keys: list[Moment]) -> str | None:
+def _out_of_reach(played: Played, keys: list[Moment]) -> TimedLine | None:
     gaps = [(moment.asked.time, met(played, moment)[1]) for moment in keys]
-    told = [f"{time:g} s by {gap:.2f} m" for time, gap in gaps if np.isfinite(gap) and gap > OUT_OF_REACH]
-    return f"the ball is out of the body's reach at key moments: {', '.join(told)}" if told else None
+    far = [(time, gap) for time, gap in gaps if np.isfinite(gap) and gap > OUT_OF_REACH]
+    return _at_moments("the ball is out of the body's reach at key moments", far, "{:.2f} m")
 
 
-def _other_words(played: Played, asked: Timeline | None, keys: list[Moment], library: Library | None) -> str | None:
+def _at_moments(what: str, found: list[tuple[float, float]], form: str) -> TimedLine | None:
+    """The line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None where there are none."""
+    told = ", ".join(f"{time:g} s by {form.format(value)}" for time, value in found)
+    return TimedLine(f"{what}: {told}", *((time, time) for time, _ in found)) if found else None
+
+
+def _other_words(played: Played, asked: Timeline | None, keys: list[Moment], library: Library | None) -> TimedLine | None:
     """Words of the user's spans that clips carry, and that are not shown for WORD_SECONDS or more, but for entry and
     exit of key moments."""
     if asked is None or played.words is None or library is None:
@@ -226,12 +247,12 @@ def _other_words(played: Played, asked: Timeline | None, keys: list[Moment], lib
         return None
     count = Counter(word for frame in np.flatnonzero(flags) for word in sorted(missing[frame]))
     told = ", ".join(word for word, _ in count.most_common(3)) + (", ..." if len(count) > 3 else "")
-    return f"{stretches(played.times, flags)}: words asked for and not shown: {told}"
+    return _line(played.times, flags, f"words asked for and not shown: {told}")
 
 
-def _below_ground(played: Played) -> str | None:
+def _below_ground(played: Played) -> TimedLine | None:
     lowest = played.positions[..., 2].min(axis=1)
     below = lowest < -BELOW_GROUND
     if not np.any(below):
         return None
-    return f"{stretches(played.times, below)}: the body goes into the ground, by up to {-100 * lowest.min():.1f} cm"
+    return _line(played.times, below, f"the body goes into the ground, by up to {-100 * lowest.min():.1f} cm")

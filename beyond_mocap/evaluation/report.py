@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..annotation import Timeline
+from ..errors import spans_of
 from ..library.library import Library
 from ..motion.track import Track
 from ..take import Take
@@ -31,7 +32,10 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
     warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
-    return {**report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings}
+    return {
+        **report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings,
+        "warning_seconds": _seconds_of(warnings),
+    }
 
 
 def evaluate_played(
@@ -66,7 +70,12 @@ def evaluate_played(
         "annotation_similarity": figures.annotation_similarity(view),
         "warnings": figures.warnings(view, ik_miss, asked),
     }
-    return rounded(report)
+    return {**rounded(report), "warning_seconds": _seconds_of(report["warnings"])}
+
+
+def _seconds_of(lines: list[str]) -> list[list[list[float]]]:
+    """For each line the stretches [first, last] s that it is about."""
+    return [[[round(edge, 3) for edge in span] for span in spans_of(line)] for line in lines]
 
 
 def rounded(value, digits: int = 5):
@@ -102,6 +111,8 @@ def flat(value, name: str = "") -> dict[str, object]:
     """A report as one row per figure: nested names joined with dots, key moments numbered from 1, warnings counted."""
     if name == "warnings":
         return {name: len(value)}
+    if name == "warning_seconds":
+        return {}
     if isinstance(value, Mapping):
         return {k: v for key, entry in value.items() for k, v in flat(entry, f"{name}.{key}" if name else key).items()}
     if isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):

@@ -6,6 +6,7 @@ poses are apart. Costs are per slot, about a metre per second of missed speed ea
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,9 @@ _NEAR_KEY = 45  # frames around a key moment in which its own words may be shown
 AVOIDED = 1000.0
 """What a slot costs that shows a word which it must not: more than a whole track of anything else."""
 
+Term = tuple[str, np.ndarray]
+"""A part of a cost, by name."""
+
 
 class PathCosts:
     """The costs of one order on one library of N frames."""
@@ -80,39 +84,51 @@ class PathCosts:
     def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
         """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end;
         inf where the clip ends before or may not be used."""
-        cost = self._misfit(first, end, self.offer.traits(number, frame, self._words(first, end)))
-        if avoid := self.wanted.avoided_in(first, end):
-            cost += AVOIDED * self.offer.showing(avoid)[frame]
+        cost = _added(self.misfit_terms(first, end, number, frame))
         return np.where(self.offer.valid[number, frame], cost, np.inf)
+
+    def misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
+        """What `misfit` is the sum of, by name, each (K,)."""
+        return self._terms(first, end, self.offer.traits(number, frame, self._words(first, end)))
 
     def cheapest(self, first: int, end: int, looked_at: int, count: int):
         """The `count` pairs of rate and library frame that cost least of the `looked_at` nearest in speed: number (K,),
         frame (K,), misfit (K,)."""
         avoid = self.wanted.avoided_in(first, end)
         near = self.offer.near_in_speed(self.asked(first, end)[0], looked_at, self._words(first, end), avoid)
-        cost = self._misfit(first, end, near)
-        if avoid:
-            cost += AVOIDED * self.offer.showing(avoid)[near.frame]
+        cost = _added(self._terms(first, end, near))
         best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
         return near.number[best], near.frame[best], cost[best]
 
     def _words(self, first: int, end: int) -> frozenset[str]:
         return self.wanted.asked[(first + end) // 2] or frozenset()
 
-    def _misfit(self, first: int, end: int, what: Traits) -> np.ndarray:
+    def _terms(self, first: int, end: int, what: Traits) -> Iterator[Term]:
         w = self.weights
         turn = what.turn * np.float32((end - first) / SLOT)
-        cost = self._motion_misfit(first, end, what.speed, turn, what.offset, what.long_stance)
-        cost += (w.rate * np.abs(RATES - 1.0)).astype(np.float32)[what.number]
-        cost += w.words * what.missing
-        cost += np.float32(w.unasked) * what.unasked
-        cost += np.float32(w.made) * what.made
-        return cost if self.price is None else cost + self.price[what.frame]
+        yield from self._motion_terms(first, end, what.speed, turn, what.offset, what.long_stance)
+        yield "rate", (w.rate * np.abs(RATES - 1.0)).astype(np.float32)[what.number]
+        yield "words", w.words * what.missing
+        yield "unasked", np.float32(w.unasked) * what.unasked
+        yield "made", np.float32(w.made) * what.made
+        if self.price is not None:
+            yield "price", self.price[what.frame]
+        if avoid := self.wanted.avoided_in(first, end):
+            yield "avoided", AVOIDED * self.offer.showing(avoid)[what.frame]
 
     def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held
-        at their ends. Words do not count here but for those that must not be. A kick that was recorded slower than the player runs is played faster,
-        within the limits of what may give way (../shared/metrics.md)."""
+        at their ends. Words do not count here but for those that must not be. A kick that was recorded slower than the
+        player runs is played faster, within the limits of what may give way (../shared/metrics.md)."""
+        return _added(self._key_terms(first, end, clip, start, rate)) * ((end - first) / SLOT)
+
+    def key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
+        """What `key_misfit` is the sum of, by name, each (K,)."""
+        for name, values in self._key_terms(first, end, clip, start, rate):
+            yield name, values * ((end - first) / SLOT)
+
+    def _key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
+        """The same per SLOT frames."""
         low, high = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         length = end - first
         a, b = (np.clip(at, low, high) for at in (start, start + rate * length))
@@ -120,14 +136,16 @@ class PathCosts:
         turn = _between(self.frames.heading, b, high) - _between(self.frames.heading, a, high)
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
         middle = self.inside((a + b) / 2.0)
-        cost = self._motion_misfit(first, end, speed, turn, self.offer.offset[middle], self.offer.long_stance[middle])
+        yield from self._motion_terms(first, end, speed, turn, self.offer.offset[middle], self.offer.long_stance[middle])
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
-        cost += self.weights.rate * off + self.weights.stretch * np.maximum(off - 0.15, 0.0) + self.weights.held * held
-        cost += self.weights.made_key * self.offer.made[self.inside(start)]
-        cost += 0.0 if self.price is None else self.price[middle]
-        cost *= length / SLOT
-        return cost + AVOIDED * self._avoided_between(first, end, a, b) if self.wanted.avoided else cost
+        far = self.weights.stretch * np.maximum(off - 0.15, 0.0)
+        yield "rate", self.weights.rate * off + far + self.weights.held * held
+        yield "made", self.weights.made_key * self.offer.made[self.inside(start)]
+        if self.price is not None:
+            yield "price", self.price[middle]
+        if self.wanted.avoided:
+            yield "avoided", AVOIDED * SLOT / length * self._avoided_between(first, end, a, b)
 
     def _avoided_between(self, first: int, end: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """(K,) bool: whether library frames a .. b (K,) show a word that the output's first .. end must not, but for
@@ -137,26 +155,30 @@ class PathCosts:
         shown = np.append(0, np.cumsum(self.offer.annotation.showing(avoid.difference(*near))))
         return shown[self.inside(b) + 1] > shown[self.inside(a)]
 
-    def _motion_misfit(self, first: int, end: int, speed, turn, offset, long_stance) -> np.ndarray:
+    def _motion_terms(self, first: int, end: int, speed, turn, offset, long_stance) -> Iterator[Term]:
         wanted_speed, wanted_turn = self.asked(first, end)
         w, moving = self.weights, min(1.0, wanted_speed)
-        cost = np.abs(speed - wanted_speed) * (w.speed + w.drag * long_stance)
-        cost += w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
+        yield "speed", np.abs(speed - wanted_speed) * (w.speed + w.drag * long_stance)
+        yield "turn", w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
         aside = np.abs(offset - float(self.wanted_offset[(first + end) // 2]))
-        return cost + w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
+        yield "facing", w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
 
     def cut(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """(B, K) cost of a cut from library frames ends (B,) to start (K,): how far their poses are apart, and how wild
         the motion is that is left or entered (nobody can blend out of a kick half way)."""
+        return _added(self.cut_terms(ends, start))
+
+    def cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
+        """What `cut` is the sum of, by name, each (B, K) or broadcast to it; "pose" first."""
         ends, start = self.inside(ends), self.inside(start)
         a, b = self.frames.features[ends], self.frames.features[start]
         square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
-        cost = np.sqrt(np.maximum(square, 0.0, out=square), out=square)
-        cost *= np.float32(self.weights.pose)
-        cost += np.float32(self.weights.feet) * self._feet_apart(ends, start)
-        cost += (self.weights.wild * self.offer.wild_before[ends]).astype(np.float32)[:, None]
-        cost += (self.weights.switch + self.weights.wild * self.offer.wild_after[start]).astype(np.float32)
-        return cost
+        apart = np.sqrt(np.maximum(square, 0.0, out=square), out=square)
+        apart *= np.float32(self.weights.pose)
+        yield "pose", apart
+        yield "feet", np.float32(self.weights.feet) * self._feet_apart(ends, start)
+        yield "left", (self.weights.wild * self.offer.wild_before[ends]).astype(np.float32)[:, None]
+        yield "cut", (self.weights.switch + self.weights.wild * self.offer.wild_after[start]).astype(np.float32)
 
     def _feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """(B, K) m between the feet that stand before and after a cut."""
@@ -167,6 +189,14 @@ class PathCosts:
             away = np.hypot(a[:, :1] - b[:, 0], a[:, 1:] - b[:, 1])
             apart += away * (stands[ends, foot][:, None] & stands[start, foot])
         return apart
+
+
+def _added(terms: Iterator[Term]) -> np.ndarray:
+    """The sum of named parts, in their order; the first one is overwritten."""
+    _, total = next(terms)
+    for _, values in terms:
+        total += values
+    return total
 
 
 def _between(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray:

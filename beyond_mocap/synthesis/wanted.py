@@ -11,7 +11,7 @@ from ..annotation import (
     MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill, gait_thresholds, spoken,
     words_per_frame,
 )
-from ..errors import NotInLibrary
+from ..errors import NotInLibrary, TimedLine
 from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
@@ -115,7 +115,8 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     choices = nearest_serving(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].words
     used = spoken(choices[0].words) if choices else gait_words
-    warnings.append(f"{text}; used instead: {' '.join(used) if choices else 'locomotion goes on there'}")
+    instead = " ".join(used) if choices else "locomotion goes on there"
+    warnings.append(TimedLine(f"{text}; used instead: {instead}", (moment.time, moment.time)))
     return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), used)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, TimedLine
 from ..runs import runs
 from .data import Track
 from .sampling import GAP_INTERVALS, LONG_GAP
@@ -315,9 +315,12 @@ def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[str]:
     """What was left as it is although nobody should believe it."""
     speed = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
     fast = track.times[1:][speed > FASTEST]
-    out = [f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}"] if snaps else []
-    out += [f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}"] if len(fast) else []
-    return out + [f"no samples from {a:.2f} to {b:.2f} s" for a, b in gaps if b - a > LONG_GAP]
+    out = []
+    if snaps:
+        out.append(TimedLine(f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}", *zip(snaps, snaps)))
+    if len(fast):
+        out.append(TimedLine(f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}", *zip(fast, fast)))
+    return out + [TimedLine(f"no samples from {a:.2f} to {b:.2f} s", (a, b)) for a, b in gaps if b - a > LONG_GAP]
 
 
 def _replacements(track: Track) -> list[str]:
