@@ -10,6 +10,7 @@
 - `give_way`   what gave way, and at which seconds
 - `played`     what was played, from a take in memory or from files
 - `reference`  a library's own scores, once per library and rate
+- `per_frame`  figures of every frame, footprints, key moments in space: what overlays and curves show
 - `view`, `figures`, `report`  the Report JSON, and reports side by side as a table
 - `targets`    what each figure aims for, and `judged` whether it is met; `html` and `plots` the report as a page
 

@@ -63,6 +63,12 @@ def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
     return windowed(values)[middle] / real[speed_class(speed[seams])]
 
 
+def ratios(values: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Windowed jerk over the real p95 at that speed, in the middle of every window: (T-3,); see `seam_ratios`."""
+    pace = speed[SEAM_TO_JERK : SEAM_TO_JERK + len(values)]
+    return windowed(values) / real[speed_class(pace)]
+
+
 def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
     """The same ratio in the middle of every window that touches no seam's window: (M,). A locked knee can pop
     anywhere."""
@@ -71,5 +77,4 @@ def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
     free = np.ones(len(values), dtype=bool)
     for seam in seams - SEAM_TO_JERK:
         free[max(seam - 2 * REACH, 0) : seam + 2 * REACH + 1] = False
-    pace = speed[SEAM_TO_JERK : SEAM_TO_JERK + len(values)]
-    return (windowed(values) / real[speed_class(pace)])[free]
+    return ratios(values, speed, real)[free]

@@ -119,7 +119,7 @@ def ball_gap(played: Played, moment: Moment) -> float:
     if played.ball is None:
         return np.nan
     pose = played.positions[moment.frame], played.rotations[moment.frame]
-    words = _touching(moment)
+    words = touching_words(moment)
     return abs(float(contact_gap(played.motion.skeleton, *pose, words, written_ball(played, moment.frame))))
 
 
@@ -127,7 +127,7 @@ def met(played: Played, moment: Moment) -> tuple[float, float]:
     """Seconds on the track's clock at which the ball is met, and the gap there, m, as `ball_gap` measures it. Both are
     the key moment's, but for dives, in which a hand meets the ball at its nearest on the flight
     (`striking.met_within`); NaN without ball or part."""
-    last = min(moment.frame + int(met_within(_touching(moment)) * played.motion.fps), len(played.motion) - 1)
+    last = min(moment.frame + int(met_within(touching_words(moment)) * played.motion.fps), len(played.motion) - 1)
     frames = range(moment.frame, last + 1)
     gaps = [ball_gap(played, replace(moment, frame=frame)) for frame in frames]
     if not np.isfinite(gaps).any():
@@ -136,7 +136,7 @@ def met(played: Played, moment: Moment) -> tuple[float, float]:
     return float(played.times[frames[nearest]]), gaps[nearest]
 
 
-def _touching(moment: Moment) -> tuple[str, ...]:
+def touching_words(moment: Moment) -> tuple[str, ...]:
     """The words that say which part meets the ball: those that are played, else those that were asked for."""
     return moment.words if striking_part(moment.words) else moment.asked.words
 

@@ -97,7 +97,7 @@ class PathSearch:
         self.offer = self.costs.offer
         self.edges = slot_edges(library, wanted, *((between.first, between.end) if between else ()))
         self.pieces = key_pieces(library, wanted, self.edges)
-        self._choice_cost = self._choice_costs()
+        self.choice_cost = self._choice_costs()
         self._closed = {slot_of(self.edges, wanted.keys[number].frame) for number in self.pieces.wanted}
         self.width, self.hurried = Width(), None
         self._report = progress or (lambda fraction, text: None)
@@ -141,7 +141,7 @@ class PathSearch:
         return costs
 
     def _first(self) -> States:
-        clip, start, rate, cost, piece = self._offered(0)
+        clip, start, rate, cost, piece = self.offered(0)
         recent = np.full((len(clip), MEMORY_SLOTS), -1)
         return self._kept(States(clip, start, rate, cost, np.zeros(len(clip), int), piece, recent))
 
@@ -160,7 +160,7 @@ class PathSearch:
         edit, at = self.between.edit, np.array([self.between.end])
         everyone = np.arange(len(states.cost))
         ends, goal = states.start + states.rate * shown, (edit.clip[at], edit.frame[at], _steps(edit, at))
-        way = self._ways(states, everyone, ends, *goal)
+        way = self.ways(states, everyone, ends, *goal)
         return replace(states, cost=way[:, 0])
 
     def _layer(self, slot: int, before: States, shown: int) -> States:
@@ -185,14 +185,14 @@ class PathSearch:
         kept.recent[:, -1] = self.offer.bucket[self.costs.inside(kept.start)]
         return kept
 
-    def _offered(self, slot: int):
+    def offered(self, slot: int):
         """What can begin in a slot: pieces of key moments, and, unless a key frame lies in it, library frames at any
         rate: the cheapest candidates, those that lead into a piece, and what was shown before an edit. clip, start,
         rate, cost, piece, each (K,)."""
         low, high = self.edges[slot : slot + 2]
         here = np.flatnonzero(self.pieces.first == slot)
         clip, start, rate = self.pieces.clip[here], self.pieces.start[here], self.pieces.rate[here]
-        cost = self.costs.key_misfit(low, high, clip, start, rate) + self._choice_cost[here]
+        cost = self.costs.key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
         offers = [(clip, start, rate, cost, here)]
         if slot not in self._closed:
             offers += [self._candidates(low, high), self._leading_in(slot)]
@@ -231,12 +231,12 @@ class PathSearch:
 
     def _entered(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray):
         """Whatever is offered, each by the cheapest way."""
-        clip, start, rate, unary, piece = self._offered(slot)
-        way = self._ways(before, free, ends[free], clip, start, rate)
+        clip, start, rate, unary, piece = self.offered(slot)
+        way = self.ways(before, free, ends[free], clip, start, rate)
         best = np.argmin(way, axis=0)
         return clip, start, rate, way[best, np.arange(len(start))] + unary, free[best], piece
 
-    def _ways(self, before: States, free: np.ndarray, ends: np.ndarray, clip, start, rate) -> np.ndarray:
+    def ways(self, before: States, free: np.ndarray, ends: np.ndarray, clip, start, rate) -> np.ndarray:
         """(B, K) cost of coming by the states `free` (B,), which end at library frames `ends` (B,), to frames start
         (K,) of clips (K,) at a rate (K,): a cut, unless the clip shows that frame next anyway."""
         cut = self.costs.cut(ends, start)

@@ -108,3 +108,13 @@ def test_hard_seams_are_told_in_the_report(cut, track_of, library):
     told = [line for line in evaluate(rough, track_of(rough), library)["warnings"] if "jolt" in line]
     assert len(told) == 1 and told[0].startswith("13.9-14.1 s: ")
     assert jolts(np.arange(100.0), np.array([10]), np.array([1.29])) is None
+
+
+def test_every_line_carries_its_seconds(cut, told, library, track_of):
+    take = cut(("jog.bvh", 0, 60), ("walk.bvh", 0, 60, 1.25), ("jog.bvh", 240, 60))
+    line = told(take)[0]
+    assert [(round(a, 1), round(b, 1)) for a, b in line.spans] == [(12.0, 13.9)]
+    report = evaluate(take, track_of(take, shift=(0.5, 0.0)), library)
+    assert len(report["warning_seconds"]) == len(report["warnings"]) > 1
+    assert all(first <= last for spans in report["warning_seconds"] for first, last in spans)
+    assert report["warning_seconds"][[line.split(":")[0] for line in report["warnings"]].index("12.0-13.9 s")] == [[12.0, 13.933]]

@@ -1,0 +1,152 @@
+"""The figures of a take frame by frame, and its footprints: what overlays and curves show of it.
+
+Nothing is measured here that the report does not measure: `root`, `feet` and `jerk` say how
+(`../shared/metrics.md`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion.striking import faster_middle, nearest_on, surfaces
+from . import feet, jerk, root
+from .moments import Moment, met, touching_words, written_ball
+from .view import View
+
+
+@dataclass(frozen=True, eq=False)
+class PerFrame:
+    """Figures of T output frames, NaN where nothing is known.
+
+    times (T,) s on the track's clock. track (T, 2) m: where the measured track is. root_error, pelvis_error (T,) m.
+    slide (T, 2) m/s: speed of each foot (left, right) over the ground while it stands. correction (T, 2) m by which
+    polish moved each foot. jerk (T,): the largest within +-8 frames, over the 95th percentile of recordings at that
+    speed. speed, asked_speed (T,) m/s behind a 1 s window.
+    """
+
+    times: np.ndarray
+    track: np.ndarray
+    root_error: np.ndarray
+    pelvis_error: np.ndarray
+    slide: np.ndarray
+    correction: np.ndarray
+    jerk: np.ndarray
+    speed: np.ndarray
+    asked_speed: np.ndarray
+
+    @property
+    def speed_gap(self) -> np.ndarray:
+        """(T,) m/s by which the body is faster than the track asks."""
+        return self.speed - self.asked_speed
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """One stance. side: 0 left, 1 right. start, end: its first and last second. heel, toe: mean places (2,) m of the
+    foot's joints on the ground; where they are the same the foot has no toe joint. direction: radians of the foot, from
+    +x. slide: metres that its toe travelled (`feet.stance_travel`)."""
+
+    side: int
+    start: float
+    end: float
+    heel: tuple[float, float]
+    toe: tuple[float, float]
+    direction: float
+    slide: float
+
+
+@dataclass(frozen=True, eq=False)
+class Strike:
+    """One key moment in space. time: seconds; words: what was asked. part: the point (3,) m of the body's striking
+    surface that is nearest to the ball's centre, ball: that centre (3,) m, gap: metres between both surfaces; where no
+    ball is met, `part` is the pelvis, ball None and gap NaN."""
+
+    time: float
+    words: tuple[str, ...]
+    part: np.ndarray
+    ball: np.ndarray | None
+    gap: float
+
+
+def per_frame(view: View) -> PerFrame:
+    """The figures of every frame."""
+    played, count = view.played, view.count
+    unknown = np.full(count, np.nan)
+    wanted = np.full((count, 2), np.nan) if view.wanted is None else view.wanted
+    known = view.wanted is not None
+    slides = np.full((count, 2), np.nan)
+    slides[1:] = feet.contact_speeds(played.feet, played.contacts, view.fps)
+    corrected = np.full((count, 2), np.nan) if played.correction is None else np.asarray(played.correction, float)
+    hard = unknown.copy()
+    if view.reference is not None and count > jerk.SEAM_TO_JERK + 1:
+        values = jerk.jerk(played.positions, view.fps)
+        hard[jerk.SEAM_TO_JERK :][: len(values)] = jerk.ratios(values, view.speed, view.reference.jerk_p95)
+    return PerFrame(
+        times=played.times,
+        track=wanted,
+        root_error=root.root_error(played.pelvis, wanted, view.fps) if known else unknown,
+        pelvis_error=root.pelvis_error(played.pelvis, wanted) if known else unknown,
+        slide=slides,
+        correction=corrected,
+        jerk=hard,
+        speed=view.speed,
+        asked_speed=root.travel_speed(wanted, view.fps) if known else unknown,
+    )
+
+
+def footprints(view: View) -> tuple[Footprint, ...]:
+    """Every stance, in the order of time."""
+    played = view.played
+    spans = feet.stances(played.contacts)
+    travel = feet.stance_travel(played.feet[:, :, 1], spans)
+    found = [_footprint(view, *span, slide) for span, slide in zip(spans.tolist(), travel.tolist())]
+    return tuple(sorted(found, key=lambda print_: (print_.start, print_.side)))
+
+
+def _footprint(view: View, first: int, end: int, side: int, slide: float) -> Footprint:
+    played = view.played
+    heel, toe = played.feet[first:end, side, :, :2].mean(axis=0)
+    along = toe - heel
+    if np.hypot(*along) < 1e-3:  # no toe joint: the foot points where the body goes
+        along = played.pelvis[min(end, view.count - 1)] - played.pelvis[max(first - 1, 0)]
+    direction = float(np.arctan2(along[1], along[0]))
+    return Footprint(
+        side, float(played.times[first]), float(played.times[end - 1]), tuple(heel.tolist()), tuple(toe.tolist()),
+        direction, slide,
+    )  # fmt: skip
+
+
+def strikes(view: View) -> tuple[Strike, ...]:
+    """Every key moment, in the order of the timeline."""
+    return tuple(_strike(view, moment) for moment in view.moments)
+
+
+def _strike(view: View, moment: Moment) -> Strike:
+    played, words = view.played, touching_words(moment)
+    when, gap = met(played, moment)
+    found = surfaces(played.motion.skeleton, words)
+    if not np.isfinite(gap) or not found:
+        part = played.positions[moment.frame, played.body.hips]
+        if found:
+            part = faster_middle(found, *_around(view, moment.frame))[-1]
+        return Strike(moment.asked.time, moment.asked.words, part, None, np.nan)
+    frame = int(np.clip(round((when - played.start_time) * view.fps), 0, view.count - 1))
+    ball = written_ball(played, frame)
+    lines = [surface.line(played.positions[frame], played.rotations[frame]) for surface in found]
+    skins = [_skin(nearest_on(line, ball), ball, surface.radius) for line, surface in zip(lines, found)]
+    part = min(skins, key=lambda point: float(np.linalg.norm(point - ball)))
+    return Strike(when, moment.asked.words, part, ball, gap)
+
+
+def _skin(inside: np.ndarray, ball: np.ndarray, radius: float) -> np.ndarray:
+    """The point (3,) m of a surface, `radius` m off its line's point `inside` (3,), towards the ball (3,)."""
+    away = ball - inside
+    return inside + away * min(1.0, radius / max(float(np.linalg.norm(away)), 1e-9))
+
+
+def _around(view: View, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """Joints' places and rotations of some frames up to `frame`."""
+    frames = slice(max(frame - 3, 0), frame + 1)
+    return view.played.positions[frames], view.played.rotations[frames]
