@@ -13,11 +13,13 @@ from . import (
     cancel,
     command,
     discard,
+    error_curves,
     export_bvh,
     import_clip,
     import_clips,
     import_tracking,
     import_words,
+    jump_to,
     keymap,
     list_clips,
     load_video,
@@ -67,6 +69,8 @@ CLASSES = (
     show_video.BEYOND_MOCAP_OT_show_video,
     move_video.BEYOND_MOCAP_OT_move_video,
     remove_video.BEYOND_MOCAP_OT_remove_video,
+    jump_to.BEYOND_MOCAP_OT_jump_to,
+    error_curves.BEYOND_MOCAP_OT_error_curves,
 )
 
 

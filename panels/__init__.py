@@ -5,7 +5,7 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 
 import bpy
 
-from . import library, menus, players, preferences, result, synthesis, video
+from . import library, menus, players, preferences, quality, result, synthesis, video, view
 
 CLASSES = (
     library.BEYOND_MOCAP_UL_clips,
@@ -15,6 +15,8 @@ CLASSES = (
     video.BEYOND_MOCAP_PT_video,
     synthesis.BEYOND_MOCAP_PT_synthesis,
     result.BEYOND_MOCAP_PT_result,
+    quality.BEYOND_MOCAP_PT_quality,
+    view.BEYOND_MOCAP_PT_view,
     preferences.BeyondMocapPreferences,
 )
 

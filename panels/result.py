@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.settings import active_player
-from .tab import Step, paragraph, table
+from .tab import Step
 
 
 class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
-    """Accept or discard, and how well the active player's take came out."""
+    """Accept or discard."""
 
     bl_label = "4  Result"
     bl_order = 4
 
     def draw(self, context):
-        """Button, what is made, figures, key moments, warnings."""
+        """Button, what is made."""
         layout, settings = self.layout, context.scene.beyond_mocap
         row = layout.row(align=True)
         row.scale_y = 1.3
@@ -33,13 +32,3 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
             body.prop(settings, "start_frame")
             body.prop(settings, "start_time")
             body.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
-        player = active_player(settings)
-        if player is not None and player.quality:
-            box = layout.box()
-            box.label(text=player.name, icon="INFO")
-            table(box, player.quality.splitlines())
-            column = box.column(align=True)
-            for line in player.moments.splitlines():
-                paragraph(column, line, "KEYTYPE_KEYFRAME_VEC")
-            for line in player.warnings.splitlines():
-                paragraph(column, line, "ERROR")

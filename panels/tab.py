@@ -26,11 +26,16 @@ def table(layout, lines) -> None:
 
 def paragraph(layout, text: str, icon: str) -> None:
     """Text over as many lines as the sidebar's width asks for, since labels are cut; an icon before the first."""
-    width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
     column = layout.column(align=True)
     column.scale_y = 0.85
-    for number, line in enumerate(textwrap.wrap(text, max(16, int((width - EDGES) / LETTER)))):
+    for number, line in enumerate(wrapped(text)):
         column.label(text=line, icon="BLANK1" if number else icon)
+
+
+def wrapped(text: str) -> list[str]:
+    """Text as lines that fit the sidebar's width."""
+    width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
+    return textwrap.wrap(text, max(16, int((width - EDGES) / LETTER)))
 
 
 class Step:

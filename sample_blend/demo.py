@@ -84,7 +84,7 @@ def prepare(bpy) -> None:
 def synthesize(load, settings, steps) -> list[dict]:
     """Library and takes, kept for Accept; returns the players' reports."""
     plans, session = load("scene.plans"), load("scene.session")
-    order, recipe = load("operators.written"), load("beyond_mocap.synthesize")
+    quality, recipe = load("scene.quality"), load("beyond_mocap.synthesize")
     steps.enter("Library")
     begun = time.perf_counter()
     clips = load("beyond_mocap.library.library").build(settings.library_folder, progress=steps.progress)
@@ -102,7 +102,7 @@ def synthesize(load, settings, steps) -> list[dict]:
         reports.append(load("beyond_mocap.evaluation.report").evaluate(take, plan.track, clips))
         reports[-1]["seconds"].update(load=load_seconds, library=library_seconds, total=total)
         player.take = session.keep_take(plan, take)
-        player.quality, player.moments = order.quality(reports[-1]), order.moments(reports[-1])
+        player.quality, player.moments = quality.quality(reports[-1]), quality.moments(reports[-1])
     return reports
 
 

@@ -14,6 +14,7 @@
 - `strips`      a player's timeline as NLA strips on his dot; `lanes` reads, `lay_strips` writes those of any object,
                 `strip_lines` is what one of them says
 - `migrate`   what earlier versions have saved
+- `view_settings`, `overlays`   what is drawn over the 3D view; `quality`, `error_curves` what a report says, in the file
 - `background`  long work in a thread
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -22,11 +23,15 @@ The classes are registered in the order of CLASSES: what others point to comes f
 
 import bpy
 
-from . import background, clips, dots, lanes, migrate, result, session, settings, strip_lines, video, watch
+from . import (
+    background, clips, dots, lanes, migrate, overlays, result, session, settings, strip_lines, video, view_settings, watch,
+)
 
 CLASSES = (
     *result.CLASSES,
     video.BeyondMocapVideo,
+    view_settings.BeyondMocapView,
+    view_settings.BeyondMocapPlayhead,
     strip_lines.BeyondMocapLine,
     lanes.BeyondMocapLanes,
     dots.BeyondMocapDot,
@@ -42,6 +47,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_dot", dots.BeyondMocapDot),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
     ("WindowManager", "beyond_mocap_work", settings.BeyondMocapWork),
+    ("WindowManager", "beyond_mocap_playhead", view_settings.BeyondMocapPlayhead),
     ("WindowManager", "beyond_mocap_clips", clips.BeyondMocapClips),
 )
 
@@ -55,10 +61,12 @@ def register():
     watch.register()
     video.register()
     migrate.register()
+    overlays.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    overlays.unregister()
     background.stop()
     video.unregister()
     migrate.unregister()

@@ -16,6 +16,10 @@ from ..beyond_mocap.motion.motion import Motion, at_frames
 from . import armature, channels, linked
 from .measure import frames_per_second, whole_frames
 
+PLACED = "beyond_mocap_placement"
+"""Custom property of an action: the 16 numbers of the armature's matrix when the motion was written onto it, so that
+what is drawn beside the body follows it when it is moved."""
+
 
 def write(
     body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
@@ -45,7 +49,9 @@ def write(
     for joint, bone in enumerate(motion.skeleton.names):
         body.pose.bones[bone].rotation_mode = "QUATERNION"
         curves[_path(bone, "rotation_quaternion")] = (bone, pose[:, joint])
-    return channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
+    action = channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
+    action[PLACED] = [number for row in body.matrix_world for number in row]
+    return action
 
 
 def read(

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..beyond_mocap.take import Take
 from . import bake, channels
+from .action import PLACED
 from .bake import MARK
 from .measure import frames_per_second
 from .set_aside import purge_action
@@ -79,6 +80,7 @@ def as_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTr
     for number, block in enumerate(pieces):
         action, part = channels.cut(whole, slot, block.start, block.end, block.name)
         action[MARK], action[BLOCKS] = True, json.dumps([[block.start, block.end, block.name]])
+        _keep_place(whole, action)
         strip = track.strips.new(block.name, block.start, action)
         strip.action_slot = part
         strip.use_sync_length = False
@@ -105,10 +107,17 @@ def as_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Actio
         whole, slot = channels.joined(pieces, f"{body.name} take", body.name)
         channels.assign(body, whole, slot)
         whole[MARK] = True
+        _keep_place(parts[0][0], whole)
         whole[BLOCKS] = json.dumps([[block.start, block.end, block.name] for _, _, block in parts])
     _clear(track)
     body.animation_data.nla_tracks.remove(track)
     return whole
+
+
+def _keep_place(source: bpy.types.Action, made: bpy.types.Action) -> None:
+    """Note on a made action where the body stood when the motion was written."""
+    if PLACED in source:
+        made[PLACED] = list(source[PLACED])
 
 
 def track_of(body: bpy.types.Object) -> bpy.types.NlaTrack | None:

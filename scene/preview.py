@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 
 from ..beyond_mocap.errors import InputError
-from . import bake, blocks, channels, session, stage
+from . import bake, blocks, channels, error_curves, session, stage
 from .bake import MARK
 from .result import BeyondMocapResult
 from .set_aside import bring_back, drop, play_as_before, put_aside
@@ -48,6 +48,7 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
         body = bake.player(context, player, made)
     blocks.note(channels.playing(body)[0], made.take, context.scene)
     result.state = "PREVIEW"
+    error_curves.renew(context.scene, player)
     share(context)
     return body
 
@@ -96,6 +97,7 @@ def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     else:
         _undress(context, player)
         if body is not None:
+            error_curves.remove(body)
             _remove_armature(body)
         player.body = result.body
     for name in LINES:
@@ -104,6 +106,7 @@ def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
         setattr(result, name, getattr(result, f"{name}_before"))
     _settle(player)
     result.state = "ACCEPTED" if accepted else "NONE"
+    error_curves.renew(context.scene, player)
     share(context)
 
 

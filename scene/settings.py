@@ -14,6 +14,7 @@ from bpy.props import (
 
 from .result import BeyondMocapResult, BeyondMocapShared
 from .video import BeyondMocapVideo, renew
+from .view_settings import BeyondMocapView
 
 METHODS = (
     ("path", "On the path", "The player's body is laid on the track, with the sway of the clips kept"),
@@ -186,6 +187,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     accept_as: EnumProperty(name="Accept As", items=FORMS, default="ACTION", description="What an accepted take becomes")
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
     shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
+    view: PointerProperty(type=BeyondMocapView, description="What is drawn over the 3D view")
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):

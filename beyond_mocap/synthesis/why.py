@@ -40,6 +40,7 @@ PARTS = {
     "cut": "the cut itself, and wild motion entered",
     "replay": "shown a moment ago",
     "rate_change": "change of playing speed",
+    "avoided": "a word that must not be",
 }
 """Name of a part of the costs -> what it is about."""
 
@@ -212,23 +213,26 @@ def _state_before(search: PathSearch, way: _Way, slot: int) -> tuple[States, np.
 
 
 def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -> Iterator[Other]:
-    """The cheapest clips but the chosen one that the search was offered for a slot, each by its best frame."""
+    """The cheapest clips but the chosen one that the search was offered for a slot, each by its best frame; where a key
+    moment's piece begins, those that serve it too."""
     edge = int(np.searchsorted(search.edges, way.edges[slot]))
     if search.edges[min(edge, len(search.edges) - 1)] != way.edges[slot]:
         return
-    clip, start, rate, cost, _ = search.offered(edge)
+    clip, start, rate, cost, piece = search.offered(edge)
     if slot:
         before, ends = _state_before(search, way, slot)
         cost = cost + search.ways(before, np.zeros(1, int), ends, clip, start, rate)[0]
-    best: dict[int, float] = {}
+    serves = np.append(search.pieces.wanted, -1)
+    cost = np.where(serves[piece] == serves[way.piece[slot]], cost, np.inf)
+    names = [(clip.path, clip.mirrored) for clip in search.library.clips]
+    known = {names[way.clip[slot]]}
     for number in np.argsort(cost, kind="stable"):
-        if clip[number] != way.clip[slot] and np.isfinite(cost[number]):
-            best.setdefault(int(clip[number]), float(cost[number]))
-        if len(best) == count:
-            break
-    for number, value in best.items():
-        other = search.library.clips[number]
-        yield Other(other.path, other.mirrored, value - paid)
+        name = names[clip[number]]
+        if not np.isfinite(cost[number]) or len(known) > count:
+            return
+        if name not in known:
+            known.add(name)
+            yield Other(*name, float(cost[number]) - paid)
 
 
 def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam, others=()) -> Reason:

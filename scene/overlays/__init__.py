@@ -1,0 +1,28 @@
+"""What is drawn over the 3D view: where a take is off, where feet stood, where it is cut and why.
+
+- `colours`   one table of colours that all eyes tell apart
+- `shapes`    vertex arrays of soles, rails, bars, figures
+- `prepare`   a take as vertex arrays and lines of text; knows neither bpy nor gpu
+- `store`     which takes are prepared: in a thread, once per take, forgotten when no player shows them
+- `place`     where a take lies in the scene now, and its clock
+- `draw`      the handlers of the view: they only look up
+"""
+
+import bpy
+
+from . import draw, store
+
+
+def register():
+    """Watch for new takes and draw them; without a window there is nothing to draw on."""
+    if not bpy.app.background:
+        store.register()
+        draw.register()
+
+
+def unregister():
+    """Take the handlers away and free what was prepared."""
+    if not bpy.app.background:
+        draw.unregister()
+        store.unregister()
+    store.clear()

@@ -1,0 +1,264 @@
+"""A take as vertex arrays and lines of text, all worked out before anything is drawn. Metres, the track's clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import colours, shapes
+
+if TYPE_CHECKING:  # the core's modules are slow to import, and switching the extension on has to be quick
+    from ...beyond_mocap.evaluation.per_frame import Footprint, PerFrame, Strike
+    from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.plan import Plan
+    from ...beyond_mocap.synthesis.why import Reason
+    from ...beyond_mocap.take import Take
+
+RAIL, SOLE, SOLE_EDGE, SEAM = 0.020, 0.024, 0.027, 0.030  # metres above the ground, each over the last
+RAILS, HALF_SEAM = (0.13, 0.17), 0.35
+SPEED_FOOT, PER_SPEED = 0.05, 0.2  # metres of the speed curtain's foot, and of its height for each m/s
+BALL_SECONDS = 1.0
+BALL_RADIUS = 0.11
+MOST_PARTS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """kind: "TRIS" or "LINES". points (N, 3) float32 m, colours (N, 4) float32. width: of lines, in pixels."""
+
+    kind: str
+    points: np.ndarray
+    colours: np.ndarray
+    width: float = 1.0
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One uncut piece: start, end s; place (3,) m of its seam on the ground; name: of the clip, short; lines: why it was
+    chosen."""
+
+    start: float
+    end: float
+    place: tuple[float, float, float]
+    name: str
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Label:
+    """Text at a place (3,) m; it is about `time` s."""
+
+    time: float
+    place: tuple[float, float, float]
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """All that is shown of one take.
+
+    times (T,) s. meshes: overlay -> its meshes. pelvis (T, 3) m; toes (T, 2, 3) m and stands (T, 2) of left and right
+    foot; figures (T, J, 3) m, pairs (B, 2) and pair_colours (2 B, 4) of stick figures. seams (S,) frames. pieces,
+    labels: in the order of time. figures_of: the figures of every frame.
+    """
+
+    times: np.ndarray
+    meshes: dict[str, tuple[Mesh, ...]]
+    pelvis: np.ndarray
+    toes: np.ndarray
+    stands: np.ndarray
+    figures: np.ndarray
+    pairs: np.ndarray
+    pair_colours: np.ndarray
+    seams: np.ndarray
+    pieces: tuple[Piece, ...]
+    labels: tuple[Label, ...]
+    figures_of: "PerFrame"
+
+    def frame(self, seconds: float) -> int:
+        """The output frame nearest to a second; the first or last beyond the ends."""
+        last = len(self.times) - 1
+        fps = last / (self.times[-1] - self.times[0]) if last else 1.0
+        return int(min(max(round((seconds - self.times[0]) * fps), 0), last))
+
+    def piece(self, seconds: float) -> Piece | None:
+        """The piece that is played at a second."""
+        return next((p for p in self.pieces if p.start <= seconds < p.end), None)
+
+
+def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
+    """Everything about one take. library: what it was made from; None: nothing is compared with its recordings."""
+    from ...beyond_mocap.evaluation import played_from_take
+    from ...beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
+    from ...beyond_mocap.evaluation.view import View
+
+    view = View(played_from_take(take), plan.track, take.timeline, library)
+    figures, met = per_frame(view), strikes(view)
+    positions = view.played.positions.astype(np.float32)
+    ground = view.played.pelvis if view.wanted is None else figures.track
+    skeleton = take.motion.skeleton
+    pairs = shapes.figure_pairs(skeleton.parents)
+    meshes = {
+        "track": _track(figures),
+        "footprints": _footprints(footprints(view)),
+        "seams": _seams(view.played.pelvis, take.seams),
+        "moments": _moments(met, take),
+        "speed": _speed(ground, figures),
+    }
+    return Prepared(
+        times=figures.times,
+        meshes={name: found for name, found in meshes.items() if found},
+        pelvis=positions[:, view.played.body.hips],
+        toes=view.played.feet[:, :, 1].astype(np.float32),
+        stands=view.played.contacts,
+        figures=positions,
+        pairs=pairs,
+        pair_colours=_pair_colours(skeleton.names, pairs),
+        seams=np.asarray(take.seams, int),
+        pieces=_pieces(plan, take, library, view.played.pelvis),
+        labels=tuple(_label(strike) for strike in met),
+        figures_of=figures,
+    )
+
+
+def _track(figures: "PerFrame") -> tuple[Mesh, ...]:
+    """Rails along the measured track, coloured by root error; between them stay the footprints."""
+    if len(figures.times) < 2 or not np.isfinite(figures.track).all():
+        return ()
+    points, owner = shapes.rails(figures.track, *RAILS, RAIL)
+    return (Mesh("TRIS", points, colours.scaled(figures.root_error, colours.ROOT_STOPS, 0.9)[owner]),)
+
+
+def _footprints(found: tuple["Footprint", ...]) -> tuple[Mesh, ...]:
+    """Soles coloured by slide, their edges by side."""
+    if not found:
+        return ()
+    side = np.array([p.side for p in found])
+    places = [np.array([getattr(p, name) for p in found]) for name in ("heel", "toe", "direction")]
+    fill, edge = shapes.soles(*places, side, SOLE)
+    slide = colours.scaled(np.array([p.slide for p in found]), colours.SLIDE_STOPS, 0.8)
+    sides = np.array([(*colours.LEFT, 1.0), (*colours.RIGHT, 1.0)], np.float32)[side]
+    edge[:, 2] = SOLE_EDGE
+    return (
+        Mesh("TRIS", fill, slide.repeat(len(fill) // len(found), axis=0)),
+        Mesh("LINES", edge, sides.repeat(len(edge) // len(found), axis=0), 2.0),
+    )
+
+
+def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
+    """A bar across the way at every seam, light on dark."""
+    if not len(seams):
+        return ()
+    points = shapes.bars(pelvis, np.asarray(seams, int), HALF_SEAM, SEAM)
+    return (
+        Mesh("LINES", points, colours.repeated(colours.BLACK, len(points), 0.8), 5.0),
+        Mesh("LINES", points, colours.repeated(colours.SEAM, len(points)), 2.5),
+    )
+
+
+def _moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
+    """Strike points, the ball then and its way about them, and the gap between the two."""
+    lines: list[tuple[np.ndarray, tuple]] = []
+    for strike in found:
+        lines.append((shapes.cross(strike.part, 0.06), colours.STRIKE))
+        if strike.ball is None:
+            continue
+        lines.append((shapes.circle(strike.ball, BALL_RADIUS, up=True), colours.BALL))
+        lines.append((np.array([strike.part, strike.ball], np.float32), colours.GAP))
+        near = np.abs(take.ball.times - strike.time) <= BALL_SECONDS
+        if near.sum() > 1:
+            lines.append((shapes.along(take.ball.positions[near]), colours.BALL))
+    if not lines:
+        return ()
+    points = np.concatenate([points for points, _ in lines]).astype(np.float32)
+    return (Mesh("LINES", points, np.concatenate([colours.repeated(rgb, len(p)) for p, rgb in lines]), 2.0),)
+
+
+def _speed(path: np.ndarray, figures: "PerFrame") -> tuple[Mesh, ...]:
+    """The asked speed as a curtain over the track, the body's own as a line."""
+    if len(path) < 2 or not np.isfinite(figures.asked_speed).all() or not np.isfinite(path).all():
+        return ()
+    asked, played = (SPEED_FOOT + PER_SPEED * values for values in (figures.asked_speed, figures.speed))
+    fill = shapes.curtain(path, asked, SPEED_FOOT)
+    over = [shapes.along(np.concatenate([path, top[:, None]], axis=1)) for top in (asked, played)]
+    return (
+        Mesh("TRIS", fill, colours.repeated(colours.ASKED, len(fill), 0.22)),
+        Mesh("LINES", over[0], colours.repeated(colours.ASKED, len(over[0])), 1.5),
+        Mesh("LINES", over[1], colours.repeated(colours.PLAYED, len(over[1])), 2.0),
+    )
+
+
+def _pair_colours(names: tuple[str, ...], pairs: np.ndarray) -> np.ndarray:
+    from ...beyond_mocap.motion.humanoid import side_and_part
+
+    table = {"left": colours.LEFT, "right": colours.RIGHT}
+    of_joint = [table.get(side_and_part(names[joint])[0], colours.MIDDLE) for _, joint in pairs]
+    return np.array([(*rgb, 0.75) for rgb in of_joint], np.float32).repeat(2, axis=0)
+
+
+def _label(strike: "Strike") -> Label:
+    gap = f"  gap {1000 * strike.gap:.0f} mm" if np.isfinite(strike.gap) else ""
+    place = strike.part if strike.ball is None else strike.ball
+    return Label(strike.time, tuple(map(float, place)), f"{strike.time:.2f} s  {' '.join(strike.words)}{gap}")
+
+
+def _pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.ndarray) -> tuple[Piece, ...]:
+    """The pieces, with the reasons of the search where its library is known."""
+    last = len(pelvis) - 1
+    return tuple(
+        Piece(
+            take.start_time + start, take.start_time + end,
+            (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines,
+        )  # fmt: skip
+        for start, end, name, lines in _told(plan, take, library)
+    )
+
+
+def _told(plan: "Plan", take: "Take", library: "Library | None"):
+    """start, end (seconds from the take's first), name and lines of every piece."""
+    if library is None or take.edit is None:
+        edges = [0, *map(int, take.seams), len(take.clip)]
+        for low, high in zip(edges, edges[1:]):
+            name = short(take.clips[take.clip[low]], bool(take.mirrored[low]))
+            shown = take.clip_frame[[low, high - 1]]
+            yield low / take.motion.fps, high / take.motion.fps, name, (name, f"frames {shown[0]:.0f} to {shown[1]:.0f}")
+        return
+    for reason in _reasons(plan, take, library):
+        name = short(reason.path, reason.mirrored)
+        yield reason.first / library.fps, reason.end / library.fps, name, reason_lines(reason, name)
+
+
+def _reasons(plan: "Plan", take: "Take", library: "Library") -> list["Reason"]:
+    from ...beyond_mocap.synthesis.balance import balanced
+    from ...beyond_mocap.synthesis.wanted import wanted
+    from ...beyond_mocap.synthesis.why import block_reasons, reasons
+    from ...beyond_mocap.synthesize import with_made_gaits
+
+    library = with_made_gaits(library, plan, lambda fraction, text: None)
+    order = wanted(library, plan)
+    if plan.method == "path":
+        return reasons(library, order, take.edit, balanced(plan.alpha))
+    return block_reasons(library, order, take.edit, plan.alpha)
+
+
+def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
+    """Why a piece was chosen, in a few lines."""
+    from ...beyond_mocap.synthesis.why import PARTS
+
+    lines = [name, f"frames {reason.shown[0]:.0f} to {reason.shown[1]:.0f}, played at {reason.rate:.2f} x"]
+    lines.append(f"cost {reason.cost:.2f}" + (f", {sum(reason.seam.values()):.2f} of it for the cut" if reason.seam else ""))
+    both = {part: reason.costs.get(part, 0.0) + reason.seam.get(part, 0.0) for part in PARTS}
+    dear = sorted((p for p in both.items() if abs(p[1]) >= 0.005), key=lambda part: -abs(part[1]))[:MOST_PARTS]
+    lines += [f"{value:.2f}  {PARTS[part]}" for part, value in dear]
+    if reason.others:
+        lines.append("next at its start:")
+        lines += [f"{other.more:+.2f}  {short(other.path, other.mirrored)}" for other in reason.others]
+    return tuple(lines)
+
+
+def short(path: str, mirrored: bool) -> str:
+    """A clip's name for people: without folder's length and ending, with a word for its mirroring."""
+    name = path.rpartition("/")[2].removesuffix(".bvh")
+    return f"{name} (mirrored)" if mirrored else name

@@ -1,0 +1,170 @@
+"""Which takes are prepared for drawing: once each, in a thread, forgotten when no player shows them any more.
+
+`sync` is cheap and called whenever the file has changed: it compares a few names. What is missing is prepared in the
+background while nothing else is made, and the views are drawn again once it is there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .. import background, session
+from ..settings import active_player
+from . import place
+
+if TYPE_CHECKING:
+    from .prepare import Prepared
+
+KIND = "view"
+WAIT = 0.1  # seconds between two looks at the thread
+
+_prepared: dict[str, "Prepared"] = {}
+_refused: set[str] = set()
+_running: list[tuple[background.Job, str]] = []  # at most one, with the name of its take
+
+
+def prepared(take: str) -> "Prepared | None":
+    """What is drawn of the take of that name; None while it is not prepared."""
+    return _prepared.get(take)
+
+
+def shown_players(settings) -> list:
+    """The players that the overlays are about."""
+    if settings.view.players == "TICKED":
+        return [player for player in settings.players if player.use and player.take]
+    player = active_player(settings)
+    return [player] if player is not None and player.take else []
+
+
+def prepare_now(scene: bpy.types.Scene) -> None:
+    """Prepare everything that is missing at once; for scripts."""
+    orders = _missing(scene)
+    _prepared.update(_work(orders, None, lambda: False, None))
+
+
+def sync(scene: bpy.types.Scene) -> None:
+    """Forget what no player shows, and begin to prepare what is missing."""
+    settings = getattr(scene, "beyond_mocap", None)
+    if settings is None:
+        return
+    kept = {player.take for any_scene in bpy.data.scenes for player in any_scene.beyond_mocap.players}
+    for name in [name for name in _prepared if name not in kept]:
+        del _prepared[name]
+    _refused.intersection_update(kept)
+    if _missing(scene) and not bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.register(_poll, first_interval=WAIT)
+
+
+def clear() -> None:
+    """Forget everything, and stop what runs."""
+    background.stop(KIND)
+    _running.clear()
+    _prepared.clear()
+    _refused.clear()
+
+
+def tell_why(scene: bpy.types.Scene) -> None:
+    """Put the text about the piece at the playhead where the panel finds it."""
+    window, settings = bpy.context.window_manager, scene.beyond_mocap
+    player = active_player(settings)
+    found = prepared(player.take) if player is not None and player.take else None
+    piece = found.piece(place.seconds_at(scene)) if found else None
+    text = "\n".join(piece.lines) if piece else ""
+    if window is not None and window.beyond_mocap_playhead.why != text:
+        window.beyond_mocap_playhead.why = text
+
+
+def register():
+    """Watch the file and the playhead."""
+    for handlers, watch in _watches():
+        handlers.append(watch)
+
+
+def unregister():
+    """Stop watching."""
+    for handlers, watch in _watches():
+        if watch in handlers:
+            handlers.remove(watch)
+    if bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.unregister(_poll)
+
+
+def _watches():
+    on = bpy.app.handlers
+    return (
+        (on.depsgraph_update_post, _file_changed), (on.undo_post, _file_changed), (on.redo_post, _file_changed),
+        (on.load_post, _file_changed), (on.frame_change_post, _frame_changed),
+    )  # fmt: skip
+
+
+@persistent
+def _file_changed(_what, *_more):
+    if bpy.context.scene is not None:
+        sync(bpy.context.scene)
+        tell_why(bpy.context.scene)
+
+
+@persistent
+def _frame_changed(scene, *_more):
+    if not bpy.app.is_job_running("RENDER"):
+        tell_why(scene)
+
+
+def _missing(scene: bpy.types.Scene) -> list[tuple]:
+    """(name, plan, take, library) of takes that are to be shown and not prepared."""
+    settings = scene.beyond_mocap
+    players = [*shown_players(settings), *filter(None, [active_player(settings)])]
+    names = dict.fromkeys(player.take for player in players if player.take)
+    orders = []
+    for name in names:
+        made = session.made(name)
+        if name not in _prepared and name not in _refused and made is not None:
+            library = session.library(made.plan.library, settings.library_unit or None) if made.plan.library else None
+            orders.append((name, made.plan, made.take, library))
+    return orders
+
+
+def _work(orders, _progress, cancelled, _hurry) -> dict[str, "Prepared"]:
+    from .prepare import prepare
+
+    found = {}
+    for name, plan, take, library in orders:
+        if cancelled():
+            break
+        found[name] = prepare(plan, take, library)
+    return found
+
+
+def _poll() -> float | None:
+    """One look: start the thread, wait for it, or take what it brings."""
+    window, scene = bpy.context.window_manager, bpy.context.scene
+    if not _running:
+        orders = _missing(scene)[:1]
+        if not orders:
+            return None
+        if window.beyond_mocap_work.kind:  # something is being made: it comes first
+            return 5 * WAIT
+        _running.append((background.Job(KIND, lambda *asking: _work(orders, *asking)), orders[0][0]))
+        return WAIT
+    job, name = _running[0]
+    if not job.poll():
+        return WAIT
+    _running.clear()
+    _prepared.update(job.result or {})
+    if job.error is not None:
+        _refused.add(name)
+        print(f"Beyond Mocap: nothing can be drawn of {name}: {job.error}")
+    tell_why(scene)
+    redraw()
+    return WAIT
+
+
+def redraw() -> None:
+    """Let all 3D views be drawn again."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
