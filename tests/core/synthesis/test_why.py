@@ -77,3 +77,13 @@ def test_blocks_tell_words_and_pose(library, order):
     assert not found[0].seam and all(reason.seam["pose"] >= 0.0 for reason in found[1:] if reason.seam)
     walking = [r for r in found if all("walking" in library.clips[r.clip].words_at(f) for f in np.linspace(*r.shown, 9))]
     assert walking and all(r.costs["words"] < 0.0 for r in walking)
+
+
+def test_a_word_that_must_not_be_is_paid_for_and_told(library, track_of):
+    from beyond_mocap.annotation import parse_timeline
+    from beyond_mocap.synthesis.wanted import wanted
+
+    asked = wanted(library, Plan(track=track_of(), timeline=parse_timeline("0 8 -walking\n", "words", 30.0, 0.0)))
+    search = Paid(library, asked)
+    found = reasons(library, asked, search.run(), Weights(), others=0)
+    assert sum(reason.cost for reason in found) == pytest.approx(search.paid, rel=1e-5, abs=2e-3)
