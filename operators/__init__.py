@@ -8,6 +8,7 @@ import bpy
 from . import (
     accept,
     add_stage,
+    annotate,
     annotate_clip,
     build_library,
     cancel,
@@ -65,6 +66,7 @@ CLASSES = (
     accept.BEYOND_MOCAP_OT_accept,
     discard.BEYOND_MOCAP_OT_discard,
     add_stage.BEYOND_MOCAP_OT_add_stage,
+    annotate.BEYOND_MOCAP_OT_annotate,
     load_video.BEYOND_MOCAP_OT_load_video,
     show_video.BEYOND_MOCAP_OT_show_video,
     move_video.BEYOND_MOCAP_OT_move_video,
@@ -85,6 +87,7 @@ def register():
 def unregister():
     """Take keys and command away and unregister the operators, the last one first."""
     keymap.unregister()
+    annotate.unwatch()
     command.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

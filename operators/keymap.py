@@ -27,7 +27,13 @@ class Entry(NamedTuple):
     properties: Mapping[str, object] = {}
 
 
-ENTRIES: tuple[Entry, ...] = ()
+ENTRIES: tuple[Entry, ...] = (
+    Entry("3D View", "VIEW_3D", "beyond_mocap.annotate", "J"),
+    Entry("NLA Editor", "NLA_EDITOR", "beyond_mocap.annotate", "J"),
+    Entry("Dopesheet", "DOPESHEET_EDITOR", "beyond_mocap.annotate", "J"),
+    Entry("Sequencer", "SEQUENCE_EDITOR", "beyond_mocap.annotate", "J"),
+    Entry("Clip Editor", "CLIP_EDITOR", "beyond_mocap.annotate", "J"),
+)
 
 
 def register():

@@ -5,13 +5,14 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 
 import bpy
 
-from . import library, menus, players, preferences, quality, result, synthesis, video, view
+from . import annotate, library, menus, players, preferences, quality, result, synthesis, video, view
 
 CLASSES = (
     library.BEYOND_MOCAP_UL_clips,
     library.BEYOND_MOCAP_PT_library,
     players.BEYOND_MOCAP_UL_players,
     players.BEYOND_MOCAP_PT_players,
+    annotate.BEYOND_MOCAP_PT_annotate,
     video.BEYOND_MOCAP_PT_video,
     synthesis.BEYOND_MOCAP_PT_synthesis,
     result.BEYOND_MOCAP_PT_result,

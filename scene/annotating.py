@@ -1,0 +1,230 @@
+"""Annotating by keys in a scene: what the library holds, where the playhead is, and commands carried out on strips.
+
+The words go to the active player's dot; while a clip with lanes of its own is the active object, to that clip.
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ..beyond_mocap.annotation import KeyMoment, Span, annotating, swap_sides
+from ..beyond_mocap.annotation.annotating import AddMoment, AddSpan, AtPlayhead, Command, Go, Now, Tell
+from ..beyond_mocap.annotation.decision import Held
+from ..beyond_mocap.errors import InputError
+from . import lanes, lay_strips, plans, session, strips
+from .clock import Clock, of_scene
+from .lanes import PlacedMoment, PlacedSpan
+from .settings import absolute, active_player
+from .tracks import read_track
+
+AT_PLAYHEAD = 0.06
+"""Seconds from the playhead at which a key moment counts as being there, at least a frame."""
+
+_held: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
+
+
+def held(scene: bpy.types.Scene) -> Held | None:
+    """What the library built last from the scene's folder holds; None where none is built."""
+    settings = scene.beyond_mocap
+    library = session.library(absolute(settings.library_folder), settings.library_unit or None)
+    if library is None:
+        return None
+    kept = _held.setdefault(library, {})
+    if settings.mirror not in kept:
+        kept[settings.mirror] = _combinations(library, settings.mirror)
+    return kept[settings.mirror]
+
+
+def name_of(context: bpy.types.Context) -> str:
+    """Who is annotated, for the eye; empty where there is nobody."""
+    clip, player = _clip(context), active_player(context.scene.beyond_mocap)
+    return clip.name if clip else player.name if player else ""
+
+
+def now(context: bpy.types.Context) -> Now:
+    """The playhead on the clock of who is annotated."""
+    scene, (target, clock) = context.scene, _subject(context)
+    time = clock.seconds(scene.frame_current_final)
+    if target is None:
+        return Now(time, 1.0 / clock.fps)
+    ends = [placed.span.end for placed in lanes.spans(target) if not (placed.off or placed.automatic)]
+    ends += [placed.time for placed in lanes.moments(target) if not placed.off]
+    return Now(time, 1.0 / clock.fps, max((end for end in ends if end < time - 0.5 / clock.fps), default=None))
+
+
+def do(context: bpy.types.Context, command: Command) -> str:
+    """Carry out one command on the strips or the scene; returns what was done, for the user. InputError where it cannot
+    be done; nothing has changed then."""
+    if isinstance(command, Tell):
+        return command.line
+    if isinstance(command, Go):
+        return _next_player(context, command.step) if command.to == "player" else _next_moment(context, command.step)
+    if isinstance(command, AddMoment):
+        return _add_moment(context, KeyMoment(command.time, command.words))
+    if isinstance(command, AddSpan):
+        return _add_span(context, Span(command.start, command.end, command.words))
+    if isinstance(command, AtPlayhead):
+        return _at_playhead(context, command.what)
+    return ""
+
+
+def changes(command: Command) -> bool:
+    """Whether a command changes words, and so is a step for undo."""
+    return isinstance(command, (AddMoment, AddSpan, AtPlayhead))
+
+
+def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
+    """Press these keys one after the other with the playhead where it is; returns what was done."""
+    state, told = annotating.State(held(context.scene)), []
+    for key in keys:
+        state, commands = annotating.press(state, key, now(context))
+        told += [do(context, command) for command in commands]
+    return told
+
+
+def _combinations(library, mirror: bool) -> Held:
+    allowed = np.array([mirror or not clip.mirrored for clip in library.clips])
+    recorded = [key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made]
+    frames = library.frames
+    rows = np.unique(frames.words[allowed[frames.clip]], axis=0)
+    spans = (frozenset(word for word, has in zip(frames.vocabulary, row) if has) for row in rows)
+    return Held(tuple(dict.fromkeys(frozenset(key.words) for key in recorded)), tuple(spans))
+
+
+def _clip(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object, where it has lanes and is nobody's dot."""
+    active = context.view_layer.objects.active
+    if active is None or not lanes.has(active):
+        return None
+    dots = {player.dot for player in context.scene.beyond_mocap.players}
+    return None if active in dots or active.beyond_mocap_dot.player else active
+
+
+def _subject(context: bpy.types.Context) -> tuple[bpy.types.Object | None, Clock]:
+    """Whose lanes are meant and the clock of his seconds; None where he has no lanes yet."""
+    clip = _clip(context)
+    if clip is not None:
+        return clip, lanes.written_for(clip)
+    player = active_player(context.scene.beyond_mocap)
+    if player is None:
+        raise InputError("annotate", "no player", "a player in the list", "import tracking in step 2 first")
+    return strips.dot_of(player, context.scene), of_scene(context.scene)
+
+
+def _lanes(context: bpy.types.Context) -> tuple[bpy.types.Object, Clock]:
+    """The same, with lanes: a player without any gets them, with the words of his text or file."""
+    target, clock = _subject(context)
+    if target is not None:
+        return target, clock
+    settings = context.scene.beyond_mocap
+    player = active_player(settings)
+    strips.write(context, player, plans.written_words(player, settings.rate, read_track(settings, player)))
+    return player.dot, clock
+
+
+def _add_moment(context: bpy.types.Context, key: KeyMoment) -> str:
+    """A key moment; one that stands on its frame already gets its words."""
+    target, clock = _lanes(context)
+    there = next((m for m in lanes.moments(target) if m.frame == clock.whole(key.time) and not m.off), None)
+    if there is not None:
+        lay_strips.change_moment(target, there.strip, there.index, replace(there.key, words=key.words))
+        return f"{_spoken(key.words)} at {there.time:.2f} s, in place of {_spoken(there.words)}"
+    lay_strips.add_moment(target, key, clock)
+    return f"{_spoken(key.words)} at {key.time:.2f} s"
+
+
+def _add_span(context: bpy.types.Context, span: Span) -> str:
+    target, clock = _lanes(context)
+    asked = [p.span for p in lanes.spans(target) if not (p.off or p.automatic) and p.span.words]
+    others = [s for s in asked if s.start < span.end - 1e-6 and span.start < s.end - 1e-6]
+    lay_strips.add_span(target, span, clock)
+    over = f"; it overlaps {_spoken(others[0].words)}, shorten one of them" if others else ""
+    return f"{_spoken(span.words)} from {span.start:.2f} to {span.end:.2f} s{over}"
+
+
+def _at_playhead(context: bpy.types.Context, what: str) -> str:
+    target, clock = _subject(context)
+    found = None if target is None else _found(context, target, clock)
+    if found is None:
+        raise InputError("playhead", "no key moment or stretch there", "one to " + _VERBS[what], "go to one first")
+    if what in ("earlier", "later"):
+        return _nudge(context, target, found, clock, 1 if what == "later" else -1)
+    return _mirror(target, found) if what == "mirror" else _remove(target, found)
+
+
+_VERBS = {"mirror": "mirror", "remove": "remove", "earlier": "move", "later": "move"}
+
+
+def _found(context, target, clock: Clock) -> PlacedMoment | PlacedSpan | None:
+    """The key moment nearest to the playhead within a frame or AT_PLAYHEAD, else the stretch that is asked for there."""
+    time = clock.seconds(context.scene.frame_current_final)
+    reach = max(AT_PLAYHEAD, 1.0 / clock.fps) + 1e-6
+    near = [moment for moment in lanes.moments(target) if abs(moment.time - time) <= reach and not moment.off]
+    if near:
+        return min(near, key=lambda moment: abs(moment.time - time))
+    span = lanes.span_at(target, time)
+    return None if span is None or span.automatic else span
+
+
+def _mirror(target, found: PlacedMoment | PlacedSpan) -> str:
+    item = found.key if isinstance(found, PlacedMoment) else found.span
+    other = replace(item, words=swap_sides(item.words), avoid=swap_sides(item.avoid))
+    if other == item:
+        raise InputError(_spoken(item.words), "no side in it", "left or right", "choose one from the menu")
+    if isinstance(found, PlacedMoment):
+        lay_strips.change_moment(target, found.strip, found.index, other)
+    else:
+        lay_strips.change_span(target, found.strip, other)
+    return f"{_spoken(item.words)} is now {_spoken(other.words)}"
+
+
+def _remove(target, found: PlacedMoment | PlacedSpan) -> str:
+    if isinstance(found, PlacedMoment):
+        lay_strips.remove_moment(target, found.strip, found.index)
+        return f"{_spoken(found.words)} removed"
+    lay_strips.remove_span(target, found.strip)
+    return f"{_spoken(found.span.words)} removed"
+
+
+def _nudge(context, target, found: PlacedMoment | PlacedSpan, clock: Clock, step: int) -> str:
+    if not isinstance(found, PlacedMoment):
+        raise InputError("playhead", "a stretch, no key moment", "a key moment to move",
+                         "set its ends anew with I and O, or drag its strip")
+    key = replace(found.key, time=found.time + step / clock.fps)
+    _show(context, lay_strips.change_moment(target, found.strip, found.index, key), clock)
+    return f"{_spoken(key.words)} at {key.time:.2f} s"
+
+
+def _next_moment(context: bpy.types.Context, step: int) -> str:
+    target, clock = _subject(context)
+    time = clock.seconds(context.scene.frame_current_final)
+    ahead = [m for m in (lanes.moments(target) if target else ()) if step * (m.time - time) > 0.75 / clock.fps]
+    if not ahead:
+        return "no key moment " + ("after" if step > 0 else "before") + " this one"
+    moment = min(ahead, key=lambda m: step * m.time)
+    lay_strips.pick(target, moment.strip, moment.index)
+    _show(context, moment, clock)
+    return f"{_spoken(moment.words)} at {moment.time:.2f} s"
+
+
+def _show(context: bpy.types.Context, moment: PlacedMoment, clock: Clock) -> None:
+    """Put the playhead on a key moment: between frames where the scene shows such, else on its marker."""
+    scene = context.scene
+    frame = clock.frame(moment.time) if scene.show_subframe else float(moment.frame)
+    scene.frame_float = frame  # frame_set would leave the movie clip editors behind
+
+
+def _next_player(context: bpy.types.Context, step: int) -> str:
+    settings = context.scene.beyond_mocap
+    count = len(settings.players)
+    if count:
+        settings.active_player = min(max(settings.active_player + step, 0), count - 1)
+    return name_of(context)
+
+
+def _spoken(words: tuple[str, ...]) -> str:
+    return " ".join(words) or "automatic"
