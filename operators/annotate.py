@@ -12,7 +12,6 @@ from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.errors import BeyondMocapError, InputError
 from ..scene import popup
 from ..scene.annotating import changes, do, held, name_of, now, type_keys
-from ..scene.settings import active_player
 from .verb import Verb
 
 SPACES = {
@@ -46,8 +45,6 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
 
     bl_idname = "beyond_mocap.annotate"
     bl_label = "Annotate by Keys"
-    bl_options = {"REGISTER"}
-
     keys: StringProperty(
         name="Keys", options={"SKIP_SAVE"},
         description="Keys to press at the playhead, with blanks between: '2 2 3 5 ENTER'; for scripts",
@@ -56,11 +53,11 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
     @classmethod
     def poll(cls, context):
         """There is somebody to say it of."""
-        cls.poll_message_set("Import tracking in step 2 first, then choose a player of the list")
-        return active_player(context.scene.beyond_mocap) is not None
+        cls.poll_message_set("Import tracking in step 2 first, and choose a player of the list; or open a clip's words")
+        return bool(name_of(context))
 
     def do(self, context):
-        """Press the keys that a script gives, as one step for undo."""
+        """Press the keys that a script gives."""
         keys = self.keys.upper().split()
         known = {*annotating.KEYS, *"0123456789"}
         strange = next((key for key in keys if key not in known), None)
@@ -68,7 +65,6 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             found = f"the key {strange}" if strange else "no keys"
             raise InputError("annotate", found, f"keys of {', '.join(sorted(known))}", "for example '2 2 3 5 ENTER'")
         told = type_keys(context, keys)
-        bpy.ops.ed.undo_push(message="Annotate")
         self.report({"INFO"}, "; ".join(told) or "nothing to do")
 
     def invoke(self, context, event):
@@ -77,7 +73,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             return self.execute(context)
         if _handlers:
             unwatch()  # the running one sees this and ends
-            return {"FINISHED"}
+            return {"CANCELLED"}
         try:
             self.state, self.told = annotating.State(held(context.scene)), ""
             self.who = name_of(context)
@@ -163,9 +159,9 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         _redraw(context)
 
     def left(self, context):
-        """End: nothing is drawn any more."""
+        """End: nothing is drawn any more, and there is no step for undo beside those that were made."""
         self.cancel(context)
-        return {"FINISHED"}
+        return {"CANCELLED"}
 
     def cancel(self, context):
         """Blender takes the operator away (a file is loaded, the window closes), or it has ended."""

@@ -58,6 +58,7 @@ def moved(folder):
 ROWS = {
     "accept": Row("synthesized"),
     "add_stage": Row("imported"),
+    "annotate": Row("imported", lambda places: {"keys": "2 2 3 5 ENTER"}),
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
     "discard": Row("synthesized"),
