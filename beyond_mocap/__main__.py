@@ -21,7 +21,7 @@ from pathlib import Path
 
 from . import __version__
 from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
-from .plan import LIMITS, METHODS, Plan, gait_choices
+from .plan import HEIGHTS, LIMITS, METHODS, Plan, gait_choices
 
 Writer = Callable[[object, Path], None]
 
@@ -82,6 +82,7 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
     verb.add_argument("--no-made", action="store_true", help="no made or blended clips where recordings lack a speed")
     verb.add_argument("--nearest", action="store_true", help="go on with the nearest words that the library has")
+    _add_player(verb)
     _add_library_options(verb)
     verb.set_defaults(run=run_synthesize)
     return verb
@@ -109,6 +110,25 @@ def _add_settings(verb) -> None:
     verb.add_argument(
         "--gait", action="append", default=[], metavar="WORD=CLIP",
         help="the clip that stands for a gait, such as walking=folder/walk.bvh; once for each gait",
+    )
+
+
+def _add_player(verb) -> None:
+    """What is one player's own."""
+    verb.add_argument("--pins", type=Path, metavar="P.csv", help="where hands, feet and gaze have to be, and when")
+    tall = partial(_between, low=HEIGHTS[0], high=HEIGHTS[1], expected=f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} metres")
+    verb.add_argument("--height", type=tall, default=0.0, metavar="METRES", help="of the player; else the library's")
+    verb.add_argument("--strong-foot", choices=("left", "right", "any"), default="any")
+    verb.add_argument(
+        "--style", action="append", default=[], metavar="NAME",
+        help="a word, or a folder or clip (with * and ?), whose clips are taken rather than others; may be repeated",
+    )
+    low, high = LIMITS["style_weight"]
+    worth = partial(_between, low=low, high=high, expected=f"between {low:g} and {high:g}")
+    default = Plan.style_weight
+    verb.add_argument(
+        "--style-weight", type=worth, default=default, metavar="NUMBER",
+        help=f"m/s of missed speed that a clip of the style is worth; default {default:g}",
     )
 
 
@@ -204,6 +224,7 @@ def summarize(library) -> dict:
 def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     """`synthesize`: one player, and what was asked to be written about it."""
     from .annotation import read_timeline, validate
+    from .files.pins import read_pins
     from .files.tables import write_ball, write_provenance, write_report
     from .files.tracking import read_track_csv
     from .motion.track import clean
@@ -211,7 +232,7 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
 
     begun = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
-    _check_outputs(*outputs, never=(options.track, options.annotations))
+    _check_outputs(*outputs, never=(options.track, options.annotations, options.pins))
     write = _writer(options.out, writers)
     track, data = clean(read_track_csv(options.track))
     timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
@@ -224,7 +245,9 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
         catch_up=not options.no_catch_up, fps=options.fps, alpha=options.alpha, mirror=not options.no_mirror,
         nearest=options.nearest, seed=options.seed, made=not options.no_made, delta=options.delta, omega=options.omega,
         seam_window=options.seam_window, track_window=options.track_window, root_window=options.root_window,
-        gaits=gait_choices(options.gait),
+        gaits=gait_choices(options.gait), pins=read_pins(options.pins) if options.pins else (),
+        height=options.height, strong_foot=options.strong_foot.replace("any", ""), style=tuple(options.style),
+        style_weight=options.style_weight,
     )
     try:
         take = synthesize(library, plan, told.progress, told.cancelled)

@@ -16,6 +16,7 @@ from .motion import quaternion
 from .motion.humanoid import identify
 from .motion.motion import pose_kinematics
 from .motion.track import SampledTrack
+from .own_size import real_ball, size_of
 from .plan import Plan
 from .polish.banking import banked, missing_lean
 from .polish.cross_fade import faded_rotations, faded_values, share
@@ -185,7 +186,12 @@ def met(library, plan: Plan, track: SampledTrack, standing: np.ndarray, planted:
     (T, 2, 2) bool."""
     known = plan.track.ball_height_known
     height = np.interp(track.times, plan.track.times, known.astype(float)) > 0.5
-    return strike(
-        library.skeleton, planted.root, planted.rotations, standing.any(axis=2), track.ball, found, plan.fps,
+    size = size_of(plan, library.skeleton)
+    skeleton, root, ball = library.skeleton, planted.root, track.ball
+    if size != 1.0:  # the ball is as large for a tall player as for a short one
+        skeleton, root, ball = skeleton.scaled(size), root * size, real_ball(ball, size)
+    struck = strike(
+        skeleton, root, planted.rotations, standing.any(axis=2), ball, found, plan.fps,
         measured=track.ball_measured, height_known=height,
     )
+    return struck if size == 1.0 else replace(struck, root=struck.root / size, ball=struck.ball / size)

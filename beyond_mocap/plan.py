@@ -1,7 +1,8 @@
-"""What is asked: a plan names the track, the timeline, the ball and the library's folder, and how to go about it."""
+"""What is asked: a plan names the track, the timeline, the ball, pins and the library's folder, and how to go about it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -10,6 +11,8 @@ from .errors import InputError
 from .motion.track import SMOOTHING_SECONDS, Track
 
 METHODS = ("path", "distance", "blocks")
+PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
+FEET = ("", "left", "right")
 LIMITS = {
     "alpha": (0.0, 1.0),
     "delta": (0.0, 100.0),
@@ -17,8 +20,40 @@ LIMITS = {
     "seam_window": (0.0, 4.0),
     "track_window": (0.2, 5.0),
     "root_window": (0.2, 5.0),
+    "style_weight": (0.0, 10.0),
 }
 """Least and most of a plan's numbers; outside them there is no sense in it."""
+
+HEIGHTS = (0.5, 3.0)
+"""Metres that a player is tall at least and at most."""
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A part of the body held at a place. time: s on the track's clock from which on; hold: s for which, 0 for a moment.
+    part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the place.
+    position: (x, y, z) m in the world. InputError for an unknown part and for numbers that are none."""
+
+    time: float
+    part: str
+    position: tuple[float, float, float]
+    hold: float = 0.0
+
+    def __post_init__(self):
+        if self.part not in PARTS:
+            raise InputError("pin", f"the part {self.part!r}", f"one of {', '.join(PARTS)}")
+        object.__setattr__(self, "time", float(self.time))
+        object.__setattr__(self, "hold", float(self.hold))
+        object.__setattr__(self, "position", tuple(float(value) for value in self.position))
+        if len(self.position) != 3 or not all(map(math.isfinite, (*self.position, self.time, self.hold))):
+            raise InputError("pin", f"{self.time:g} s, {self.position}, {self.hold:g} s", "a time, a place and a hold")
+        if self.hold < 0.0:
+            raise InputError("pin", f"a hold of {self.hold:g} s", "0 s or more")
+
+    @property
+    def end(self) -> float:
+        """Seconds at which the part is let go."""
+        return self.time + self.hold
 
 
 @dataclass(frozen=True)
@@ -39,8 +74,12 @@ class Plan:
     of the window behind which the root is pulled onto the track (method "path" only; the root error is measured with
     1.5). gaits: (gait word, clip) pairs, which clip stands for which gait (§3.1.1); other gaits are found among all
     clips.
+    pins: where hands, feet and gaze have to be, in the order of time. height: of the player, m; 0: as tall as the
+    library's skeleton. strong_foot: one of FEET; key moments that name no side take this foot's clips where that costs
+    little. style: words, or names or patterns of folders and clips ("academy", "lmd/*"), whose clips are taken rather
+    than others by style_weight (m/s of missed speed that they are worth).
 
-    InputError for a number outside LIMITS.
+    InputError for a number outside LIMITS or HEIGHTS, and for two pins of one part at one time.
     """
 
     track: Track
@@ -60,13 +99,33 @@ class Plan:
     track_window: float = SMOOTHING_SECONDS
     root_window: float = 1.5
     gaits: tuple[tuple[str, str], ...] = ()
+    pins: tuple[Pin, ...] = ()
+    height: float = 0.0
+    strong_foot: str = ""
+    style: tuple[str, ...] = ()
+    style_weight: float = 0.5
 
     def __post_init__(self):
+        object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
+        object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
         for name, (least, most) in LIMITS.items():
             if not least <= getattr(self, name) <= most:
                 raise InputError(name, f"{getattr(self, name):g}", f"{least:g} to {most:g}")
         if 0.0 < self.omega < 1.0:
             raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the usual thresholds")
+        if self.height and not HEIGHTS[0] <= self.height <= HEIGHTS[1]:
+            raise InputError("height", f"{self.height:g} m", f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} m, or 0 for the library's")
+        if self.strong_foot not in FEET:
+            raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
+        self._check_pins()
+
+    def _check_pins(self):
+        for part in PARTS:
+            mine = [pin for pin in self.pins if pin.part == part]
+            for before, after in zip(mine, mine[1:]):
+                if after.time <= before.end:
+                    found = f"two pins of {part} at {after.time:g} s"
+                    raise InputError("pins", found, "one place at a time", "move one, or shorten the hold before it")
 
 
 def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:

@@ -26,6 +26,7 @@ from .motion import quaternion
 from .motion.motion import Motion
 from .motion.track import SampledTrack, sample
 from .motion.track.sampling import MOVING_SPEED
+from .own_size import in_library_size, size_of, taken_in_library_size
 from .plan import Plan
 from .polish.hand_over import handed_over, old_share
 from .polish.meeting import eased
@@ -43,7 +44,7 @@ from .synthesis.touched import Stretch, asked_anew, joined, kept_keys, lies_else
 from .synthesis.used import Used, used_in
 from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
-    Progress, key_result, sources_shown, synthesize, with_made_gaits, with_warnings, words_shown,
+    Progress, finished, key_result, sources_shown, synthesize, with_made_gaits, words_shown,
 )
 from .take import BallPath, KeyResult, Take
 
@@ -81,8 +82,8 @@ def resynthesize(
 ) -> Take:
     """The take `before` after its plan has become `plan`: searched and built anew only where the change touches it.
 
-    A whole synthesis where the change is not one of words, track or ball (another method, rate, length or choice),
-    where `before` was made from another library or by another method than "path", or where all of it is touched. The
+    Pins are laid on anew. A whole synthesis where the change is not one of words, track, ball or pins (another method,
+    rate, length or choice), where `before` was made from another library or by another method than "path", or where all of it is touched. The
     same library, plan and take give the same bits. anew: a stretch of which another solution is wanted, whether or not
     its plan has changed; InputError where it lies outside the take, or for another method than "path". progress,
     cancelled, hurry and what is raised: as for `synthesize`.
@@ -94,7 +95,7 @@ def resynthesize(
         _check(plan, before, anew)
     with threadpool_limits(limits=1):
         comparable = _comparable(plan, before)
-        taken = _updated(library, plan, before, report, cancelled, hurry, anew) if comparable else None
+        taken = _edited(library, plan, before, report, cancelled, hurry, anew) if comparable else None
     used = anew.used if anew is not None else ()
     return synthesize(library, plan, progress, cancelled, hurry, used) if taken is None else taken
 
@@ -102,6 +103,7 @@ def resynthesize(
 def shown_footage(library: Library, take: Take, start: float, end: float) -> tuple[Used, ...]:
     """The footage that a take of method "path" shows from second `start` to second `end`, for `Anew`; nothing where the
     take was made from another library."""
+    take = taken_in_library_size(take, size_of(take.plan, library.skeleton))
     library = _library_of_both(library, take.plan, take, lambda fraction, text: None)
     if take.edit is None or not _made_from(library, take, len(take.edit)):
         return ()
@@ -122,16 +124,25 @@ def _comparable(plan: Plan, before: Take) -> bool:
     old = before.plan
     if old is None or plan.method != "path":
         return False
-    same_choices = replace(plan, track=old.track, timeline=old.timeline, library=old.library) == old
+    same_choices = replace(plan, track=old.track, timeline=old.timeline, library=old.library, pins=old.pins) == old
     return same_choices and np.array_equal(plan.track.times[[0, -1]], old.track.times[[0, -1]])
 
 
-def _updated(
+def _edited(
     library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
 ) -> Take | None:
-    """The take, or None where it has to be made as a whole."""
+    """The take, or None where it has to be made as a whole; what is made anew is made in the library's size."""
+    size = size_of(plan, library.skeleton)
+    small = in_library_size(plan, size), taken_in_library_size(before, size)
+    found = _updated(library, *small, report, cancelled, hurry, anew)
+    return None if found is None else finished(found[0], plan, library, *found[1:], before)
+
+
+def _updated(library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None):
+    """The take without pins, its order and the frame from which on it was searched in a hurry; None where it has to be
+    made as a whole."""
     clock = [time.perf_counter()]
-    recordings, library = library, _library_of_both(library, plan, before, report)
+    library = _library_of_both(library, plan, before, report)
     old, new = wanted(library, before.plan), wanted(library, plan)
     if not _made_from(library, before, len(old)):
         return None
@@ -161,7 +172,7 @@ def _updated(
     clock.append(time.perf_counter())
     report(1.0, "Done")
     seconds = dict(zip(("search", "polish"), np.diff(clock).tolist()))
-    return with_warnings(replace(update.take(), seconds=seconds), recordings, new, min(hurried, default=None))
+    return replace(update.take(), seconds=seconds), new, min(hurried, default=None)
 
 
 def _library_of_both(library: Library, plan: Plan, before: Take, report: Progress) -> Library:

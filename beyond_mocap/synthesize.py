@@ -12,23 +12,26 @@ The plan is put into frames (`synthesis.wanted`), a search picks what is shown (
 from __future__ import annotations
 
 import time
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .annotation import avoided_per_frame, spoken
+from .annotation import LOCOMOTION_WORDS, avoided_per_frame, spoken
 from .errors import InputError, TimedLine
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
 from .lay_out import as_far, chained, faced, footed, leaning, met, on_track, smoothed, touches
 from .library.chosen import with_chosen_gaits
 from .library.library import Library
-from .motion.motion import Motion
+from .motion.motion import Motion, at_frames
 from .motion.runs import runs
 from .motion.track import SampledTrack, sample
+from .own_size import in_library_size, in_own_size, size_of
 from .plan import METHODS, Plan
 from .polish.foot_plant import Planted
+from .polish.pins import look_axis, pinned
 from .polish.steps import Steps
 from .polish.strike import Touch
 from .synthesis.balance import balanced
@@ -40,10 +43,16 @@ from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
 from .synthesis.used import Used
 from .synthesis.wanted import Wanted, wanted
-from .take import BallPath, KeyResult, Take
+from .take import BallPath, KeyResult, PinResult, Take
 
 NEAR_KEY = 1.5
 """Seconds around a key moment in which its own words may be shown, whoever avoids them."""
+
+PIN_MISSED, GAZE_MISSED = 0.01, np.radians(5.0)
+"""Metres, and radians of a gaze, by which a pin may be missed without being told."""
+
+LOOKED_AT = 200
+_looks: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()
 
 Progress = Callable[[float, str], None]
 
@@ -83,7 +92,8 @@ def synthesize(
         return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled, hurry, used)
 
 
-def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
+def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
+    plan = in_library_size(asked, size_of(asked, library.skeleton))
     recordings, library = library, with_made_gaits(library, plan, report)
     clock = [time.perf_counter()]
     order = wanted(library, plan)
@@ -107,7 +117,7 @@ def _synthesize(library: Library, plan: Plan, report: Progress, cancelled, hurry
     clock.append(time.perf_counter())
     report(1.0, "Done")
     seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
-    return with_warnings(replace(take, seconds=seconds), recordings, order, found.hurried)
+    return finished(replace(take, seconds=seconds), asked, recordings, order, found.hurried)
 
 
 def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
@@ -208,6 +218,40 @@ def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
     return tuple(spoken(library.clips[clip].words_at(frame)) for clip, frame in frames)
 
 
+def finished(
+    take: Take, plan: Plan, recordings: Library, order: Wanted, hurried: int | None, before: Take | None = None
+) -> Take:
+    """A take out of the library's size in the player's, with its pins and its warnings. before: the finished take that it
+    is an edit of."""
+    take = in_own_size(take, size_of(plan, recordings.skeleton), plan, before)
+    return with_warnings(with_pins(take, recordings), recordings, order, hurried)
+
+
+def with_pins(take: Take, recordings: Library) -> Take:
+    """The take with hands, feet and gaze at the pins of its plan."""
+    pins = take.plan.pins
+    if not pins:
+        return take
+    found = pinned(take.motion, take.contacts, pins, take.start_time, look_of(recordings))
+    motion = replace(take.motion, root_positions=found.root, rotations=found.rotations)
+    results = tuple(PinResult(pin, miss) for pin, miss in zip(pins, found.miss))
+    unpinned = take.motion, take.contacts
+    return replace(take, motion=motion, contacts=found.contacts, pins=results, unpinned=unpinned)
+
+
+def look_of(library: Library) -> np.ndarray:
+    """(3,) which way heads look in their own frame, on the average of the library's locomotion."""
+    if library not in _looks:
+        frames = library.frames
+        gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION_WORDS]
+        going = np.flatnonzero(frames.words[:, gaits].any(axis=1) & (frames.velocity[:, 0] > 0.0))
+        some = going[:: max(1, len(going) // LOOKED_AT)] if len(going) else np.arange(min(len(frames), LOOKED_AT))
+        pairs = zip(frames.clip[some], frames.source[some])
+        poses = [at_frames(library.clips[clip].motion, np.array([frame]))[1] for clip, frame in pairs]
+        _looks[library] = look_axis(library.skeleton, np.concatenate(poses))
+    return _looks[library]
+
+
 def with_warnings(take: Take, recordings: Library, order: Wanted, hurried: int | None) -> Take:
     """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
     library's rate from which on the search was cut short, or None."""
@@ -215,7 +259,7 @@ def with_warnings(take: Take, recordings: Library, order: Wanted, hurried: int |
     if hurried is not None:
         since = take.start_time + hurried / recordings.fps
         told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
-    told += _shown_all_the_same(take)
+    told += [*_shown_all_the_same(take), *_pins_missed(take)]
     return replace(take, warnings=(*told, *_gave_way(recordings, take.plan, take)))
 
 
@@ -249,6 +293,21 @@ def _shown_all_the_same(take: Take) -> list[str]:
                 "be; no way without it was found", (times[first], times[end - 1]),
             ) for first, end in runs(shows)
         ]  # fmt: skip
+    return told
+
+
+def _pins_missed(take: Take) -> list[str]:
+    """One warning per pin that is missed by more than can be seen."""
+    told = []
+    for result in take.pins:
+        pin, when = f"{result.pin.time:g} s: the pin of {result.pin.part}", (result.pin.time, result.pin.end)
+        if not np.isfinite(result.miss):
+            told.append(f"{pin} lies outside the track, or the skeleton has no such part; it counts for nothing")
+        elif result.pin.part == "gaze" and result.miss > GAZE_MISSED:
+            beyond = np.degrees(result.miss)
+            told.append(TimedLine(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
+        elif result.pin.part != "gaze" and result.miss > PIN_MISSED:
+            told.append(TimedLine(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
     return told
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from .annotation import KeyMoment, Timeline
 from .motion.motion import Motion
-from .plan import Plan
+from .plan import Pin, Plan
 from .synthesis.edit_list import EditList
 
 
@@ -40,6 +40,14 @@ class KeyResult:
     used_instead: tuple[str, ...] | None = None
 
 
+@dataclass(frozen=True)
+class PinResult:
+    """How one pin was met: miss, m by which a hand or foot falls short of it, or radians that the gaze looks past it."""
+
+    pin: Pin
+    miss: float
+
+
 @dataclass(frozen=True, eq=False)
 class Take:
     """A synthesized player.
@@ -51,7 +59,8 @@ class Take:
     correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it.
     ik_miss: (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right,
     extra steps of feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
-    at the library's rate, for `resynthesize`.
+    at the library's rate, for `resynthesize`. pins: how they were met; unpinned: motion and contacts without them, None
+    where there are none.
     """
 
     motion: Motion
@@ -75,3 +84,5 @@ class Take:
     stepped: np.ndarray | None = None
     plan: Plan | None = None
     edit: EditList | None = None
+    pins: tuple[PinResult, ...] = ()
+    unpinned: tuple[Motion, np.ndarray] | None = None

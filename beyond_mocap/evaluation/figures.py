@@ -153,7 +153,7 @@ def _bone_change(view: View) -> float:
     """Largest difference of any bone's length in any frame from the library's skeleton, m."""
     skeleton, positions = view.library.skeleton, view.played.positions
     bones = np.linalg.norm(positions[:, 1:] - positions[:, list(skeleton.parents[1:])], axis=-1)
-    return float(np.max(np.abs(bones - np.linalg.norm(skeleton.offsets[1:], axis=-1)), initial=0.0))
+    return float(np.max(np.abs(bones - view.size * np.linalg.norm(skeleton.offsets[1:], axis=-1)), initial=0.0))
 
 
 def seams_and_loops(view: View) -> dict:
@@ -189,7 +189,7 @@ def poses(view: View) -> dict:
     smoothness = {**_spread(curve, ("mean", "p95", "max")), **{f"source_{name}": value for name, value in own.items()}}
     out = {"pose_realism": None, "smoothness_m": smoothness}
     if view.reference is not None and np.isfinite(view.reference.pose_p95).all():
-        distance = realism.nearest_distance(features, view.reference.poses)
+        distance = realism.nearest_distance(features / view.size, view.reference.poses)
         out["pose_realism"] = _mean(realism.unreal(distance, view.speed, view.reference.pose_p95))
     return out
 

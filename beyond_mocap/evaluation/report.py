@@ -32,10 +32,12 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
     warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
-    return {
+    pins = [{"time_s": p.pin.time, "part": p.pin.part, "miss": p.miss} for p in take.pins]
+    out = {
         **report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings,
         "warning_seconds": _seconds_of(warnings),
     }
+    return {**out, "pins": rounded(pins)} if pins else out
 
 
 def evaluate_played(

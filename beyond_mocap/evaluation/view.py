@@ -8,6 +8,8 @@ import numpy as np
 from ..annotation import Timeline
 from ..errors import InputError
 from ..library.library import Library
+from ..motion.humanoid import stature
+from ..motion.skeleton import Skeleton
 from ..motion.track import Track
 from . import pieces, root
 from .moments import moments
@@ -23,8 +25,7 @@ class View:
         self.played, self.timeline, self.library, self.track = played, timeline, library, track
         self.fps, self.count = motion.fps, len(motion)
         self.reference = None if library is None else library_reference(library, motion.fps)
-        if library is not None and not motion.skeleton.same_bones(library.skeleton, 5e-3):
-            raise InputError("motion", "another skeleton than the library's", "a motion made from this library")
+        self.size = 1.0 if library is None else _size(motion.skeleton, library.skeleton)
         self.stride = played.stride(library)
         self.rows = self._rows()
         self.used = np.rint(self.rows[np.isfinite(self.rows)]).astype(int)
@@ -46,3 +47,13 @@ class View:
         if self.reference is None:
             return np.full(self.count, np.nan)
         return self.reference.rows(self.played.clips, self.played.clip, self.played.clip_frame)
+
+
+def _size(skeleton: Skeleton, library: Skeleton) -> float:
+    """How many times as tall as the library's skeleton another one is; InputError where it is not the same one."""
+    if skeleton.same_bones(library, 5e-3):
+        return 1.0
+    size = stature(skeleton) / stature(library) if skeleton.names == library.names else 1.0
+    if not skeleton.same_bones(library.scaled(size), 5e-3):
+        raise InputError("motion", "another skeleton than the library's", "a motion made from this library")
+    return size

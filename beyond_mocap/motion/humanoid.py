@@ -245,6 +245,15 @@ def heading(motion: Motion) -> np.ndarray:
     return np.unwrap(heading_from_positions(motion.skeleton, positions))
 
 
+LEG_SHARE = 0.485
+"""Length of upper plus lower leg as a share of the stature (`adult`, after Drillis and Contini 1966)."""
+
+
+def stature(skeleton: Skeleton) -> float:
+    """Metres that a body with these legs is tall; recordings seldom have a joint at the top of the head."""
+    return leg_length(skeleton) / LEG_SHARE
+
+
 def leg_length(skeleton: Skeleton) -> float:
     """Mean length in metres of upper plus lower legs."""
     body = identify(skeleton)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -59,6 +59,10 @@ class Skeleton:
     def children(self, joint: int) -> tuple[int, ...]:
         """Indices of the joints that hang on `joint`."""
         return tuple(i for i, p in enumerate(self.parents) if p == joint)
+
+    def scaled(self, size: float) -> "Skeleton":
+        """The skeleton of a body `size` times as large."""
+        return replace(self, offsets=self.offsets * size, end_offsets=self.end_offsets * size)
 
     def same_bones(self, other: "Skeleton", tolerance: float = 1e-3) -> bool:
         """Whether names, parents and offsets agree, offsets within `tolerance` metres."""

@@ -28,6 +28,7 @@ from ..library.keys import Key
 from ..library.library import Library
 from .annotation_cost import AnnotationCost
 from .block_dp import cheapest_path
+from .style import weak_foot_cost
 from .transition_cost import distances, typical_distance, windows
 from .wanted import Wanted, needed, pool_frame
 
@@ -155,13 +156,15 @@ class BlockSearch:
         it."""
         count = len(clusters.medoid)
         cost = self.annotation.of_blocks(clusters.start, self.asked_words(slot, clusters.length))
-        blocks, _ = self._key_blocks(slot, clusters.length)
+        blocks, which = self._key_blocks(slot, clusters.length)
+        cost = cost + self._off_style(clusters.start)
         fine = usable & ~self._shows_avoided(clusters.start, slot, clusters.length)
         usable = fine if fine.any() and not len(blocks) else usable
         members = np.bincount(clusters.label[usable], minlength=count)
         total = np.bincount(clusters.label[usable], cost[usable], minlength=count)
         out = np.where(members > 0, self.alpha * total / np.maximum(members, 1), np.inf)
-        labels = {clusters.label_at(start) for start in blocks.start} - {-1}
+        weak = np.concatenate([np.zeros(0), *(self._weak_foot(*served) for served in which)])
+        labels = {clusters.label_at(start) for start in blocks.start[weak == weak.min(initial=np.inf)]} - {-1}
         if labels:
             out[[label for label in range(count) if label not in labels]] = np.inf
         return out
@@ -198,6 +201,9 @@ class BlockSearch:
             slots.append(blocks)
             keys.append(which)
             cost = self.alpha * self.annotation.of_blocks(blocks.start, self.asked_words(slot, length))
+            cost += self.alpha * self._off_style(blocks.start)
+            if which:
+                cost += np.concatenate([self._weak_foot(*served) for served in which])
             unary.append(cost + AVOIDED * self._shows_avoided(blocks.start, slot, length))
         ends, starts = zip(*(self._ends(blocks, length) for blocks in slots))
         weight = (1.0 - self.alpha) / (self.scale * np.sqrt(length // 2))
@@ -210,10 +216,19 @@ class BlockSearch:
         """At most MOST_CANDIDATES blocks, those with the best words first, plus the ones beside key moments."""
         if len(offered) > MOST_CANDIDATES:
             cost = self.annotation.of_blocks(offered.start, self.asked_words(slot, length))
-            cost += AVOIDED * self._shows_avoided(offered.start, slot, length)
+            cost += AVOIDED * self._shows_avoided(offered.start, slot, length) + self._off_style(offered.start)
             offered = offered.at(np.sort(np.argsort(cost, kind="stable")[:MOST_CANDIDATES]))
         beside = self._beside_keys(slot, length)
         return Candidates(np.append(offered.clip, beside.clip), np.append(offered.start, beside.start))
+
+    def _off_style(self, start: np.ndarray) -> np.ndarray:
+        """(M,) what blocks from frames `start` (M,) on cost for not being of the style that is asked."""
+        off = self.wanted.off_style
+        return np.zeros(len(start)) if off is None else off[np.clip(start, 0, len(off) - 1)].astype(float)
+
+    def _weak_foot(self, number: int, key: Key) -> np.ndarray:
+        """(1,) what it costs to serve a key moment by `key`."""
+        return weak_foot_cost(self.wanted.keys[number].asked.words, (key,), self.wanted.weak_foot)
 
     def _shows_avoided(self, start: np.ndarray, slot: int, length: int) -> np.ndarray:
         """(M,) bool: whether a block that starts at frame `start` (M,) and fills a slot shows a word that it must

@@ -111,6 +111,8 @@ class PathCosts:
         yield "words", w.words * what.missing
         yield "unasked", np.float32(w.unasked) * what.unasked
         yield "made", np.float32(w.made) * what.made
+        if self.wanted.off_style is not None:
+            yield "style", self.wanted.off_style[what.frame]
         if self.price is not None:
             yield "price", self.price[what.frame]
         if avoid := self.wanted.avoided_in(first, end):
@@ -142,6 +144,8 @@ class PathCosts:
         far = self.weights.stretch * np.maximum(off - 0.15, 0.0)
         yield "rate", self.weights.rate * off + far + self.weights.held * held
         yield "made", self.weights.made_key * self.offer.made[self.inside(start)]
+        if self.wanted.off_style is not None:
+            yield "style", self.wanted.off_style[self.inside(start)]
         if self.price is not None:
             yield "price", self.price[middle]
         if self.wanted.avoided:

@@ -22,6 +22,7 @@ from .key_fit import ball_at, misfit, strikes
 from .offer import RATES, SLOT
 from .path_costs import PathCosts, Weights
 from .slots import key_pieces, slot_edges, slot_of
+from .style import weak_foot_cost
 from .used import Used
 from .wanted import Wanted
 
@@ -138,6 +139,7 @@ class PathSearch:
             key, at = self.wanted.keys[number], self.pieces.wanted == number
             ball = ball_at(self.wanted.track, key.frame, key.ball_height_known)
             costs[at] = misfit(strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
+            costs[at] += weak_foot_cost(key.asked.words, key.choices, self.wanted.weak_foot)[self.pieces.choice[at]]
         return costs
 
     def _first(self) -> States:

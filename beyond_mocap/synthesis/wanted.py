@@ -15,6 +15,7 @@ from ..errors import NotInLibrary, TimedLine
 from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
+from .style import off_style_cost
 from ..motion.track import SampledTrack, sample
 from ..plan import Plan
 
@@ -39,7 +40,9 @@ class WantedKey:
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
-    avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use.
+    avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style: (N,)
+    float32 cost per slot of library frames without the style that is asked, None where none is. weak_foot: side of the
+    foot that key moments without a side rather leave, or "". gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use.
     warnings: what the library lacks of what is asked."""
 
     track: SampledTrack
@@ -50,6 +53,8 @@ class Wanted:
     allowed: np.ndarray
     warnings: tuple[str, ...]
     avoided: tuple[frozenset[str], ...] = ()
+    off_style: np.ndarray | None = None
+    weak_foot: str = ""
 
     def __len__(self) -> int:
         return len(self.track.times)
@@ -82,7 +87,9 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
     warnings += _lacking(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
-    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided)
+    off_style = off_style_cost(library, plan.style, plan.style_weight, warnings)
+    weak_foot = {"left": "right", "right": "left"}.get(plan.strong_foot, "")
+    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, off_style, weak_foot)
 
 
 def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:

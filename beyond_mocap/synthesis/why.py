@@ -41,6 +41,7 @@ PARTS = {
     "replay": "shown a moment ago",
     "rate_change": "change of playing speed",
     "avoided": "a word that must not be",
+    "style": "no clip of the style",
 }
 """Name of a part of the costs -> what it is about."""
 

@@ -13,6 +13,7 @@ import pytest
 from beyond_mocap.__main__ import main
 from beyond_mocap.annotation import read_timeline
 from beyond_mocap.files import bvh
+from beyond_mocap.motion.humanoid import stature
 from beyond_mocap.files.tables import read_ball, read_provenance
 from beyond_mocap.library.made import KICKED, MADE_FOLDER
 
@@ -486,3 +487,17 @@ def test_real_recordings(run, tmp_path_factory, scenario):
                 assert key["used_instead"] and key["time_error_s"] is None
         if method == "path":
             assert report["root_error_m"]["mean"] <= 0.01
+
+
+def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
+    (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m,hold_s\n2,gaze,30,0,1.5,0.5\n99,left_hand,0,0,1,\n")
+    status, _, error = synthesize(
+        "--strong-foot", "left", "--style", "kick*", report=tmp_path / "r.json", pins=tmp_path / "pins.csv", height=2.0
+    )
+    assert status == 0 and any("99 s: the pin of left_hand lies outside" in line for line in error)
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert [pin["part"] for pin in report["pins"]] == ["gaze", "left_hand"] and report["pins"][0]["miss"] < 0.05
+    assert stature(bvh.read(tmp_path / "out.bvh", 0.01).motion.skeleton) == pytest.approx(2.0, abs=1e-3)
+    assert_told(synthesize(height=0.1), 2, "--height", "0.5 to 3 metres")
+    (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m\n2,nose,30,0,1.5\n")
+    assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")

@@ -28,7 +28,7 @@ ROOMS = {
     "annotation": ["motion"],
     "plan": ["motion", "annotation"],
     "take": ["motion", "annotation", "plan", "synthesis.edit_list"],
-    "files": ["motion", "take"],
+    "files": ["motion", "annotation", "take", "plan"],
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "polish": ["motion"],
