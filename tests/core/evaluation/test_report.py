@@ -282,8 +282,8 @@ def test_wrong_provenance_and_wrong_skeleton_are_told(uncut, library):
     provenance = tables.provenance_of(uncut)
     with pytest.raises(InputError, match="300 rows"):
         played_from_tables(uncut.motion.frames(0, 10), provenance)
-    skeleton = replace(uncut.motion.skeleton, offsets=uncut.motion.skeleton.offsets * 1.1)
-    taller = replace(uncut.motion, skeleton=skeleton)
+    offsets = uncut.motion.skeleton.offsets * np.linspace(1.0, 1.3, len(uncut.motion.skeleton))[:, None]
+    taller = replace(uncut.motion, skeleton=replace(uncut.motion.skeleton, offsets=offsets))
     with pytest.raises(InputError, match="another skeleton"):
         evaluate_played(played_from_tables(taller, provenance), library=library)
 
