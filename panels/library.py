@@ -88,6 +88,20 @@ def draw_clips(layout, settings, listing, current) -> None:
     row = layout.row(align=True)
     row.operator("beyond_mocap.import_clip", text="Import", icon="IMPORT").path = clip.path
     row.operator("beyond_mocap.annotate_clip", text="Annotate", icon="GREASEPENCIL").path = clip.path
+    header, body = layout.panel("beyond_mocap_library_assets", default_closed=True)
+    header.label(text="Assets")
+    if body:
+        draw_assets(body, listing)
+
+
+def draw_assets(layout, listing) -> None:
+    """Clips for the Asset Browser."""
+    column = layout.column(align=True)
+    column.operator("beyond_mocap.make_assets", text="Chosen Clip in This File", icon="ASSET_MANAGER").which = "CHOSEN"
+    for apart, text, icon in ((False, "in This File", "ASSET_MANAGER"), (True, "as a File ...", "FILE_BLEND")):
+        button = column.operator("beyond_mocap.make_assets", text=f"{len(listing.shown)} Shown {text}", icon=icon)
+        button.which, button.apart = "SHOWN", apart
+    column.operator("beyond_mocap.make_assets", text="Selected Armatures", icon="ARMATURE_DATA").which = "SELECTED"
 
 
 def draw_opened(layout, thing) -> None:

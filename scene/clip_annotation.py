@@ -45,12 +45,17 @@ def lay(rig: bpy.types.Object, scene: bpy.types.Scene, motion: "Motion", timelin
 def said(rig: bpy.types.Object) -> tuple[ClipAnnotation, ...]:
     """What the armature's strips say, as rows in frames of the recording; InputError where it has no strips, or where
     they say nothing."""
+    if RATE not in rig:
+        raise InputError(rig.name, "no strips with words", "a clip opened with Annotate Clip")
+    return said_at(rig, rig[RATE], rig[COUNT])
+
+
+def said_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipAnnotation, ...]:
+    """What an armature's strips say, as rows in frames of a motion of `count` frames at `fps`; InputError as `said`."""
     from ..beyond_mocap.library.keep_words import within
 
     timeline = lanes.read(rig, f"strips of {rig.name}")
-    if timeline is None or RATE not in rig:
-        raise InputError(rig.name, "no strips with words", "a clip opened with Annotate Clip")
-    rows = within(clip_annotations(timeline, rig[RATE]), rig[COUNT])
+    rows = within(clip_annotations(timeline, fps), count) if timeline is not None else ()
     if not rows:
         raise InputError(rig.name, "strips that say nothing", "at least one strip or marker", "press Propose Words")
     return rows

@@ -23,12 +23,10 @@ def folder_of(settings) -> Path:
     return Path(absolute(settings.library_folder))
 
 
-def read(settings, path: str, folder: str = "") -> tuple["Motion", tuple[str, ...]]:
-    """The motion of a clip and what its reader decided; InputError where it cannot be read, or waits to be converted.
-
-    path: below the library's folder; folder: as a setting spells it, the scene's own where empty.
-    """
-    from ..beyond_mocap.files import bvh
+def file_of(settings, path: str, folder: str = "") -> tuple[Path, float | None]:
+    """The BVH file to read for a clip, and the metres per unit to read it with (None: guessed). path: below the library's
+    folder; folder: as a setting spells it, the scene's own where empty. InputError where it is missing, or waits to be
+    converted."""
     from ..beyond_mocap.library import cache
     from ..beyond_mocap.library.converted import Conversions, is_foreign
 
@@ -39,8 +37,14 @@ def read(settings, path: str, folder: str = "") -> tuple["Motion", tuple[str, ..
         raise InputError(file, "no such file", "a clip of the library", "press Build Library to list its clips anew")
     if not conversions.stands(file):
         raise InputError(file, "not converted yet", "a clip that was converted", "press Build Library")
-    unit = None if is_foreign(file) else settings.library_unit or None
-    clip = bvh.read(conversions.readable(file), unit)
+    return conversions.readable(file), None if is_foreign(file) else settings.library_unit or None
+
+
+def read(settings, path: str, folder: str = "") -> tuple["Motion", tuple[str, ...]]:
+    """The motion of a clip and what its reader decided; arguments and errors as `file_of`."""
+    from ..beyond_mocap.files import bvh
+
+    clip = bvh.read(*file_of(settings, path, folder))
     return clip.motion, clip.notes
 
 

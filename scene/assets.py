@@ -1,0 +1,148 @@
+"""Motions as assets: actions with a catalog, tags, a description and a picture of their key pose.
+
+Works without a window: pictures are drawn by the core. Catalogs stand in Blender's own text beside the file; each has an
+identity that follows from its name, so that the same catalog is the same everywhere.
+"""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ..beyond_mocap.annotation import DISCRETE, LOCOMOTION
+from ..beyond_mocap.errors import InputError
+from . import action, armature
+
+if TYPE_CHECKING:
+    from ..beyond_mocap.motion.motion import Motion
+
+CATALOGS = "blender_assets.cats.txt"
+TOP = "Beyond Mocap"
+_HEAD = "# This is an Asset Catalog Definition file for Blender.\n\nVERSION 1\n\n"
+_SPACE = uuid.UUID("6a8b2d0e-6f0f-5f0c-9d7b-0f3f5b3d7a11")
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """A motion on its way to be an asset. frame: the pose that its picture shows; action: the name of the action that
+    plays it already, "" where one is to be made."""
+
+    name: str
+    motion: "Motion"
+    words: tuple[str, ...]
+    frame: int
+    told: str
+    action: str = ""
+
+
+def draft(name: str, motion: "Motion", rows, told: str = "", action: str = "") -> Draft:
+    """A draft from a motion and its rows of words: the picture shows the first key moment, else the middle of the
+    longest row."""
+    from ..beyond_mocap.library.listing import words_of
+
+    keys = [row.key for row in rows if row.key is not None]
+    longest = max(rows, key=lambda row: row.end - row.start, default=None)
+    middle = (longest.start + longest.end) // 2 if longest is not None else len(motion) // 2
+    frame = min(keys[0] if keys else middle, len(motion) - 1)
+    return Draft(name, motion, words_of(rows)[0], frame, told, action)
+
+
+def picture(one: Draft) -> np.ndarray | None:
+    """Its picture (256, 256, 4); None for a skeleton on which no body can be put."""
+    from ..beyond_mocap.motion.picture import pose_picture
+
+    try:
+        return pose_picture(one.motion, one.frame)
+    except InputError:
+        return None
+
+
+def catalog_of(words: Iterable[str]) -> str:
+    """The catalog of a motion with these words: its action, else its gait, else "Other"."""
+    words = tuple(words)
+    known = [word for word in words if word in DISCRETE] or [word for word in words if word in LOCOMOTION]
+    return f"{TOP}/{(known or ['other'])[0].replace('_', ' ').capitalize()}"
+
+
+def catalog_id(catalog: str) -> str:
+    """A catalog's identity, the same in every file."""
+    return str(uuid.uuid5(_SPACE, catalog))
+
+
+def make(context: bpy.types.Context, drafts: list[Draft], pictures: list) -> list[bpy.types.Action]:
+    """The drafts as assets of this file: their own actions marked, or new ones made; returns the actions."""
+    made, rigs = [], []
+    try:
+        for one, pixels in zip(drafts, pictures):
+            own = bpy.data.actions.get(one.action) if one.action else None
+            if own is None:
+                rig = next((rig for rig, skeleton in rigs if skeleton.same_bones(one.motion.skeleton)), None)
+                if rig is None:
+                    rig = armature.create(context, one.motion.skeleton, "Player")
+                    rigs.append((rig, one.motion.skeleton))
+                own = action.write(rig, one.motion, context.scene, name=one.name)
+            mark(own, one, pixels)
+            made.append(own)
+    finally:
+        data = [rig.data for rig, _ in rigs]
+        bpy.data.batch_remove([rig for rig, _ in rigs])
+        bpy.data.batch_remove(data)
+    return made
+
+
+def mark(item: bpy.types.Action, one: Draft, pixels: np.ndarray | None) -> None:
+    """An action as an asset: catalog, tags, description, picture."""
+    item.asset_mark()
+    about = item.asset_data
+    about.catalog_id = catalog_id(catalog_of(one.words))
+    about.description = one.told
+    for tag in list(about.tags):
+        about.tags.remove(tag)
+    for word in one.words:
+        about.tags.new(word)
+    if pixels is not None:
+        preview = item.preview_ensure()
+        preview.image_size = pixels.shape[1], pixels.shape[0]
+        preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
+
+
+def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
+    """Add catalogs to the definitions that hold for files in `folder`: the nearest above it, else its own, written
+    beside and renamed; returns that file. InputError where it cannot be written."""
+    folder = Path(folder)
+    target = next((place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()), folder / CATALOGS)
+    text = target.read_text("utf-8") if target.is_file() else _HEAD
+    new = [name for name in sorted({TOP, *catalogs}) if catalog_id(name) not in text]
+    if not new:
+        return target
+    text = text.rstrip("\n") + "\n" + "".join(f"{catalog_id(name)}:{name}:{name.replace('/', '-')}\n" for name in new)
+    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        beside.write_text(text, "utf-8")
+        os.replace(beside, target)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror})"
+        raise InputError(target, found, "a folder that can be written", "choose another place") from None
+    finally:
+        beside.unlink(missing_ok=True)
+    return target
+
+
+def write_library(path: Path, actions: list[bpy.types.Action]) -> None:
+    """Actions as a .blend of their own, written beside and renamed; InputError where that cannot be done."""
+    beside = path.with_name(f".{path.stem}.{os.getpid()}.blend")
+    try:
+        bpy.data.libraries.write(str(beside), set(actions), fake_user=True, compress=True)
+        os.replace(beside, path)
+    except (OSError, RuntimeError) as error:
+        found = f"cannot be written ({getattr(error, 'strerror', None) or error})"
+        raise InputError(path, found, "a folder that can be written", "choose another place") from None
+    finally:
+        beside.unlink(missing_ok=True)
