@@ -7,6 +7,7 @@ import bpy
 
 from . import (
     accept,
+    add_preset,
     add_stage,
     annotate,
     annotate_clip,
@@ -60,6 +61,7 @@ CLASSES = (
     save_words.BEYOND_MOCAP_OT_save_words,
     remove_clip.BEYOND_MOCAP_OT_remove_clip,
     make_assets.BEYOND_MOCAP_OT_make_assets,
+    add_preset.BEYOND_MOCAP_OT_add_preset,
     import_words.BEYOND_MOCAP_OT_import_words,
     import_words.BEYOND_MOCAP_FH_words,
     synthesize.BEYOND_MOCAP_OT_synthesize,

@@ -5,7 +5,7 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 
 import bpy
 
-from . import annotate, library, menus, players, preferences, quality, result, synthesis, video, view
+from . import annotate, library, menus, players, preferences, presets, quality, result, synthesis, video, view
 
 CLASSES = (
     library.BEYOND_MOCAP_UL_clips,
@@ -14,6 +14,8 @@ CLASSES = (
     players.BEYOND_MOCAP_PT_players,
     annotate.BEYOND_MOCAP_PT_annotate,
     video.BEYOND_MOCAP_PT_video,
+    presets.BEYOND_MOCAP_MT_presets,
+    presets.BEYOND_MOCAP_PT_presets,
     synthesis.BEYOND_MOCAP_PT_synthesis,
     result.BEYOND_MOCAP_PT_result,
     quality.BEYOND_MOCAP_PT_quality,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .presets import BEYOND_MOCAP_PT_presets
 from .tab import Step
 
 
@@ -12,6 +13,10 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
 
     bl_label = "3  Synthesize"
     bl_order = 3
+
+    def draw_header_preset(self, _context):
+        """The presets."""
+        BEYOND_MOCAP_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context):
         """Button, progress, choices."""
