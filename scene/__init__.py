@@ -12,7 +12,7 @@
 - `result`, `preview`, `set_aside`, `blocks`   a take is shown, kept or put away again; as one action or as NLA strips
 - `dots`        an Empty for each player that runs along the track; `clock` its seconds against frames
 - `strips`      a player's timeline as NLA strips on his dot; `lanes` reads, `lay_strips` writes those of any object,
-                `strip_lines` is what one of them says
+                `strip_lines` is what one of them says, `strip_events` puts in order what users do to them
 - `migrate`   what earlier versions have saved
 - `view_settings`, `overlays`   what is drawn over the 3D view; `quality`, `error_curves` what a report says, in the file
 - `background`  long work in a thread
@@ -24,7 +24,8 @@ The classes are registered in the order of CLASSES: what others point to comes f
 import bpy
 
 from . import (
-    background, clips, dots, lanes, migrate, overlays, result, session, settings, strip_lines, video, view_settings, watch,
+    background, clips, dots, lanes, migrate, overlays, result, session, settings, strip_events, strip_lines, video,
+    view_settings, watch,
 )
 
 CLASSES = (
@@ -62,6 +63,7 @@ def register():
     video.register()
     migrate.register()
     overlays.register()
+    strip_events.register()
 
 
 def unregister():
@@ -70,6 +72,7 @@ def unregister():
     background.stop()
     video.unregister()
     migrate.unregister()
+    strip_events.unregister()
     watch.unregister()
     session.clear()
     for owner, name, _ in reversed(KEPT_WITH):

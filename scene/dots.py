@@ -30,6 +30,7 @@ class BeyondMocapDot(bpy.types.PropertyGroup):
     metadata_file: bpy.props.StringProperty(name="Metadata", description="The provider's second file")
     feed_id: bpy.props.StringProperty(name="ID in the feed", description="Which player of the tracking file this is")
     provider: bpy.props.StringProperty(name="Provider", description="Whose form the tracking file has")
+    clock: bpy.props.StringProperty(name="Clock", description="Start frame, seconds there, frames per second of its keys")
     shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", description="Colour of the player's shirt")
 
 
@@ -75,11 +76,12 @@ def remove(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
             _delete(ball)
 
 
-def relay(dot: bpy.types.Object, old: Clock, new: Clock) -> None:
-    """Move a dot's keys from the frames of one clock to those of another."""
+def relay(dot: bpy.types.Object, new: Clock) -> bool:
+    """Move a dot's keys to the frames of another clock; whether there was anything to do."""
+    old = Clock.read(dot.beyond_mocap_dot.clock)
     action, slot = channels.playing(dot)
-    if action is None or not action.get(MARK):
-        return
+    if old is None or old == new or action is None or not action.get(MARK):
+        return False
     for curve in channels.curves(action, slot).values():
         keys = np.empty(2 * len(curve.keyframe_points), np.float32)
         curve.keyframe_points.foreach_get("co", keys)
@@ -87,6 +89,8 @@ def relay(dot: bpy.types.Object, old: Clock, new: Clock) -> None:
         keys[::2] = new.start_frame + (seconds - new.start_time) * new.fps
         curve.keyframe_points.foreach_set("co", keys)
         curve.update()
+    dot.beyond_mocap_dot.clock = new.spelled()
+    return True
 
 
 def keyed_frames(dot: bpy.types.Object) -> tuple[float, float] | None:
@@ -124,6 +128,7 @@ def _animate(scene: bpy.types.Scene, dot: bpy.types.Object, seconds: np.ndarray,
     frames = clock.start_frame + (seconds - clock.start_time) * clock.fps
     curves = {"location": ("Object Transforms", places * units_per_metre(scene))}
     channels.animate(dot, f"{dot.name} track", frames, curves)[MARK] = True
+    dot.beyond_mocap_dot.clock = clock.spelled()
 
 
 def _delete(dot: bpy.types.Object) -> None:

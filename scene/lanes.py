@@ -112,8 +112,8 @@ def spans(target: bpy.types.Object, where: str = "") -> list[PlacedSpan]:
 def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
     """All key moments by time; InputError as `read`.
 
-    A marker beyond the ends of its strip is not seen and does not count; one of an action that several strips play
-    counts once where they show it on the same frame.
+    A marker beyond the ends of its strip is not seen and does not count; what several strips show on the same frame,
+    since one is a copy of the other, counts once.
     """
     clock, where, found = written_for(target), where or target.name, {}
     for track, strip in strips(target):
@@ -122,8 +122,10 @@ def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
                 frame = marker_frame(strip, marker)
                 off = track.mute or strip.mute
                 placed = PlacedMoment(key_of(marker, frame, clock, where), strip.name, index, frame, off, marker.select)
-                found.setdefault((strip.action.name, index, frame), placed)
-    return sorted(found.values(), key=lambda placed: placed.key.time)
+                others = found.setdefault((frame, placed.words), [])
+                if all(other.strip == strip.name for other in others):
+                    others.append(placed)
+    return sorted((placed for same in found.values() for placed in same), key=lambda placed: placed.key.time)
 
 
 def span_at(target: bpy.types.Object, seconds: float) -> PlacedSpan | None:

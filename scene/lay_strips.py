@@ -130,7 +130,7 @@ def relay(target: bpy.types.Object, clock: Clock) -> bool:
     keys = [(strip, marker, key_of(marker, marker_frame(strip, marker), old, target.name))
             for _, strip in strips(target) for marker in strip.action.pose_markers if shows(strip, marker)]
     for track in target.animation_data.nla_tracks:
-        _place_all([(strip, *frames_of(said[strip.name], clock)) for strip in track.strips if strip.name in said])
+        place_all([(strip, *frames_of(said[strip.name], clock)) for strip in track.strips if strip.name in said])
     for _, strip in strips(target):
         if strip.action.beyond_mocap.kind != "moments":
             remember(strip, said[strip.name], strip.action.beyond_mocap.kind)
@@ -173,7 +173,7 @@ def place(strip: bpy.types.NlaStrip, first: float, last: float) -> None:
 
 def _lay(target: bpy.types.Object, span: Span, clock: Clock, kind: str) -> bpy.types.NlaStrip:
     first, last = frames_of(span, clock)
-    lane = _lane(target, AUTOMATIC if kind == "automatic" else WORDS, first, last)
+    lane = lane_with_room(target, AUTOMATIC if kind == "automatic" else WORDS, first, last)
     strip = _new_strip(lane, f"{target.name} {words_of(span)}", first, last)
     remember(strip, span, kind)
     strip.mute = kind == "automatic"
@@ -189,7 +189,7 @@ def _new_strip(track: bpy.types.NlaTrack, name: str, first: int, last: int) -> b
     return strip
 
 
-def _lane(target: bpy.types.Object, name: str, first: int, last: int) -> bpy.types.NlaTrack:
+def lane_with_room(target: bpy.types.Object, name: str, first: int, last: int) -> bpy.types.NlaTrack:
     """The first track of that lane with room from first to last, made where there is none."""
     tracks = target.animation_data.nla_tracks
     fitting = [track for track in tracks if (lane_number(track) if name == WORDS else track.name.startswith(name))]
@@ -244,7 +244,7 @@ def _on_action(strip: bpy.types.NlaStrip, frame: int) -> int:
     return nearest_frame(strip.action_frame_start + (frame - strip.frame_start) / strip.scale)
 
 
-def _place_all(wanted: list[tuple[bpy.types.NlaStrip, int, int]]) -> None:
+def place_all(wanted: list[tuple[bpy.types.NlaStrip, int, int]]) -> None:
     """Put all strips of one track in place. They go far away first: one that lands on another would push it."""
     wanted = sorted(wanted, key=lambda one: one[0].frame_start)
     far = 1.0 + max((max(strip.frame_end, last) for strip, _, last in wanted), default=0.0)

@@ -25,6 +25,7 @@ KINDS = (
     ("moments", "Moments", "The lane of key moments"),
     ("moment", "Moment", "A key moment"),
 )
+_MOST_BLANKS = 24
 _NEAR = 1.0 - 1e-3  # frames; what was moved by less still stands where its line says
 
 
@@ -89,7 +90,11 @@ def recorded_span(action: bpy.types.Action) -> Span | None:
 
 def remember(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
     """Name a strip by its words and keep the exact line with its action."""
-    strip.name = words_of(span)
+    words = words_of(span)
+    for blanks in range(_MOST_BLANKS):  # which nobody sees, and Blender adds no number to the name
+        strip.name = words + " " * blanks
+        if strip.name == words + " " * blanks:
+            break
     record = strip.action.beyond_mocap
     record.kind, record.line, record.shown = kind, line_of(span), strip.name
 
@@ -102,8 +107,8 @@ def tell(marker: bpy.types.TimelineMarker, key: KeyMoment, frame: int) -> None:
 
 
 def base_name(name: str) -> str:
-    """A strip's name without the number that Blender adds to a name that is taken: "running" of "running.001"."""
-    return re.sub(r"\.\d{3,}$", "", name)
+    """A strip's name without what keeps it apart from others: "running" of "running  " and "running.001"."""
+    return re.sub(r"\.\d{3,}$", "", name).rstrip()
 
 
 def _typed(name: str) -> str:

@@ -113,8 +113,8 @@ def test_each_end_is_exact_until_it_is_moved_by_a_frame(room, core, text, dot, c
 def test_names_are_words(room, core, text, dot, clock):
     room("lay_strips").write(dot, text.parse_timeline("2 4 running\n5 6 running\n7 9\n3 kick\n"), clock)
     read, InputError = room("lanes").read, core("errors").InputError
-    assert strip_of(dot, "running.001") and strip_of(dot, "(automatic)")
-    strip_of(dot, "running.001").name = "Jogging dribble.002"
+    assert strip_of(dot, "running ") and strip_of(dot, "(automatic)")
+    strip_of(dot, "running ").name = "Jogging dribble.002"
     strip_of(dot, "(automatic)").name = "walking"
     marker = strip_of(dot, "Moments").action.pose_markers[0]
     marker.name = "kick rigt"
@@ -143,10 +143,10 @@ def test_automatic_strips_are_asked_for_once_touched(room, text, dot, clock):
     lay_strips.write(dot, parse("2 4 running\n"), clock)
     lay_strips.set_automatic(dot, parse("0 2 walking\n2 4 running\n4 6 walking\n6 9 jogging\n"), clock)
     strips = [strip for strip in dot.animation_data.nla_tracks["Automatic"].strips]
-    assert [strip.name for strip in strips] == ["walking", "walking.001", "jogging"] and all(strip.mute for strip in strips)
+    assert [strip.name for strip in strips] == ["walking", "walking ", "jogging"] and all(strip.mute for strip in strips)
     assert text.format_timeline(lanes.read(dot)) == "2 4 running\n"
     strip_of(dot, "walking").name = "sprinting"
-    strip_of(dot, "walking.001").frame_end_raw = 145
+    strip_of(dot, "walking ").frame_end_raw = 145
     strip_of(dot, "jogging").mute = False
     assert text.format_timeline(lanes.read(dot)) == "0 2 sprinting\n2 4 running\n4 5.76 walking\n6 9 jogging\n"
     lay_strips.set_automatic(dot, parse("0 2 sprinting\n2 4 running\n4 5.76 walking\n5.76 6 standing\n6 9 jogging\n"), clock)
