@@ -84,7 +84,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
     def add(self, settings, path: str, found: tracks.Found, provider: str):
         """One more player in the list; of a whole match only the first is ticked."""
         entry = settings.players.add()
-        entry.name = _free_name(found.name, {player.name for player in settings.players})
+        entry.name = free_name(found.name, {player.name for player in settings.players})
         entry.tracking_file, entry.metadata_file = as_setting(path), as_setting(self.metadata) if self.metadata else ""
         entry.feed_id, entry.provider = found.feed_id, provider
         same_file = [player for player in settings.players if player.tracking_file == entry.tracking_file]
@@ -96,7 +96,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
             entry.annotation_file = as_setting(str(words))
 
 
-def _free_name(wanted: str, taken: set[str]) -> str:
+def free_name(wanted: str, taken: set[str]) -> str:
     """`wanted`, or the first "wanted 2", "wanted 3" ... that is not taken."""
     number, name = 1, wanted
     while name in taken:

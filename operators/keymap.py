@@ -33,6 +33,8 @@ ENTRIES: tuple[Entry, ...] = (
     Entry("Dopesheet", "DOPESHEET_EDITOR", "beyond_mocap.annotate", "J"),
     Entry("Sequencer", "SEQUENCE_EDITOR", "beyond_mocap.annotate", "J"),
     Entry("Clip Editor", "CLIP_EDITOR", "beyond_mocap.annotate", "J"),
+    Entry("NLA Editor", "NLA_EDITOR", "beyond_mocap.pick_moment", "LEFTMOUSE"),
+    Entry("Dopesheet", "DOPESHEET_EDITOR", "beyond_mocap.pick_moment", "LEFTMOUSE"),
 )
 
 

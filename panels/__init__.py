@@ -6,6 +6,8 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import annotate, library, menus, players, preferences, presets, quality, result, synthesis, video, view
+from . import annotate, library, menus, players, preferences, quality, result, synthesis, video, view
+from . import library, menus, players, preferences, result, synthesis, timeline, video
 
 CLASSES = (
     library.BEYOND_MOCAP_UL_clips,
@@ -20,6 +22,9 @@ CLASSES = (
     result.BEYOND_MOCAP_PT_result,
     quality.BEYOND_MOCAP_PT_quality,
     view.BEYOND_MOCAP_PT_view,
+    timeline.BEYOND_MOCAP_MT_choose_player,
+    timeline.BEYOND_MOCAP_PT_timeline,
+    timeline.BEYOND_MOCAP_PT_timeline_dope_sheet,
     preferences.BeyondMocapPreferences,
 )
 

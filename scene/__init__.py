@@ -13,6 +13,7 @@
 - `dots`        an Empty for each player that runs along the track; `clock` its seconds against frames
 - `strips`      a player's timeline as NLA strips on his dot; `lanes` reads, `lay_strips` writes those of any object,
                 `strip_lines` is what one of them says, `strip_events` puts in order what users do to them
+- `subject`     whose timeline is meant; `word_checks` what is wrong with it; `moment_names` drawn in the NLA editor
 - `migrate`   what earlier versions have saved
 - `view_settings`, `overlays`   what is drawn over the 3D view; `quality`, `error_curves` what a report says, in the file
 - `background`  long work in a thread
@@ -24,8 +25,8 @@ The classes are registered in the order of CLASSES: what others point to comes f
 import bpy
 
 from . import (
-    background, clips, dots, lanes, migrate, overlays, result, session, settings, strip_events, strip_lines, video,
-    view_settings, watch,
+    background, clips, dots, lanes, migrate, moment_names, overlays, result, session, settings, strip_events,
+    strip_lines, video, view_settings, watch, word_checks,
 )
 
 CLASSES = (
@@ -36,6 +37,8 @@ CLASSES = (
     strip_lines.BeyondMocapLine,
     lanes.BeyondMocapLanes,
     dots.BeyondMocapDot,
+    word_checks.BeyondMocapProblem,
+    word_checks.BeyondMocapProblems,
     settings.BeyondMocapPlayer,
     settings.BeyondMocapSettings,
     settings.BeyondMocapWork,
@@ -47,6 +50,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_lanes", lanes.BeyondMocapLanes),
     ("Object", "beyond_mocap_dot", dots.BeyondMocapDot),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
+    ("WindowManager", "beyond_mocap_problems", word_checks.BeyondMocapProblems),
     ("WindowManager", "beyond_mocap_work", settings.BeyondMocapWork),
     ("WindowManager", "beyond_mocap_playhead", view_settings.BeyondMocapPlayhead),
     ("WindowManager", "beyond_mocap_clips", clips.BeyondMocapClips),
@@ -64,6 +68,7 @@ def register():
     migrate.register()
     overlays.register()
     strip_events.register()
+    moment_names.register()
 
 
 def unregister():
@@ -72,6 +77,7 @@ def unregister():
     background.stop()
     video.unregister()
     migrate.unregister()
+    moment_names.unregister()
     strip_events.unregister()
     watch.unregister()
     session.clear()

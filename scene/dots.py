@@ -12,14 +12,15 @@ from ..beyond_mocap.motion.track import Track
 from . import bake, channels
 from .clock import Clock, of_scene
 from .measure import units_per_metre
-from .settings import BeyondMocapPlayer
+from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, as_setting
 from .tracks import read_track
 
 BALL = "Ball dot"
 MARK = "beyond_mocap_dot"  # on actions that move a dot and may be made anew
 SIZE, BALL_SIZE = 0.25, 0.11  # metres
 BALL_RGB = (0.9, 0.9, 0.9)
-ORIGIN = ("tracking_file", "metadata_file", "feed_id", "provider", "shirt")
+FILES = ("tracking_file", "metadata_file")  # kept whole: a dot may be appended to a file in another folder
+ORIGIN = (*FILES, "feed_id", "provider", "shirt")
 
 
 class BeyondMocapDot(bpy.types.PropertyGroup):
@@ -62,7 +63,8 @@ def show(player: BeyondMocapPlayer) -> None:
     dot.name, dot.color = f"{player.name} dot", (*player.shirt, 1.0)
     dot.beyond_mocap_dot.player = player.name
     for name in ORIGIN:
-        setattr(dot.beyond_mocap_dot, name, getattr(player, name))
+        value = getattr(player, name)
+        setattr(dot.beyond_mocap_dot, name, absolute(value) if name in FILES else value)
 
 
 def remove(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
@@ -74,6 +76,30 @@ def remove(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
         ball = bake.collection(scene).objects.get(BALL)
         if ball is not None:
             _delete(ball)
+
+
+def orphans(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected dots of players that are in no list of this scene."""
+    owned = {player.dot for player in context.scene.beyond_mocap.players}
+    return [dot for dot in context.selected_objects if dot.beyond_mocap_dot.player and dot not in owned]
+
+
+def adopt(settings: BeyondMocapSettings, dot: bpy.types.Object, name: str) -> BeyondMocapPlayer:
+    """A new player of this scene, to whom the dot belongs."""
+    origin = {key: getattr(dot.beyond_mocap_dot, key) for key in ORIGIN}
+    player = settings.players.add()
+    for key, value in origin.items():
+        setattr(player, key, as_setting(value) if key in FILES and value else value)
+    player.dot = dot
+    player.name = name
+    settings.active_player = len(settings.players) - 1
+    return player
+
+
+def first_second(dot: bpy.types.Object) -> float:
+    """What the track's clock shows at the dot's first key."""
+    clock, frames = Clock.read(dot.beyond_mocap_dot.clock), keyed_frames(dot)
+    return clock.seconds(frames[0]) if clock and frames else 0.0
 
 
 def relay(dot: bpy.types.Object, new: Clock) -> bool:

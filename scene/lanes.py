@@ -94,19 +94,19 @@ def spans(target: bpy.types.Object, where: str = "") -> list[PlacedSpan]:
 
     An automatic strip that was moved, renamed, unmuted or put on another lane is asked for from then on.
     """
-    clock, where, out = written_for(target), where or target.name, []
-    for track, strip in strips(target):
-        kind = strip.action.beyond_mocap.kind
-        if kind == "moments":
-            continue
-        span = span_of(strip, clock, where)
-        untouched = (
-            kind == "automatic" and track.name.startswith(AUTOMATIC) and strip.mute and span == recorded_span(strip.action)
-        )
-        off = (track.mute or strip.mute) and kind != "automatic"
-        frames = nearest_frame(strip.frame_start), nearest_frame(strip.frame_end)
-        out.append(PlacedSpan(span, track.name, strip.name, *frames, off, untouched, strip.select))
-    return sorted(out, key=lambda placed: (placed.span.start, placed.span.end))
+    clock, where = written_for(target), where or target.name
+    found = [placed_span(track, strip, clock, where) for track, strip in strips(target)
+             if strip.action.beyond_mocap.kind != "moments"]
+    return sorted(found, key=lambda placed: (placed.span.start, placed.span.end))
+
+
+def placed_span(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip, clock: Clock, where: str) -> PlacedSpan:
+    """One strip's span; InputError as `read`."""
+    span, made = span_of(strip, clock, where), strip.action.beyond_mocap.kind == "automatic"
+    untouched = made and track.name.startswith(AUTOMATIC) and strip.mute and span == recorded_span(strip.action)
+    off = (track.mute or strip.mute) and not made
+    frames = nearest_frame(strip.frame_start), nearest_frame(strip.frame_end)
+    return PlacedSpan(span, track.name, strip.name, *frames, off, untouched, strip.select)
 
 
 def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:

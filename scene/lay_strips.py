@@ -12,8 +12,8 @@ from ..beyond_mocap.annotation import KeyMoment, Span, Timeline
 from ..beyond_mocap.errors import InputError
 from .clock import Clock, nearest_frame
 from .lanes import (
-    AUTOMATIC, MOMENTS, WORDS, PlacedMoment, PlacedSpan, lane_number, marker_frame, moments, shows, spans, strip_named,
-    strips, within, written_for,
+    AUTOMATIC, MOMENTS, WORDS, PlacedMoment, PlacedSpan, lane_number, marker_frame, moments, placed_span, shows, spans,
+    strip_named, strips, within, written_for,
 )
 from .strip_lines import frames_of, key_of, remember, span_of, tell, words_of
 
@@ -283,4 +283,5 @@ def _select_only(target: bpy.types.Object, strip_name: str) -> None:
 
 
 def _placed(target: bpy.types.Object, strip_name: str) -> PlacedSpan:
-    return next(placed for placed in spans(target) if placed.strip == strip_name)
+    track = next(track for track, strip in strips(target) if strip.name == strip_name)
+    return placed_span(track, strip_named(target, strip_name), written_for(target), target.name)

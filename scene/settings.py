@@ -181,6 +181,10 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Clock at Start", default=0.0, unit="TIME_ABSOLUTE", precision=2, update=renew,
         description="Seconds on the tracking file's clock at the start frame",
     )
+    show_moment_names: BoolProperty(
+        name="Names of Key Moments", default=True,
+        description="Write the names of key moments into NLA editors and dope sheets",
+    )
     make_bodies: BoolProperty(name="Bodies", default=True, description="Make a low-poly body for each player")
     make_ball: BoolProperty(name="Ball", default=True, description="Make the ball, where the tracking has one")
     make_paths: BoolProperty(name="Paths", default=True, description="Draw each player's track on the ground")

@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ..beyond_mocap.annotation import Span
 from ..beyond_mocap.errors import InputError
-from . import dots
+from . import dots, moment_names, word_checks
 from .clock import Clock, of_scene
 from .lanes import AUTOMATIC, WORDS, has, is_lane, marker_frame, shows, strips, written_for
 from .lay_strips import lane_with_room, place, place_all, relay
@@ -108,13 +108,14 @@ def _renew(target, track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) -
 
 def _move(target, track, strip: bpy.types.NlaStrip) -> None:
     """Put a strip onto a lane of words with room; tracks cannot hand over strips, so it is made again there."""
-    first, last, action, name, selected = strip.frame_start, strip.frame_end, strip.action, strip.name, strip.select
+    first, last, action = strip.frame_start, strip.frame_end, strip.action
+    selected, muted = strip.select, strip.mute
     lane = lane_with_room(target, WORDS, int(first), int(last))
     track.strips.remove(strip)
-    strip = lane.strips.new(base_name(name), int(first), action)
-    strip.extrapolation, strip.select = "NOTHING", selected
+    strip = lane.strips.new(action.name, int(first), action)
+    strip.extrapolation, strip.select, strip.mute = "NOTHING", selected, muted
     place(strip, first, last)
-    action.beyond_mocap.shown = strip.name
+    remember(strip, recorded_span(action), action.beyond_mocap.kind)
 
 
 def _onto_frames(target: bpy.types.Object, clock: Clock) -> bool:
@@ -207,7 +208,9 @@ def _later():
     running = [operator.bl_idname for window in bpy.context.window_manager.windows for operator in window.modal_operators]
     if any(name.startswith(UNDER_WAY) for name in running):
         return DELAY
-    put_in_order(bpy.context.scene)
+    if put_in_order(bpy.context.scene):
+        moment_names.redraw(bpy.context)
+    word_checks.keep(bpy.context)
     return None
 
 

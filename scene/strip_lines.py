@@ -65,7 +65,7 @@ def span_of(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
         start = kept.start if abs(strip.frame_start - was[0]) < _NEAR else start
         end = kept.end if abs(strip.frame_end - was[1]) < _NEAR else end
     if kept is None or base_name(strip.name) != base_name(record.shown):
-        kept = _parsed(f"0 1 {_typed(strip.name)}", strip.name, f"{where}, strip on frame {first}").spans[0]
+        kept = _parsed("0 1", strip.name, f"{where}, strip on frame {first}").spans[0]
     return replace(kept, start=start, end=end, line=None)
 
 
@@ -78,8 +78,15 @@ def key_of(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: st
     time = kept.time if on_time else clock.seconds(frame)
     if kept is None or marker.name != record.shown:
         place = f"{where}, key moment on frame {frame}"
-        kept = _parsed(f"0 {_typed(marker.name)}", marker.name, place).keys[0]
+        kept = _parsed("0", marker.name, place).keys[0]
     return replace(kept, time=time, line=None)
+
+
+def said(text: str, start: float, end: float | None = None, where: str = "words") -> Span | KeyMoment:
+    """The span (or, without an end, the key moment) that typed words say; InputError where they are not of the form."""
+    if end is None:
+        return replace(_parsed("0", text, where).keys[0], time=start, line=None)
+    return replace(_parsed("0 1", text, where).spans[0], start=start, end=end, line=None)
 
 
 def recorded_span(action: bpy.types.Action) -> Span | None:
@@ -111,17 +118,13 @@ def base_name(name: str) -> str:
     return re.sub(r"\.\d{3,}$", "", name).rstrip()
 
 
-def _typed(name: str) -> str:
+def _parsed(times: str, name: str, place: str) -> Timeline:
+    """What a name says at one time or two; InputError where the text form would read it as something else."""
     words = base_name(name)
-    return "" if words == NO_WORDS else words
-
-
-def _parsed(line: str, name: str, place: str) -> Timeline:
-    """What a name says; InputError where the text form would read it as something else."""
     try:
-        found = parse_timeline(line)
-        if "#" not in name and len(found.spans) + len(found.keys) == 1:
-            return found
+        found = parse_timeline(f"{times} {'' if words == NO_WORDS else words}")
     except InputError:
-        pass
-    raise InputError(place, f"the name {name!r}", "words, without numbers and '#'", "rename it")
+        found = None
+    if found is None or "#" in name or len(found.keys if times == "0" else found.spans) != 1:
+        raise InputError(place, f"the words {name.strip()!r}", "words, without numbers and '#'", "write them anew")
+    return found

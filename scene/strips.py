@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..beyond_mocap.annotation import KeyMoment, Span, Timeline
+from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.errors import InputError
 from . import dots, lanes, lay_strips
 from .clock import Clock, of_scene
 from .lanes import PlacedMoment, PlacedSpan
 from .settings import BeyondMocapPlayer
+from .strip_lines import said
 
 
 def read(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> Timeline | None:
@@ -32,17 +33,20 @@ def set_automatic(context: bpy.types.Context, player: BeyondMocapPlayer, timelin
 def add_span(
     context: bpy.types.Context, player: BeyondMocapPlayer, start_s: float, end_s: float, words: tuple[str, ...]
 ) -> PlacedSpan:
-    """One more span, in seconds on the track's clock; InputError where it is empty or its words are not of the form."""
+    """One more span, in seconds on the track's clock; words as the text form has them, "-word" for one that must not be.
+    InputError where it is empty or its words are not of the form."""
     if end_s <= start_s:
         raise InputError("span", f"the end {end_s:g} is not after the start {start_s:g}", "START < END")
-    return lay_strips.add_span(_with_lanes(context, player), Span(start_s, end_s, words), of_scene(context.scene))
+    span = said(" ".join(words), start_s, end_s)
+    return lay_strips.add_span(with_lanes(context, player), span, of_scene(context.scene))
 
 
 def add_moment(
     context: bpy.types.Context, player: BeyondMocapPlayer, time_s: float, words: tuple[str, ...]
 ) -> PlacedMoment:
     """One more key moment, picked; InputError where its words are not of the form."""
-    return lay_strips.add_moment(_with_lanes(context, player), KeyMoment(time_s, words), of_scene(context.scene))
+    key = said(" ".join(words), time_s)
+    return lay_strips.add_moment(with_lanes(context, player), key, of_scene(context.scene))
 
 
 def remove(player: BeyondMocapPlayer, placed: PlacedSpan | PlacedMoment) -> None:
@@ -86,7 +90,7 @@ def where(player: BeyondMocapPlayer) -> str:
     return f"strips of {player.name}"
 
 
-def _with_lanes(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
+def with_lanes(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
     """The dot, its lane of key moments as long as the track."""
     dot = dots.ensure(context, player)
     if not lanes.has(dot):

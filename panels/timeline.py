@@ -1,0 +1,117 @@
+"""The tab "Beyond Mocap" in the NLA editor and the dope sheet: the timeline of words of one player."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.settings import active_player
+from .tab import paragraph
+
+MOST = 60  # key moments that the list shows
+
+
+class BEYOND_MOCAP_MT_choose_player(bpy.types.Menu):
+    """Whose strips are shown."""
+
+    bl_label = "Player"
+
+    def draw(self, context):
+        """A line for each player."""
+        for player in context.scene.beyond_mocap.players:
+            icon = "LAYER_ACTIVE" if player == active_player(context.scene.beyond_mocap) else "BLANK1"
+            self.layout.operator("beyond_mocap.choose_player", text=player.name, icon=icon).player = player.name
+
+
+class Timeline:
+    """What all editors of time show."""
+
+    bl_region_type = "UI"
+    bl_category = "Beyond Mocap"
+    bl_label = "Timeline"
+
+    def draw(self, context):
+        """Whose it is, key moments, what is wrong, tools."""
+        layout, settings = self.layout, context.scene.beyond_mocap
+        target, player = written_on(context), active_player(settings)
+        clip = target is not None and not target.beyond_mocap_dot.player
+        row = layout.row(align=True)
+        row.menu("BEYOND_MOCAP_MT_choose_player", text=target.name if clip else player.name if player else "No player")
+        row.operator("beyond_mocap.choose_player", text="", icon="RESTRICT_SELECT_OFF")
+        row.prop(settings, "show_moment_names", text="", icon="SYNTAX_OFF")
+        if target is None:
+            layout.operator("beyond_mocap.place_players", icon="NLA")
+        else:
+            self.moments(layout, target)
+            self.problems(layout, context, target)
+        self.tools(layout)
+
+    def moments(self, layout, target):
+        """Key moments by frame; a click goes there and picks it."""
+        found = sorted(shown_moments(target), key=lambda one: one[0])
+        box = layout.column(align=True)
+        for frame, name, strip, index, picked in found[:MOST]:
+            line = box.operator("beyond_mocap.go_to_moment", text=f"{frame}   {name}", depress=picked)
+            line.strip, line.index = strip, index
+        if len(found) > MOST:
+            box.label(text=f"and {len(found) - MOST} more")
+        row = layout.row(align=True)
+        row.operator("beyond_mocap.add_moment", text="Add", icon="ADD")
+        row.operator("beyond_mocap.move_moment", text="Move", icon="TRIA_DOWN_BAR")
+        row.operator("beyond_mocap.delete_moment", text="Delete", icon="REMOVE")
+
+    def problems(self, layout, context, target):
+        """What is wrong with the words, as it was found when they were last changed."""
+        for one in context.window_manager.beyond_mocap_problems.lines:
+            if one.target == target.name:
+                paragraph(layout, f"{one.frame}: {one.line}", "ERROR")
+
+    def tools(self, layout):
+        """Words of what is selected, spans, text form."""
+        column = layout.column(align=True)
+        column.operator("beyond_mocap.edit_words", icon="GREASEPENCIL")
+        column.operator("beyond_mocap.mirror_side", icon="MOD_MIRROR")
+        column = layout.column(align=True)
+        column.operator("beyond_mocap.add_span", icon="ADD")
+        column.operator("beyond_mocap.split_span", icon="UNLINKED")
+        column.operator("beyond_mocap.join_spans", icon="LINKED")
+        header, body = layout.panel("beyond_mocap_timeline_text", default_closed=True)
+        header.label(text="Text Form")
+        if body:
+            column = body.column(align=True)
+            column.operator("beyond_mocap.read_words", icon="IMPORT")
+            column.operator("beyond_mocap.words_to_text", icon="TEXT")
+            column.operator("beyond_mocap.export_words", icon="EXPORT")
+            body.operator("beyond_mocap.player_from_dot", icon="ADD")
+
+
+class BEYOND_MOCAP_PT_timeline(Timeline, bpy.types.Panel):
+    """In the NLA editor."""
+
+    bl_space_type = "NLA_EDITOR"
+
+
+class BEYOND_MOCAP_PT_timeline_dope_sheet(Timeline, bpy.types.Panel):
+    """In the dope sheet."""
+
+    bl_space_type = "DOPESHEET_EDITOR"
+
+
+def written_on(context) -> bpy.types.Object | None:
+    """The object whose strips are meant: a clip that is being annotated, else the active player's dot."""
+    active = context.view_layer.objects.active
+    if active is not None and active.beyond_mocap_lanes.clock and not active.beyond_mocap_dot.player:
+        return active
+    player = active_player(context.scene.beyond_mocap)
+    dot = player.dot if player else None
+    return dot if dot is not None and dot.beyond_mocap_lanes.clock and dot.animation_data else None
+
+
+def shown_moments(target):
+    """(frame, name, strip, index, picked) of the markers that an object's strips show."""
+    for track in target.animation_data.nla_tracks if target.animation_data else ():
+        for strip in track.strips:
+            low, high = strip.action_frame_start - 0.5, strip.action_frame_end + 0.5
+            for index, marker in enumerate(strip.action.pose_markers if strip.action else ()):
+                if low <= marker.frame <= high and marker.beyond_mocap.kind == "moment":
+                    frame = strip.frame_start + (marker.frame - strip.action_frame_start) * strip.scale
+                    yield round(frame), marker.name, strip.name, index, marker.select

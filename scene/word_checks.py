@@ -1,0 +1,114 @@
+"""What is wrong with the words of a timeline, as lines for the panel and the dialog: before anything is synthesized."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..beyond_mocap.annotation import KeyMoment, Span, Timeline, missing_keys, problems
+from ..beyond_mocap.errors import InputError
+from . import lanes, session
+from .settings import absolute
+from .strip_lines import base_name, key_of, span_of
+from .subject import name_of
+
+
+class BeyondMocapProblem(bpy.types.PropertyGroup):
+    """One line and where it leads."""
+
+    line: bpy.props.StringProperty(name="Line", description="What is wrong, and what to do")
+    frame: bpy.props.IntProperty(name="Frame", description="The frame that it is about")
+    target: bpy.props.StringProperty(name="Object", description="The object whose strips these are")
+
+
+class BeyondMocapProblems(bpy.types.PropertyGroup):
+    """What is wrong with the words; on the window manager, since it follows from the strips and is no data."""
+
+    lines: bpy.props.CollectionProperty(type=BeyondMocapProblem)
+
+
+def built(scene: bpy.types.Scene):
+    """The library that this session has built from the scene's folder, or None."""
+    settings = scene.beyond_mocap
+    folder = absolute(settings.library_folder)
+    return session.library(folder, settings.library_unit or None) if folder else None
+
+
+def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment) -> list[str]:
+    """What is wrong with one span or key moment: words out of the vocabulary, and words of key moments that the built
+    library does not have, with the nearest that it has."""
+    library = built(scene)
+    timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
+    found = [_short(error) for error in problems(timeline, library.words if library else ())]
+    if library is not None and isinstance(item, KeyMoment) and not found:
+        found += _missing(scene, timeline, library)
+    return found
+
+
+def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
+    """(frame, line) for everything that is wrong with an object's strips, in time order."""
+    found, timeline = [], []
+    clock, where = lanes.written_for(target), name_of(target)
+    for track, strip in lanes.strips(target):
+        if strip.mute or track.mute:
+            continue
+        if strip.action.beyond_mocap.kind != "moments":
+            found += _readable(timeline, strip.name, strip.frame_start, lambda: span_of(strip, clock, where))
+        for marker in strip.action.pose_markers:
+            if lanes.shows(strip, marker):
+                frame = lanes.marker_frame(strip, marker)
+                found += _readable(timeline, marker.name, frame, lambda: key_of(marker, frame, clock, where))
+    for frame, item in timeline:
+        found += [(frame, line) for line in lines_for(scene, item)]
+    return sorted(found + _together(target, [item for _, item in timeline]))
+
+
+def keep(context: bpy.types.Context) -> None:
+    """Work the lines out anew for every timeline of the scene; for the panel, which only shows them."""
+    found = [(target.name, *line) for target in context.scene.objects if lanes.has(target)
+             for line in lines_of(context.scene, target)]
+    kept = context.window_manager.beyond_mocap_problems.lines
+    if [(one.target, one.frame, one.line) for one in kept] == found:
+        return
+    kept.clear()
+    for target, frame, line in found:
+        one = kept.add()
+        one.target, one.frame, one.line = target, frame, line
+
+
+def _readable(timeline: list, name: str, frame: float, read) -> list[tuple[int, str]]:
+    """Adds what a strip or marker says to `timeline`; a line where its name cannot be read."""
+    try:
+        timeline.append((round(frame), read()))
+        return []
+    except InputError:
+        return [(round(frame), f"'{base_name(name)}': words have no numbers and no '#'; rename it")]
+
+
+def _together(target: bpy.types.Object, items: list) -> list[tuple[int, str]]:
+    """Spans that overlap and key moments at one time."""
+    timeline = Timeline(tuple(item for item in items if isinstance(item, Span) and item.words),
+                        tuple(item for item in items if isinstance(item, KeyMoment)))
+    clock, found = lanes.written_for(target), []
+    for a, b in zip(timeline.spans, timeline.spans[1:]):
+        if b.start < a.end - 1e-6:
+            found.append((clock.whole(b.start), f"'{' '.join(a.words)}' and '{' '.join(b.words)}' overlap; shorten one"))
+    for a, b in zip(timeline.keys, timeline.keys[1:]):
+        if b.time - a.time <= 1e-6:
+            found.append((clock.whole(b.time), f"'{' '.join(a.words)}' and '{' '.join(b.words)}' are at one time"))
+    return found
+
+
+def _missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
+    """The nearest words that the library has, where it lacks those of a key moment."""
+    mirror = scene.beyond_mocap.mirror
+    choices = [key.words for key in library.keys if mirror or not library.clips[key.clip].mirrored]
+    lines = []
+    for key, nearest in missing_keys(timeline, choices):
+        offers = ", ".join(f"'{' '.join(words)}'" for words in nearest)
+        lines.append(f"the library has no '{' '.join(key.words)}'; nearest: {offers or 'nothing'}")
+    return lines
+
+
+def _short(error: InputError) -> str:
+    """An error without the place in front, which the list shows by itself."""
+    return str(error).removeprefix(f"{error.where}: ")
