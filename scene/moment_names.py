@@ -15,7 +15,7 @@ from .subject import subject
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
 BOTTOM, TOP = 24, 26  # points that stay free for the scroll bar and the frame numbers
 MOST_ROWS = 5
-INK, PAPER = (0.92, 0.92, 0.92, 1.0), (0.13, 0.13, 0.13, 0.92)
+INK, PAPER = (0.92, 0.92, 0.92, 1.0), (0.21, 0.21, 0.21, 0.95)
 PICKED_INK, PICKED_PAPER = (0.05, 0.05, 0.05, 1.0), (1.0, 0.62, 0.15, 1.0)
 OFF_INK, WRONG_PAPER = (0.55, 0.55, 0.55, 1.0), (0.5, 0.12, 0.1, 0.95)
 LINE = (1.0, 0.62, 0.15, 0.35)
@@ -87,11 +87,13 @@ def draw():
     if not shown(context):
         return
     region, scale = context.region, context.preferences.system.ui_scale
+    found = names(context, region)
     gpu.state.blend_set("ALPHA")
-    for one in names(context, region):
-        paper = PICKED_PAPER if one.picked else WRONG_PAPER if one.wrong else PAPER
+    for one in found:
         _rectangle(one.x - 0.5 * scale, one.box[3], one.x + 0.5 * scale, region.height - TOP * scale, LINE)
-        _rectangle(*one.box, paper)
+    for one in found:
+        _rectangle(*one.box, PICKED_PAPER if one.picked else WRONG_PAPER if one.wrong else PAPER)
+    for one in found:  # after all boxes, since drawing text ends the blending
         blf.size(0, TEXT * scale)
         blf.color(0, *(PICKED_INK if one.picked else OFF_INK if one.off else INK))
         blf.position(0, one.box[0] + PAD * scale, one.box[1] + 4.5 * scale, 0)

@@ -3,7 +3,7 @@
 import importlib
 
 import bpy
-from tab import EXTENSION, PICTURES, output, sample, window
+from tab import EXTENSION, PICTURES, TAB, operator_of, sample, window
 
 LIMIT = 300
 
@@ -97,7 +97,7 @@ def check_splitting_by_key_and_undo():
     assert asked() == before, asked()
     yield from own_keys("Z", ctrl=True, shift=True)
     assert asked() == split, asked()
-    assert in_order() and len({strip_of(n).action.name for n in ("jogging dribble", "jogging dribble.001")}) == 2
+    assert in_order() and len({strip_of(n).action.name for n in ("jogging dribble", "jogging dribble ")}) == 2
     yield from own_keys("Z", ctrl=True)
     yield from own_keys("Z", ctrl=True, shift=True)
     yield from own_keys("Z", ctrl=True)
@@ -141,7 +141,7 @@ def check_scaling_duplicating_and_deleting():
     yield 0.5
     doubled = asked()
     assert doubled.count("jogging dribble") == 3 and in_order(), doubled
-    assert strip_of("jogging dribble.001").frame_start % 1 == 0
+    assert strip_of("jogging dribble ").frame_start % 1 == 0
     with in_nla():
         bpy.ops.nla.delete("EXEC_DEFAULT", True)
     yield 0.5
@@ -189,3 +189,145 @@ def check_another_frame_rate():
     yield from own_keys("Z", ctrl=True)
     assert bpy.context.scene.render.fps == 24 and strip_of("jogging dribble").frame_start == 59
     assert asked() == before and in_order()
+
+
+def name_at(text):
+    """The drawn name with this text, and its middle in pixels of the window."""
+    area = nla()
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with in_nla():
+        found = next(one for one in room("scene.moment_names").names(bpy.context, region) if one.text == text)
+    left, bottom, right, top = found.box
+    return found, (int(region.x + (left + right) / 2), int(region.y + (bottom + top) / 2))
+
+
+def picked():
+    """The words of the picked key moment."""
+    scene = bpy.context.scene
+    moment = room("scene.strips").active_moment(scene.beyond_mocap.players[0], scene)
+    return " ".join(moment.words) if moment else ""
+
+
+def check_names_are_drawn_and_picked_by_a_click():
+    yield from begin()
+    before = asked()
+    found, place = name_at("receive right foot low inside")
+    assert not found.picked
+    yield from window.click(*place)
+    yield 0.4
+    assert picked() == "receive right foot low inside", picked()
+    assert asked() == before and not window.window.modal_operators.keys()
+    window.picture(PICTURES / "timeline-names.png")
+    yield from own_keys("Z", ctrl=True)
+    assert picked() == "", picked()
+    strip = strip_of("jogging dribble")
+    strip.select = False
+    yield from window.click(*place_of(strip))
+    yield 0.3
+    assert strip_of("jogging dribble").select, "a click beside the names is no longer Blender's"
+
+
+def place_of(strip):
+    """The middle of a strip on the first lane of words, in pixels of the window; found by trying rows."""
+    region = next(region for region in nla().regions if region.type == "WINDOW")
+    x = region.view2d.view_to_region((strip.frame_start + strip.frame_end) / 2, 0, clip=False)[0]
+    return int(region.x + x), int(region.y + region.height - strips_top())
+
+
+def strips_top():
+    """Pixels from the region's top to the lane of words: frame numbers, then five rows before it."""
+    return 176 * bpy.context.preferences.system.ui_scale
+
+
+def check_a_name_is_dragged_and_put_back_by_escape():
+    yield from begin()
+    before = asked()
+    found, (x, y) = name_at("kick right running low inside")
+    for ending in ("ESC", "RELEASE"):
+        yield from window.move(x, y)
+        window.event("LEFTMOUSE", "PRESS")
+        yield 0.1
+        for step in range(1, 7):
+            yield from window.move(x + 10 * step, y)
+        yield 0.2
+        during = asked()
+        assert during != before, "nothing has moved"
+        if ending == "ESC":
+            yield from window.press("ESC")
+            window.event("LEFTMOUSE", "RELEASE")
+            yield 0.4
+            assert asked() == before, asked()
+        else:
+            window.picture(PICTURES / "timeline-drag.png")
+            window.event("LEFTMOUSE", "RELEASE")
+            yield 0.4
+            assert asked() == during
+    moved = asked()
+    yield from own_keys("Z", ctrl=True)
+    assert asked() == before, asked()
+    yield from own_keys("Z", ctrl=True, shift=True)
+    assert asked() == moved, asked()
+
+
+def check_the_tab_in_the_nla_editor():
+    yield from begin()
+    area = nla()
+    yield from window.open_tab(area, TAB)
+    room("scene.strips").set_automatic(bpy.context, bpy.context.scene.beyond_mocap.players[0], room(
+        "beyond_mocap.annotation").parse_timeline("0 2.4 standing\n8 17 jogging\n17 19.2 walking\n24.2 26.4 running\n"))
+    select("jogging dribble")
+    with in_nla():
+        bpy.ops.beyond_mocap.edit_words("EXEC_DEFAULT", True, words="joging dribble")
+        bpy.ops.beyond_mocap.go_to_moment("EXEC_DEFAULT", True, strip="Moments", index=1)
+    yield 0.6
+    window.picture(PICTURES / "timeline-tab.png")
+    region = window.sidebar(area)
+    found = yield from window.buttons(area, region)
+    operators = {operator_of(call) for call in found}
+    wanted = {"go_to_moment", "add_moment", "move_moment", "delete_moment", "edit_words", "mirror_side", "add_span", "split_span"}
+    assert wanted <= operators, wanted - operators
+    call = next(call for call in found if "go_to_moment" in call and "index=2" in call)
+    yield from window.click(*found[call])
+    yield 0.4
+    assert bpy.context.scene.frame_current == round(1 + 24.8 * 24), bpy.context.scene.frame_current
+    assert picked() == "kick right running low top", picked()
+
+
+def check_many_names_do_not_overlap():
+    yield from begin()
+    parse, strips = room("beyond_mocap.annotation").parse_timeline, room("scene.strips")
+    words = "".join(f"{1 + n / 3:.3f} kick right running low inside {'front' if n % 2 else 'back'}\n" for n in range(80))
+    strips.write(bpy.context, bpy.context.scene.beyond_mocap.players[0], parse(words))
+    bpy.context.preferences.view.ui_scale = 1.3
+    yield 0.8
+    with in_nla():
+        bpy.ops.nla.view_all()
+    yield 0.5
+    region = next(region for region in nla().regions if region.type == "WINDOW")
+    with in_nla():
+        boxes = [one.box for one in room("scene.moment_names").names(bpy.context, region)]
+    window.picture(PICTURES / "timeline-many.png")
+    bpy.context.preferences.view.ui_scale = 1.0
+    yield 0.5
+    assert len(boxes) > 5
+    for number, a in enumerate(boxes):
+        assert 0 <= a[0] and a[2] <= region.width and a[3] < region.height
+        for b in boxes[:number]:
+            assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1], (a, b)
+
+
+def check_names_in_the_dope_sheet():
+    yield from begin()
+    nla().ui_type = "DOPESHEET"
+    yield 0.6
+    area = window.area("DOPESHEET_EDITOR")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window.window, screen=window.window.screen, area=area, region=region):
+        bpy.ops.action.view_all()
+        found = room("scene.moment_names").names(bpy.context, region)
+    yield 0.5
+    window.picture(PICTURES / "timeline-dope-sheet.png")
+    assert found, "no name is drawn"
+    bpy.context.scene.beyond_mocap.show_moment_names = False
+    with bpy.context.temp_override(window=window.window, screen=window.window.screen, area=area, region=region):
+        assert not room("scene.moment_names").shown(bpy.context)
