@@ -23,7 +23,9 @@ class BeyondMocapProblem(bpy.types.PropertyGroup):
 class BeyondMocapProblems(bpy.types.PropertyGroup):
     """What is wrong with the words; on the window manager, since it follows from the strips and is no data."""
 
-    lines: bpy.props.CollectionProperty(type=BeyondMocapProblem)
+    lines: bpy.props.CollectionProperty(
+        name="Problems", type=BeyondMocapProblem, description="Everything that was found when words last changed"
+    )
 
 
 def built(scene: bpy.types.Scene):
