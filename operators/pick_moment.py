@@ -18,7 +18,7 @@ class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.pick_moment"
     bl_label = "Pick Key Moment"
-    bl_options = {"UNDO"}
+    bl_options = {"UNDO", "INTERNAL"}
 
     def execute(self, context):
         """Only a pointer can pick."""

@@ -5,10 +5,9 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 
 import bpy
 
-from . import annotate, library, menus, players, preferences, presets, quality, result, synthesis, video, view
-from . import annotate, library, menus, players, preferences, quality, result, synthesis, video, view
-from . import library, menus, players, preferences, result, synthesis, timeline, video
-from . import annotate, library, menus, players, preferences, quality, result, synthesis, timeline, video, view
+from . import (
+    annotate, library, menus, players, preferences, presets, quality, result, synthesis, timeline, video, view,
+)
 
 CLASSES = (
     library.BEYOND_MOCAP_UL_clips,

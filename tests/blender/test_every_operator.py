@@ -47,6 +47,24 @@ def forget_dots():
     bpy.context.view_layer.update()
 
 
+def pick_a_moment():
+    bpy.ops.beyond_mocap.go_to_moment(strip="Moments", index=0)
+
+
+def two_spans():
+    """A second span, and both selected."""
+    bpy.ops.beyond_mocap.add_span(words="jogging", start=2.0, end=3.0)
+    for strip in bpy.context.scene.beyond_mocap.players[0].dot.animation_data.nla_tracks["Words"].strips:
+        strip.select = True
+
+
+def lose_a_player():
+    """A dot is left, as where one was appended from another file."""
+    player = bpy.context.scene.beyond_mocap.players[0]
+    worlds.choose(player.dot)
+    player.dot = None
+
+
 def moved(folder):
     """A second copy of a folder, beside it."""
     other = folder.with_name(f"{folder.name} moved")
@@ -57,29 +75,43 @@ def moved(folder):
 
 ROWS = {
     "accept": Row("synthesized"),
+    "add_moment": Row("imported", lambda places: {"words": "header"}),
+    "add_span": Row("imported", lambda places: {"words": "walking"}),
     "add_stage": Row("imported"),
     "annotate": Row("imported", lambda places: {"keys": "2 2 3 5 ENTER"}),
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
+    "choose_player": Row("imported", lambda places: {"player": "player2"}),
+    "delete_moment": Row("imported", prepare=pick_a_moment),
     "discard": Row("synthesized"),
+    "edit_words": Row("imported", lambda places: {"words": "header"}, pick_a_moment),
     "error_curves": Row("synthesized"),
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
+    "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
+    "go_to_moment": Row("imported", lambda places: {"strip": "Moments", "index": 0}),
     "import_clip": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.list_clips()),
     "import_clips": Row("imported", lambda places: {"filepath": f"{places.clips}/walking_1_2.bvh"}),
     "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
+    "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
     "list_clips": Row("imported", changes=False),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "mirror": Row("accepted"),
+    "mirror_side": Row("imported", prepare=pick_a_moment),
+    "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
     "move_video": Row("video", lambda places: {"frames": 3}),
+    "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=lambda: forget_dots()),
+    "player_from_dot": Row("imported", prepare=lose_a_player),
     "read_words": Row("imported", prepare=lambda: forget_dots()),
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
     "show_video": Row("video", changes=False),
+    "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
     "synthesize": Row("imported"),
     "update": Row("synthesized"),
+    "words_to_text": Row("imported"),
 }
 
 
