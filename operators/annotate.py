@@ -11,7 +11,7 @@ from ..beyond_mocap.annotation import annotating
 from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.errors import BeyondMocapError, InputError
 from ..scene import popup
-from ..scene.annotating import changes, do, held, name_of, now, type_keys
+from ..scene.annotating import do, held, name_of, now, type_keys
 from .verb import Verb
 
 SPACES = {
@@ -123,9 +123,9 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         if isinstance(command, Leave):
             self.state = None
             return
-        self.told = do(context, command)
-        self.who = name_of(context)
-        if changes(command):
+        done = do(context, command)
+        self.told, self.who = done.line, name_of(context)
+        if done.words:
             bpy.ops.ed.undo_push(message=f"Annotate: {self.told}"[:60])
 
     def moused(self, context, event, area, region):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import replace
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -56,25 +57,25 @@ def now(context: bpy.types.Context) -> Now:
     return Now(time, 1.0 / clock.fps, max((end for end in ends if end < time - 0.5 / clock.fps), default=None))
 
 
-def do(context: bpy.types.Context, command: Command) -> str:
-    """Carry out one command on the strips or the scene; returns what was done, for the user. InputError where it cannot
-    be done; nothing has changed then."""
-    if isinstance(command, Tell):
-        return command.line
-    if isinstance(command, Go):
-        return _next_player(context, command.step) if command.to == "player" else _next_moment(context, command.step)
+class Done(NamedTuple):
+    """What a command has done. line: for the user; words: whether words changed, and so it is a step for undo."""
+
+    line: str
+    words: bool = False
+
+
+def do(context: bpy.types.Context, command: Command) -> Done:
+    """Carry out one command on the strips or the scene. InputError where it cannot be done; nothing has changed
+    then."""
     if isinstance(command, AddMoment):
-        return _add_moment(context, KeyMoment(command.time, command.words))
+        return Done(_add_moment(context, KeyMoment(command.time, command.words)), True)
     if isinstance(command, AddSpan):
-        return _add_span(context, Span(command.start, command.end, command.words))
+        return Done(_add_span(context, Span(command.start, command.end, command.words)), True)
     if isinstance(command, AtPlayhead):
         return _at_playhead(context, command.what)
-    return ""
-
-
-def changes(command: Command) -> bool:
-    """Whether a command changes words, and so is a step for undo."""
-    return isinstance(command, (AddMoment, AddSpan, AtPlayhead))
+    if isinstance(command, Go):
+        return Done(_next_player(context, command.step) if command.to == "player" else _next_moment(context, command.step))
+    return Done(command.line if isinstance(command, Tell) else "")
 
 
 def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
@@ -82,7 +83,7 @@ def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
     state, told = annotating.State(held(context.scene)), []
     for key in keys:
         state, commands = annotating.press(state, key, now(context))
-        told += [do(context, command) for command in commands]
+        told += [do(context, command).line for command in commands]
     return told
 
 
@@ -146,17 +147,18 @@ def _add_span(context: bpy.types.Context, span: Span) -> str:
     return f"{_spoken(span.words)} from {span.start:.2f} to {span.end:.2f} s{over}"
 
 
-def _at_playhead(context: bpy.types.Context, what: str) -> str:
+def _at_playhead(context: bpy.types.Context, what: str) -> Done:
     target, clock = _subject(context)
     found = None if target is None else _found(context, target, clock)
-    if found is None:
-        raise InputError("playhead", "no key moment or stretch there", "one to " + _VERBS[what], "go to one first")
     if what in ("earlier", "later"):
-        return _nudge(context, target, found, clock, 1 if what == "later" else -1)
-    return _mirror(target, found) if what == "mirror" else _remove(target, found)
-
-
-_VERBS = {"mirror": "mirror", "remove": "remove", "earlier": "move", "later": "move"}
+        step = 1 if what == "later" else -1
+        if isinstance(found, PlacedMoment):
+            return Done(_nudge(context, target, found, clock, step), True)
+        context.scene.frame_float += step
+        return Done(f"{clock.seconds(context.scene.frame_current_final):.2f} s")
+    if found is None:
+        raise InputError("playhead", "no key moment or stretch there", f"one to {what}", "go to one first")
+    return Done(_mirror(target, found) if what == "mirror" else _remove(target, found), True)
 
 
 def _found(context, target, clock: Clock) -> PlacedMoment | PlacedSpan | None:
@@ -190,11 +192,8 @@ def _remove(target, found: PlacedMoment | PlacedSpan) -> str:
     return f"{_spoken(found.span.words)} removed"
 
 
-def _nudge(context, target, found: PlacedMoment | PlacedSpan, clock: Clock, step: int) -> str:
-    if not isinstance(found, PlacedMoment):
-        raise InputError("playhead", "a stretch, no key moment", "a key moment to move",
-                         "set its ends anew with I and O, or drag its strip")
-    key = replace(found.key, time=found.time + step / clock.fps)
+def _nudge(context, target, found: PlacedMoment, clock: Clock, step: int) -> str:
+    key = replace(found.key, time=round(found.time + step / clock.fps, 6))
     _show(context, lay_strips.change_moment(target, found.strip, found.index, key), clock)
     return f"{_spoken(key.words)} at {key.time:.2f} s"
 

@@ -4,7 +4,8 @@ has of them (Faustino §6.2 and Appendix A).
 Digits never move, so that fingers learn them. First come the roots of the tree in its order. After the root 1 is left
 and 2 is right wherever one is in the tree, 8 and 9 are the paces of a key moment (standing, running) or the ways of a
 stretch (front, back), and 3 to 7 are the tree's next words; what has no room follows on further pages, with the other
-modifiers and the library's own words behind. A level may be skipped, so that "kick top" needs no height.
+modifiers, the rest of the root's branches and the library's own words behind. A level may be skipped, so that "kick
+top" needs no height.
 
     walk = Walk("moment")
     for word in ("kick", "right", "low", "top"):
@@ -142,8 +143,20 @@ def _layout(walk: Walk, held: Held | None) -> list[str | None]:
     below = [word for word in _next_words(walk) if word not in (*SIDES, *last)]
     room = PAGE - len(SIDES) - len(last)
     first = [*SIDES, *below[:room], *[None] * (room - len(below)), *last]
-    behind = dict.fromkeys((*below[room:], *_BEHIND[walk.kind], *own))
-    return [*first, *(word for word in behind if word not in below[:room])]
+    behind = dict.fromkeys((*below[room:], *_BEHIND[walk.kind], *_elsewhere(walk), *own))
+    return [*first, *(word for word in behind if word not in first)]
+
+
+def _elsewhere(walk: Walk) -> list[str]:
+    """All words of the root's branches: what one says across them ("receive body high") can be said too."""
+    tree = _TREES[walk.kind]
+    roots = tree.values() if walk.steps[0] is None else [tree.get(walk.steps[0], {})]
+    gone = {word for word in walk.steps if word}
+    return [word for branch in roots for word in _words_of(branch) if word not in gone]
+
+
+def _words_of(branch: Mapping[str, dict]) -> list[str]:
+    return list(dict.fromkeys(word for name, below in branch.items() for word in (name, *_words_of(below))))
 
 
 def _own_words(walk: Walk, held: Held | None) -> list[str]:

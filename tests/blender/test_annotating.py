@@ -79,7 +79,7 @@ def test_in_and_out_make_a_span(room, players, scene):
     for second, key in ((10.0, "IN"), (11.2, "OUT"), (11.2, "4"), (11.2, "ENTER")):
         scene.frame_float = 1 + 25 * second
         state, commands = core.press(state, key, annotating.now(bpy.context))
-        told += [annotating.do(bpy.context, command) for command in commands]
+        told += [annotating.do(bpy.context, command).line for command in commands]
     assert said(room, players[0])[0] == [(1.0, 3.0, "dribble"), (10.0, 11.2, "running")]
     assert told == ["running from 10.00 to 11.20 s"]
 
@@ -107,7 +107,15 @@ def test_a_spans_side_is_mirrored_too(room, players):
     assert (9.0, 10.0, "dribble right") in said(room, players[0])[0]
 
 
-@pytest.mark.parametrize("press", ["MIRROR", "REMOVE", "EARLIER", "LATER"])
+def test_where_no_moment_is_the_playhead_alone_goes_by_frames(room, players, scene):
+    before = said(room, players[0])
+    keys("EARLIER EARLIER LATER EARLIER", 6.0)
+    assert scene.frame_current == 1 + 150 - 2 and said(room, players[0]) == before
+    keys("LATER", 2.0)
+    assert scene.frame_current == 52 and said(room, players[0]) == before
+
+
+@pytest.mark.parametrize("press", ["MIRROR", "REMOVE"])
 def test_nothing_at_the_playhead_is_told_and_changes_nothing(room, players, press):
     before = said(room, players[0])
     with pytest.raises(RuntimeError, match="playhead"):
@@ -145,7 +153,7 @@ def test_an_overlap_is_told(room, players):
     annotating = room("annotating")
     core = import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
     told = annotating.do(bpy.context, core.AddSpan(2.0, 4.0, ("walking",)))
-    assert "overlaps dribble" in told
+    assert told.words and "overlaps dribble" in told.line
 
 
 def test_each_call_is_one_step(room, players):

@@ -90,9 +90,11 @@ def test_what_the_library_lacks_is_told_with_the_nearest_it_has():
 
 
 def test_digits_do_not_depend_on_the_library():
-    for way in ((), ("kick",), ("kick", "right", "low"), ("intercept",)):
-        bare, held = (digits(down("moment", *way), which) for which in (None, HELD))
-        assert bare == {word: digit for word, digit in held.items() if word in bare}
+    ways = [("moment", way) for way in ((), ("kick",), ("kick", "right", "low"), ("intercept",))]
+    for kind, way in [*ways, ("span", ()), ("span", ("dribble",)), ("span", ("celebration",))]:
+        for page in range(4):
+            bare, held = (digits(down(kind, *way), which, page) for which in (None, HELD))
+            assert bare == {word: digit for word, digit in held.items() if word in bare}
 
 
 def test_without_a_library_nothing_is_known_to_be_missing():
@@ -128,6 +130,12 @@ def test_stretches_go_down_their_own_tree():
     assert down("span", "celebration", "arms", "inside").words == ("celebration", "arms", "inside")
     assert digits(down("span", "walking"))["back"] == 9
     assert down("span", "dribble", "right").words == ("dribble", "right")
+
+
+def test_words_across_the_branches_can_be_said_too():
+    found = {option.word: option for option in options(down("moment", "receive", "body"))}
+    assert found["high"].page > 0 and "body" not in found and "receive" not in found
+    assert set(down("moment", "receive", "body", "high").words) == {"receive", "body", "high"}
 
 
 def test_chosen_words_are_marked():
