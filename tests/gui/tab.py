@@ -56,11 +56,14 @@ def press_all(wanted=None, then=None):
     while more and not (wanted and len(pressed) >= len(wanted)):
         found = yield from window.buttons(area, region)
         new = [call for call in found if call not in pressed and (wanted is None or operator_of(call) in wanted)]
-        for call in new:  # a press may move the others: then they are looked for again
+        moved = False  # a press may move the others: then they are looked for again
+        for call in new:
             if (yield from window.points_at(area, region, found[call])) == call:
                 pressed.append(call)
                 yield from press_one(call, found[call], then or end_what_began)
-        more = bool(new) or (yield from window.scroll(region))
+            else:
+                moved = True
+        more = moved or bool(wanted and new) or (yield from window.scroll(region))
     return pressed
 
 
