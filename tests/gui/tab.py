@@ -67,6 +67,55 @@ def press_all(wanted=None, then=None):
     return pressed
 
 
+def press_button(operator, editor="VIEW_3D"):
+    """Find the operator's button in our tab and click it."""
+    area = window.area(editor)
+    yield from window.open_tab(area, TAB)
+    region = window.sidebar(area)
+    wanted = f"bpy.ops.beyond_mocap.{operator}("
+    place = yield from window.find(area, region, lambda call: call.startswith(wanted), window.command_under_pointer)
+    yield from window.click(*place)
+    yield 0.3
+
+
+def fill_in(path, text, editor="VIEW_3D"):
+    """Find the field of a property in our tab by the end of its data path, and type into it."""
+    area = window.area(editor)
+    yield from window.open_tab(area, TAB)
+    region = window.sidebar(area)
+    place = yield from window.find(area, region, lambda found: found.endswith(path), window.field_under_pointer)
+    yield from window.click(*place)
+    yield from window.press("LEFTMOUSE")
+    yield 0.3
+    yield from window.write(text)
+    yield 0.3
+
+
+def choose_file(path):
+    """Choose a file in the file browser that is open, as one who types its folder and name and presses Enter."""
+    def browser():
+        for other in bpy.context.window_manager.windows:
+            for area in other.screen.areas:
+                if area.type == "FILE_BROWSER" and area.spaces.active.params is not None:
+                    return other, area
+        return None, None
+
+    for _ in range(50):
+        other, area = browser()
+        if other is not None:
+            break
+        yield 0.1
+    assert other is not None, "no file browser has opened"
+    parameters = area.spaces.active.params
+    parameters.directory, parameters.filename = str(path.parent).encode(), path.name
+    yield 1.0
+    middle = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
+    other.event_simulate(type="MOUSEMOVE", value="NOTHING", **middle)
+    yield 0.2
+    other.event_simulate(type="RET", value="PRESS", **middle)
+    yield 1.0
+
+
 def operator_of(call):
     """The operator's name in a call as Blender writes it.
 

@@ -60,10 +60,10 @@ class Window:
         """The editor's right-hand region, where the tabs are."""
         return next(region for region in area.regions if region.type == "UI")
 
-    def event(self, kind, value):
-        """One event at the pointer."""
+    def event(self, kind, value, **held):
+        """One event at the pointer; held: ctrl=True and the like."""
         x, y = self.pointer
-        self.window.event_simulate(type=kind, value=value, x=x, y=y)
+        self.window.event_simulate(type=kind, value=value, x=x, y=y, **held)
 
     def move(self, x, y):
         """Put the pointer there."""
@@ -71,12 +71,22 @@ class Window:
         self.event("MOUSEMOVE", "NOTHING")
         yield 0.015
 
-    def press(self, key):
-        """A key or mouse button, down and up."""
-        self.event(key, "PRESS")
+    def press(self, key, **held):
+        """A key or mouse button, down and up; held: ctrl=True and the like."""
+        self.event(key, "PRESS", **held)
         yield 0.05
-        self.event(key, "RELEASE")
+        self.event(key, "RELEASE", **held)
         yield 0.15
+
+    def write(self, text):
+        """Type into the field that is being edited, and end with Enter; what stood there is replaced."""
+        yield from self.press("A", ctrl=True)
+        for letter in text:
+            self.event("A", "PRESS", unicode=letter)
+            yield 0.01
+            self.event("A", "RELEASE")
+            yield 0.01
+        yield from self.press("RET")
 
     def escape_from(self, window):
         """Press Escape with the pointer in the middle of one of Blender's windows, which may be gone after that."""
@@ -116,6 +126,30 @@ class Window:
         yield from self.move(*place)
         return self.command_under_pointer(area, region)
 
+    def field_under_pointer(self, area, region):
+        """The full data path of the property under the pointer; "" where there is none."""
+        manager = bpy.context.window_manager
+        manager.clipboard = ""
+        with bpy.context.temp_override(window=self.window, area=area, region=region):
+            if bpy.ops.ui.copy_data_path_button.poll():
+                bpy.ops.ui.copy_data_path_button(full_path=True)
+        return manager.clipboard
+
+    def find(self, area, region, wanted, what, step=9):
+        """Where the first thing is that `wanted(text)` is true of, looked for from the top of the region, page by page.
+        what(area, region): the text of what is under the pointer."""
+        while (yield from self.scroll(region, "WHEELUPMOUSE")):
+            pass
+        more = True
+        while more:
+            for y in range(region.y + region.height - 8, region.y + 4, -step):
+                for share in (0.3, 0.7, 0.12, 0.9):
+                    yield from self.move(region.x + region.width * share, y)
+                    if wanted(what(area, region)):
+                        return region.x + int(region.width * share), y - 3
+            more = yield from self.scroll(region)
+        raise AssertionError("not found in the sidebar")
+
     def buttons(self, area, region, step=12):
         """Move over all that the region shows; return each operator's button: its call -> where it is."""
         found = {}
@@ -126,12 +160,12 @@ class Window:
                     found.setdefault(call, (x, y))
         return found
 
-    def scroll(self, region):
+    def scroll(self, region, wheel="WHEELDOWNMOUSE"):
         """Turn the wheel over the region by about half of what it shows; return whether it moved."""
         before = region.view2d.view_to_region(0, 0, clip=False)
         yield from self.move(region.x + region.width // 2, region.y + region.height // 2)
         for _ in range(8):
-            self.event("WHEELDOWNMOUSE", "PRESS")
+            self.event(wheel, "PRESS")
             yield 0.1
         return region.view2d.view_to_region(0, 0, clip=False) != before
 
