@@ -46,7 +46,7 @@ class BeyondMocapResult(bpy.types.PropertyGroup):
     recipe: StringProperty(description="The steps that make the newest take again, as JSON")
     made_of: StringProperty(description="Fingerprints of what the newest take was made of, as JSON")
     hand_keys: IntProperty(description="How many hand-made keys the newest take has kept")
-    variants: CollectionProperty(type=BeyondMocapVariant)
+    variants: CollectionProperty(type=BeyondMocapVariant, description="Other solutions, side by side")
     body: PointerProperty(type=bpy.types.Object, description="The player's body before the preview")
     motion: PointerProperty(type=BeyondMocapBefore, description="What the body played before the preview")
     track: PointerProperty(type=bpy.types.Curve, description="The track on the ground before the preview")

@@ -39,6 +39,11 @@ def files(*names):
     return lambda places: {"directory": f"{places.match}/", "files": [{"name": name} for name in names]}
 
 
+def list_clips():
+    """The window's list of clips, which no file keeps."""
+    bpy.ops.beyond_mocap.list_clips()
+
+
 def forget_dots():
     """As in a file of the time before dots."""
     for player in bpy.context.scene.beyond_mocap.players:
@@ -76,9 +81,11 @@ def moved(folder):
 ROWS = {
     "accept": Row("synthesized"),
     "add_moment": Row("imported", lambda places: {"words": "header"}),
+    "add_preset": Row("imported", lambda places: {"name": "Tried"}, changes=False),
     "add_span": Row("imported", lambda places: {"words": "walking"}),
     "add_stage": Row("imported"),
     "annotate": Row("imported", lambda places: {"keys": "2 2 3 5 ENTER"}),
+    "annotate_clip": Row("imported", prepare=list_clips),
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
     "choose_player": Row("imported", lambda places: {"player": "player2"}),
@@ -89,24 +96,29 @@ ROWS = {
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
     "go_to_moment": Row("imported", lambda places: {"strip": "Moments", "index": 0}),
-    "import_clip": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.list_clips()),
+    "import_clip": Row("imported", prepare=list_clips),
     "import_clips": Row("imported", lambda places: {"filepath": f"{places.clips}/walking_1_2.bvh"}),
     "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
+    "import_words": Row("imported", lambda places: {"filepath": f"{places.match}/player1.txt"}),
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
     "list_clips": Row("imported", changes=False),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
+    "make_assets": Row("imported", prepare=list_clips),
     "mirror": Row("accepted"),
     "mirror_side": Row("imported", prepare=pick_a_moment),
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
     "move_video": Row("video", lambda places: {"frames": 3}),
     "pick_moment": Row("imported", changes=False, window=True),
-    "place_players": Row("imported", prepare=lambda: forget_dots()),
+    "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),
-    "read_words": Row("imported", prepare=lambda: forget_dots()),
+    "propose_words": Row("clip"),
+    "read_words": Row("imported", prepare=forget_dots),
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
+    "remove_clip": Row("clip"),
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
+    "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
     "show_video": Row("video", changes=False),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
     "synthesize": Row("imported"),

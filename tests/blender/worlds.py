@@ -73,7 +73,13 @@ def video(places):
     bpy.ops.beyond_mocap.load_video(filepath=str(places.match / PICTURE))
 
 
-STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "video": video}
+def clip(places):
+    """A clip of the library is open for annotation."""
+    bpy.ops.beyond_mocap.list_clips()
+    bpy.ops.beyond_mocap.annotate_clip()
+
+
+STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "video": video, "clip": clip}
 
 
 def choose(*things):
