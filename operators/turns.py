@@ -65,7 +65,9 @@ class TurnsVerb(Verb):
             window.progress_end()
         for entry, result in zip(entries, made):
             written(context, context.scene.beyond_mocap.players[entry.player], entry.order, result)
-        self.report({"INFO"}, f"made: {', '.join(entry.player for entry in entries)}; Accept keeps, Discard undoes")
+        players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
+        names = ", ".join(player.name for player in players)
+        self.report({"INFO"}, f"made: {names}{_kept(players)}; Accept keeps, Discard undoes")
 
     def invoke(self, context, event):
         """Let the players wait, and work the queue off where nobody does it yet."""
@@ -162,7 +164,7 @@ class TurnsVerb(Verb):
         self.wrote += ok
         self.last = ok
         if ok:
-            self.tell(f"{player.name}: made; Accept keeps it, Discard undoes it")
+            self.tell(f"{player.name}: made{_kept([player])}; Accept keeps it, Discard undoes it")
         return True
 
     last = False  # whether the newest result was written and has no step for undo yet
@@ -224,6 +226,12 @@ class TurnsVerb(Verb):
         if context.workspace is not None:
             context.workspace.status_text_set(None)
         _redraw(context)
+
+
+def _kept(players) -> str:
+    """How many hand-made keys these players' results have kept, in words."""
+    count = sum(player.result.hand_keys for player in players)
+    return f", {count} hand-made {'key' if count == 1 else 'keys'} kept" if count else ""
 
 
 def _library(entry: queue.Entry):

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.take import Take
-from . import bake, channels
+from . import bake, channels, hand_keys
 from .action import PLACED
 from .bake import MARK
 from .measure import frames_per_second
@@ -76,9 +76,11 @@ def as_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTr
     if track is None:
         track = data.nla_tracks.new()
         track.name = TRACK
-    data.action = None
+    data.action, made = None, hand_keys.read(whole)
     for number, block in enumerate(pieces):
         action, part = channels.cut(whole, slot, block.start, block.end, block.name)
+        if made is not None:
+            hand_keys.write(action, made.part(block.start, block.end))
         action[MARK], action[BLOCKS] = True, json.dumps([[block.start, block.end, block.name]])
         _keep_place(whole, action)
         strip = track.strips.new(block.name, block.start, action)
@@ -106,6 +108,9 @@ def as_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Actio
         pieces = [(action, slot, block.start, block.end) for action, slot, block in parts]
         whole, slot = channels.joined(pieces, f"{body.name} take", body.name)
         channels.assign(body, whole, slot)
+        made = hand_keys.joined([hand_keys.read(action) for action, _, _ in parts])
+        if made is not None:
+            hand_keys.write(whole, made)
         whole[MARK] = True
         _keep_place(parts[0][0], whole)
         whole[BLOCKS] = json.dumps([[block.start, block.end, block.name] for _, _, block in parts])

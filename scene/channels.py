@@ -111,6 +111,11 @@ def put_keys(curve: bpy.types.FCurve, keys: dict[str, np.ndarray]) -> None:
         points.foreach_set(name, np.ascontiguousarray(keys[name]).ravel())
 
 
+def new_curve(action: bpy.types.Action, slot, path: str, index: int, group: str) -> bpy.types.FCurve:
+    """A curve that the action does not have yet."""
+    return _new_curve(_channelbag(action, slot), path, index, group)
+
+
 def chosen(keys: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
     """Those keys of a table that an index or mask picks."""
     return {name: values[which] for name, values in keys.items()}
@@ -198,5 +203,7 @@ def _new_curve(bag, path: str, index: int, group: str):
     if bpy.app.version >= (5, 0, 0):
         return bag.fcurves.new(path, index=index, group_name=group)
     curve = bag.fcurves.new(path, index=index)
+    if not group:
+        return curve
     curve.group = bag.groups.get(group) or bag.groups.new(group)
     return curve

@@ -8,9 +8,9 @@ from __future__ import annotations
 import bpy
 
 from ..beyond_mocap.errors import InputError
-from . import bake, blocks, channels, error_curves, session, stage
+from . import bake, blocks, channels, error_curves, hand_keys, session, stage
 from .bake import MARK
-from .result import BeyondMocapResult
+from .clock import of_scene
 from .set_aside import bring_back, drop, play_as_before, put_aside
 from .settings import BeyondMocapPlayer
 
@@ -39,6 +39,7 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
     check(player)
     if result.state != "NONE" and not shown(context.scene, player):
         forget(player)
+    hand = _hand(player) if context.scene.beyond_mocap.keep_hand_keys else None
     if result.state != "PREVIEW":
         _remember(context, player, made)
     player.take = take
@@ -46,7 +47,13 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
         setattr(result if name in STEPS else player, name, text)
     with _shared_length(context.scene):
         body = bake.player(context, player, made)
-    blocks.note(channels.playing(body)[0], made.take, context.scene)
+    action, slot = channels.playing(body)
+    blocks.note(action, made.take, context.scene)
+    hand_keys.note(action, slot, of_scene(context.scene))
+    result.hand_keys = 0
+    if hand is not None:
+        moved = hand_keys.shift_between(hand[1], of_scene(context.scene))
+        result.hand_keys = hand_keys.put(action, slot, hand[0], moved) if moved is not None else 0
     result.state = "PREVIEW"
     error_curves.renew(context.scene, player)
     share(context)
@@ -197,6 +204,23 @@ def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: sessi
     result.track = ribbon.data if ribbon is not None and ribbon.type == "CURVE" else None
     if fits:
         put_aside(result.motion, body)
+
+
+def _hand(player: BeyondMocapPlayer) -> tuple[hand_keys.Hand, str] | None:
+    """The user's keys on the player's result, and the clock that they were set by; None where there are none."""
+    body = player.body
+    if body is None or player.result.state == "NONE":
+        return None
+    action, slot = channels.playing(body)
+    track = blocks.track_of(body)
+    if action is not None and hand_keys.read(action) is not None:
+        found, source = hand_keys.found(action, slot), action
+    elif track is not None:
+        found, source = hand_keys.of_strips(track), track.strips[0].action
+    else:
+        return None
+    made = hand_keys.read(source)
+    return (found, made.clock) if len(found) and made is not None else None
 
 
 def _settle(player: BeyondMocapPlayer) -> None:

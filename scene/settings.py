@@ -188,6 +188,10 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     make_bodies: BoolProperty(name="Bodies", default=True, description="Make a low-poly body for each player")
     make_ball: BoolProperty(name="Ball", default=True, description="Make the ball, where the tracking has one")
     make_paths: BoolProperty(name="Paths", default=True, description="Draw each player's track on the ground")
+    keep_hand_keys: BoolProperty(
+        name="Keep Hand-Made Keys", default=True,
+        description="What you have keyed, moved or deleted on a result stays when it is made anew",
+    )
     accept_as: EnumProperty(name="Accept As", items=FORMS, default="ACTION", description="What an accepted take becomes")
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
     shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
