@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.errors import InputError
-from ..scene import preview, session, strips
+from ..scene import preview
 from .accept import ResultVerb
+from .written import show_automatic
 
 
 class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
@@ -29,7 +29,5 @@ class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
             raise InputError("discard", "no preview is shown", "a preview", "synthesize first")
         for player in players:
             preview.discard(context, player)
-            made = session.made(player.take)
-            if made is not None or not player.take:
-                strips.set_automatic(context, player, made.take.timeline if made else Timeline())
+            show_automatic(context, player)
         self.report({"INFO"}, f"discarded: {', '.join(player.name for player in players)}")

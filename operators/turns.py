@@ -10,8 +10,9 @@ from __future__ import annotations
 from time import perf_counter
 
 import bpy
+from bpy.props import StringProperty
 
-from ..beyond_mocap.errors import BeyondMocapError
+from ..beyond_mocap.errors import BeyondMocapError, InputError
 from ..scene import background, orders, plans, queue, session
 from .verb import Verb
 from .written import written
@@ -25,6 +26,9 @@ HOLDING = ("TRANSFORM_OT", "PAINT_OT", "SCULPT_OT", "POSE_OT", "VIEW3D_OT_select
 class TurnsVerb(Verb):
     """A verb that makes takes. `wanted(context)`: pairs of a player and `orders.How`."""
 
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Only this one; empty: all ticked players")
+    kind = "whole"
+
     @classmethod
     def poll(cls, context):
         """A library and a player."""
@@ -36,8 +40,12 @@ class TurnsVerb(Verb):
         return any(player.use for player in settings.players)
 
     def wanted(self, context):
-        """Every ticked player, as a whole."""
-        return [(player, orders.How()) for player in plans.chosen(context.scene.beyond_mocap)]
+        """The named player, or every ticked one."""
+        settings = context.scene.beyond_mocap
+        if self.player and self.player not in settings.players:
+            raise InputError("player", self.player, "a name in the list", "look at step 2")
+        players = [settings.players[self.player]] if self.player else plans.chosen(settings)
+        return [(player, orders.How(self.kind)) for player in players]
 
     def entries(self, context) -> list[queue.Entry]:
         """What is wanted, as orders."""
@@ -80,11 +88,12 @@ class TurnsVerb(Verb):
         for entry in entries:
             queue.add(entry)
         running = context.window_manager.beyond_mocap_work
-        if running.kind == KIND:
+        if queue.worked():
             running.waiting = "\n".join(queue.names())
             self.report({"INFO"}, f"waiting: {', '.join(queue.names())}")
             return {"CANCELLED"}  # nothing has changed yet, so no step for undo
         windows = context.window_manager
+        queue.work(True)
         self.entry, self.job, self.told, self.wrote = None, None, [], 0
         self.seen, self.drawn = None, 0.0
         self.timer = windows.event_timer_add(0.05, window=context.window)
@@ -220,6 +229,7 @@ class TurnsVerb(Verb):
     def close(self, context):
         """Take progress display and timer away."""
         windows = context.window_manager
+        queue.work(False)
         windows.beyond_mocap_work.kind = windows.beyond_mocap_work.waiting = ""
         windows.event_timer_remove(self.timer)
         windows.progress_end()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene import orders, plans
 from .turns import TurnsVerb
 
 
@@ -15,6 +14,7 @@ After the file was opened again the take is made again as it was"""
 
     bl_idname = "beyond_mocap.update"
     bl_label = "Update"
+    kind = "update"
 
     @classmethod
     def poll(cls, context):
@@ -23,7 +23,3 @@ After the file was opened again the take is made again as it was"""
             return False
         cls.poll_message_set("Synthesize first")
         return any(player.use and player.take for player in context.scene.beyond_mocap.players)
-
-    def wanted(self, context):
-        """Every ticked player, from its take."""
-        return [(player, orders.How("update")) for player in plans.chosen(context.scene.beyond_mocap)]

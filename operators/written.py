@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 
-from ..scene import preview, quality, session, strips, variants
+from ..beyond_mocap.annotation import Timeline
+from ..scene import freshness, preview, quality, session, strips, variants
 from .build_library import summary
 
 
@@ -24,4 +25,13 @@ def written(context, player, order, result) -> None:
         shown.append((session.keep_take(one.plan, one.take, one.report), lines))
     preview.show(context, player, *shown[0])
     variants.keep(player, [(name, lines, one.report) for (name, lines), one in zip(shown, result.takes)])
-    strips.set_automatic(context, player, result.takes[0].take.timeline)
+    freshness.dirty()
+    show_automatic(context, player)
+
+
+def show_automatic(context, player) -> None:
+    """Let the player's automatic strips be those of its take; a player without strips, whose words are in a text or a
+    file, is left without, since strips count more."""
+    made = session.made(player.take)
+    if strips.read(player, context.scene) is not None and (made is not None or not player.take):
+        strips.set_automatic(context, player, made.take.timeline if made is not None else Timeline())

@@ -1,27 +1,44 @@
-"""Step 4: what was made is kept or put away."""
+"""Step 4: what was made is kept, put away, or made otherwise; and what is out of date."""
 
 from __future__ import annotations
 
 import bpy
 
-from .tab import Step
+from ..scene.settings import active_player
+from .tab import Step, paragraph
+
+STATES = {
+    "NONE": ("Nothing is shown", "BLANK1"),
+    "PREVIEW": ("Preview: not kept yet", "HIDE_OFF"),
+    "ACCEPTED": ("Accepted", "CHECKMARK"),
+}
+MENDS = {  # what the button says that brings a player up to date
+    "update": ("Update", "FILE_REFRESH"),
+    "build_library": ("Build Library", "ASSET_MANAGER"),
+}
 
 
 class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
-    """Accept or discard."""
+    """Accept or discard; what else could be shown; what is out of date."""
 
     bl_label = "4  Result"
     bl_order = 4
 
     def draw(self, context):
-        """Button, what is made."""
+        """State, buttons, what is made."""
         layout, settings = self.layout, context.scene.beyond_mocap
-        row = layout.row(align=True)
+        player = active_player(settings)
+        if player is not None and player.take:
+            text, icon = STATES[player.result.state]
+            layout.label(text=f"{player.name}: {text}", icon=icon)
+            self.out_of_date(context, player)
+        column = layout.column(align=True)
+        row = column.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.accept", icon="CHECKMARK").form = settings.accept_as
         row.operator("beyond_mocap.discard", icon="X")
-        row = layout.row(align=True)
-        row.prop(settings, "accept_as", expand=True)
+        column.row(align=True).prop(settings, "accept_as", expand=True)
+        self.others(player)
         row = layout.row(align=True)
         for name in ("make_bodies", "make_ball", "make_paths"):
             row.prop(settings, name, toggle=True)
@@ -29,6 +46,45 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
         header.label(text="Time & Stage")
         if body:
             body.use_property_split, body.use_property_decorate = True, False
+            body.prop(settings, "keep_hand_keys")
             body.prop(settings, "start_frame")
             body.prop(settings, "start_time")
             body.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+
+    def out_of_date(self, context, player):
+        """The box that says what is out of date, with the button that mends it."""
+        scene = context.scene.session_uid
+        told = context.window_manager.beyond_mocap_stale
+        entry = next((entry for entry in told if entry.name == player.name and entry.scene == scene), None)
+        if entry is None or not (entry.lines or entry.notes):
+            return
+        box = self.layout.box().column(align=True)
+        if entry.lines:
+            box.label(text="Out of date", icon="ERROR")
+        for line in entry.lines.splitlines():
+            paragraph(box, line, "DOT")
+        for line in entry.notes.splitlines():
+            paragraph(box, line, "KEYFRAME")
+        if entry.mend in MENDS:
+            text, icon = MENDS[entry.mend]
+            button = box.operator(f"beyond_mocap.{entry.mend}", text=text, icon=icon)
+            if entry.mend == "update":
+                button.player = player.name
+
+    def others(self, player):
+        """Other solutions: of a stretch, of the whole take."""
+        column = self.layout.column(align=True)
+        column.operator("beyond_mocap.resynthesize_stretch", icon="UV_SYNC_SELECT")
+        column.operator("beyond_mocap.variants", icon="RENDERLAYERS")
+        variants = player.result.variants if player is not None else ()
+        if not variants:
+            return
+        row = column.row(align=True)
+        for number, variant in enumerate(variants, 1):
+            shown = variant.name == player.take
+            button = row.operator("beyond_mocap.preview", text=str(number), depress=shown)
+            button.number, button.player = number, player.name
+        for number, variant in enumerate(variants, 1):
+            row = column.row()
+            row.active = variant.name == player.take
+            row.label(text=f"{number}: {variant.summary}")

@@ -16,7 +16,8 @@
 - `subject`     whose timeline is meant; `word_checks` what is wrong with it; `moment_names` drawn in the NLA editor
 - `migrate`   what earlier versions have saved
 - `view_settings`, `overlays`   what is drawn over the 3D view; `quality`, `error_curves` what a report says, in the file
-- `background`  long work in a thread
+- `background`  long work in a thread; `queue`, `orders` which player is made next, and of what
+- `freshness`   what is out of date; `hand_keys` what of a result is the user's; `variants`, `stretch` other solutions
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
 The classes are registered in the order of CLASSES: what others point to comes first.
@@ -25,7 +26,7 @@ The classes are registered in the order of CLASSES: what others point to comes f
 import bpy
 
 from . import (
-    background, clips, dots, lanes, migrate, moment_names, overlays, result, session, settings, strip_events,
+    background, clips, dots, freshness, lanes, migrate, moment_names, overlays, result, session, settings, strip_events,
     strip_lines, video, view_settings, watch, word_checks,
 )
 
@@ -43,6 +44,7 @@ CLASSES = (
     settings.BeyondMocapSettings,
     settings.BeyondMocapWork,
     *clips.CLASSES,
+    freshness.BeyondMocapStale,
 )
 KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Action", "beyond_mocap", strip_lines.BeyondMocapLine),
@@ -69,10 +71,12 @@ def register():
     overlays.register()
     strip_events.register()
     moment_names.register()
+    freshness.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    freshness.unregister()
     overlays.unregister()
     background.stop()
     video.unregister()

@@ -1,16 +1,50 @@
-"""What is out of date, said in one place: fingerprints of what a take was made of, against what is asked now."""
+"""What is out of date, said in one place: fingerprints of what a take was made of, against what is asked now.
+
+Nothing is worked out while panels are drawn. With a window, a timer looks at one player at a time when something has
+changed (a handler notes that, and whether files have), and writes what it finds beside the file, where undo leaves it
+alone; operators and scripts may ask with `renew`.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
+import threading
+import time
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+import bpy
 import numpy as np
+from bpy.app.handlers import persistent
+from bpy.props import IntProperty, StringProperty
 
 from ..beyond_mocap.annotation import Timeline
+from ..beyond_mocap.errors import BeyondMocapError
 from ..beyond_mocap.plan import Plan
+from . import bake, blocks, channels, hand_keys, plans, queue, session
+from .settings import BeyondMocapPlayer, absolute
+
+SECONDS = 1.0  # between two looks
+LIBRARY_SECONDS = 10.0  # between two looks at the library's folder
+CHANGED = {  # what is told where a part of `parts` is another
+    "words": "its words have changed since",
+    "track": "its track has changed since",
+    "choices": "choices in step 3 have changed since",
+    "library": "the library's files have changed since",
+}
+
+_now: dict = {"dirty": True, "left": [], "files": {}, "stamps": {}, "looked": 0.0, "thread": None, "seen": []}
+
+
+class BeyondMocapStale(bpy.types.PropertyGroup):
+    """What is out of date about one player; its name is the player's."""
+
+    scene: IntProperty(description="The scene's session_uid")
+    lines: StringProperty(description="What is out of date, a line each")
+    notes: StringProperty(description="What else there is to know, a line each")
+    mend: StringProperty(description="The operator that mends it; empty where nothing is out of date")
 
 
 def fingerprint(value: Any) -> str:
@@ -40,14 +74,15 @@ def _feed(digest, value: Any) -> None:
         digest.update(f"{value!r};".encode())
 
 
-def parts(plan: Plan, folder: str) -> dict[str, str]:
-    """What a take is made of, each by its fingerprint: the track, the words, the other choices, the library on disk."""
+def parts(plan: Plan, folder: str, library: str = "") -> dict[str, str]:
+    """What a take is made of, each by its fingerprint: the track, the words, the other choices, the library on disk
+    (`library`, where its stamp is known)."""
     rest = replace(plan, track=None, timeline=Timeline(), library="")
     return {
         "track": fingerprint(plan.track),
         "words": fingerprint(plan.timeline),
         "choices": fingerprint(rest),
-        "library": library_stamp(folder),
+        "library": library or library_stamp(folder),
     }
 
 
@@ -64,3 +99,196 @@ def library_stamp(folder: str) -> str:
                     continue
                 found.append((name, status.st_size, status.st_mtime_ns))
     return fingerprint(found)
+
+
+def stale(made_of: str, now: dict[str, str]) -> list[str]:
+    """What has changed since: names of `parts` whose fingerprint is another. made_of: JSON as kept on a player."""
+    before = json.loads(made_of or "{}")
+    return [name for name in now if before and before.get(name) != now[name]]
+
+
+def renew(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> BeyondMocapStale:
+    """Look at one player, and write what is out of date where the panel finds it."""
+    lines, notes, mend = look(scene, player)
+    told = bpy.context.window_manager.beyond_mocap_stale
+    entry = next((entry for entry in told if (entry.scene, entry.name) == (scene.session_uid, player.name)), None)
+    if entry is None:
+        entry = told.add()
+        entry.name, entry.scene = player.name, scene.session_uid
+    new = ("\n".join(lines), "\n".join(notes), mend)
+    if (entry.lines, entry.notes, entry.mend) != new:
+        entry.lines, entry.notes, entry.mend = new
+        _redraw()
+    return entry
+
+
+def look(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> tuple[list[str], list[str], str]:
+    """What is out of date, what else there is to know, and the operator that mends it."""
+    if not player.take:
+        return [], [], ""
+    lines, settings, mend = [], scene.beyond_mocap, "update"
+    if session.made(player.take) is None:
+        lines.append("its take is not in this session: Update makes it again, hand-made keys are kept")
+    try:
+        plan, _ = plans.plan_of(settings, player)
+        folder = absolute(settings.library_folder)
+        now = parts(plan, folder, _now["stamps"].get(folder) or library_stamp(folder))
+        changed = stale(player.result.made_of, now)
+        lines += [CHANGED[name] for name in changed]
+        if "library" in changed and session.library(folder, settings.library_unit or None) is not None:
+            mend = "build_library"
+    except (BeyondMocapError, OSError) as error:
+        lines.append(str(error))
+    if player.result.state != "NONE":
+        trouble = _body(scene, player)
+        lines += [trouble] if trouble else []
+    return lines, _notes(player), mend if lines else ""
+
+
+def _body(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> str:
+    """What is wrong with the body that shows a result."""
+    body, made = player.body, session.made(player.take)
+    if body is None or body.name not in scene.objects:
+        return "its body has been deleted: Update makes another"
+    if made is not None and not bake.fits(body, made.take, scene):
+        return "its body's bones have been edited: Update makes another body"
+    if channels.playing(body)[0] is None and blocks.track_of(body) is None:
+        return "its body does not play the result any more: Update shows it again"
+    return ""
+
+
+def _notes(player: BeyondMocapPlayer) -> list[str]:
+    """How many hand-made keys the result carries."""
+    if player.body is None or player.result.state == "NONE":
+        return []
+    count = len(hand_keys.of_body(player.body)[0])
+    keys = "hand-made key" if count == 1 else "hand-made keys"
+    return [f"{count} {keys} on it: kept when it is made anew"] if count else []
+
+
+def dirty(*_) -> None:
+    """Something has changed: look again when there is time."""
+    _now["dirty"] = True
+
+
+def _tick():
+    """Look at one player, if something has changed and nobody is busy."""
+    scene, manager = bpy.context.scene, bpy.context.window_manager
+    if scene is None or not hasattr(scene, "beyond_mocap"):
+        return SECONDS
+    screens = [window.screen for window in manager.windows]
+    if any(screen.is_animation_playing for screen in screens):
+        return SECONDS
+    players = scene.beyond_mocap.players
+    _look_at_files(scene)
+    if (seen := _seen(scene)) != _now["seen"]:  # settings that a script changes tell no handler
+        _now["seen"] = seen
+        dirty()
+    if _now["dirty"]:
+        _now["dirty"] = False
+        active = scene.beyond_mocap.active_player
+        _now["left"] = sorted(range(len(players)), key=lambda number: number != active)
+    while _now["left"]:
+        number = _now["left"].pop(0)
+        if number < len(players) and (players[number].take or _told(scene, players[number])):
+            renew(scene, players[number])
+            break
+    return 0.2 if _now["left"] else SECONDS
+
+
+def _seen(scene: bpy.types.Scene) -> list:
+    """The settings of a scene and its players, as far as they are plain values, and the words that are texts."""
+    found = []
+    for group in (scene.beyond_mocap, *scene.beyond_mocap.players):
+        found += [getattr(group, place.identifier) for place in group.bl_rna.properties
+                  if place.type in {"STRING", "INT", "FLOAT", "BOOLEAN", "ENUM"} and not getattr(place, "is_array", False)]
+    for player in scene.beyond_mocap.players:
+        text, body = player.annotation_text, player.body
+        found += [text.as_string() if text is not None else None, body is not None and body.name in scene.objects]
+    return found
+
+
+def _told(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
+    told = bpy.context.window_manager.beyond_mocap_stale
+    return any(entry.lines and (entry.scene, entry.name) == (scene.session_uid, player.name) for entry in told)
+
+
+def _look_at_files(scene: bpy.types.Scene) -> None:
+    """Note where tracking, words or library have changed on disk."""
+    settings = scene.beyond_mocap
+    paths = {absolute(path) for player in settings.players for path in (player.tracking_file, player.annotation_file)}
+    found = {path: _changed_at(path) for path in paths if path}
+    if found != _now["files"]:
+        _now["files"] = found
+        dirty()
+    folder, thread = absolute(settings.library_folder), _now["thread"]
+    if folder and (thread is None or not thread.is_alive()) and time.monotonic() > _now["looked"] + LIBRARY_SECONDS:
+        _now["looked"] = time.monotonic()
+        _now["thread"] = threading.Thread(target=_stamp, args=(folder,), name="beyond-mocap library", daemon=True)
+        _now["thread"].start()
+
+
+def _stamp(folder: str) -> None:
+    stamp = library_stamp(folder)
+    if _now["stamps"].get(folder) != stamp:
+        _now["stamps"][folder] = stamp
+        dirty()
+
+
+def _changed_at(path: str) -> int:
+    try:
+        return os.stat(path).st_mtime_ns
+    except OSError:
+        return 0
+
+
+def _redraw() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+@persistent
+def _after_load(*_):
+    """Nothing runs in a file that has just been opened, whatever was saved with it."""
+    manager = bpy.context.window_manager
+    manager.beyond_mocap_work.kind = manager.beyond_mocap_work.waiting = ""
+    manager.beyond_mocap_stale.clear()
+    queue.clear()
+    dirty()
+
+
+@persistent
+def _after_change(_scene, graph):
+    """Objects, actions, texts or settings have changed."""
+    if not _now["dirty"] and len(graph.updates):
+        dirty()
+
+
+@persistent
+def _after_undo(*_):
+    dirty()
+
+
+def register():
+    """Look after changes; with a window, from time to time."""
+    bpy.types.WindowManager.beyond_mocap_stale = bpy.props.CollectionProperty(type=BeyondMocapStale)
+    bpy.app.handlers.load_post.append(_after_load)
+    bpy.app.handlers.undo_post.append(_after_undo)
+    bpy.app.handlers.redo_post.append(_after_undo)
+    if not bpy.app.background:
+        bpy.app.handlers.depsgraph_update_post.append(_after_change)
+        bpy.app.timers.register(_tick, first_interval=SECONDS, persistent=True)
+
+
+def unregister():
+    """Look no more."""
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    if _after_change in bpy.app.handlers.depsgraph_update_post:
+        bpy.app.handlers.depsgraph_update_post.remove(_after_change)
+    bpy.app.handlers.redo_post.remove(_after_undo)
+    bpy.app.handlers.undo_post.remove(_after_undo)
+    bpy.app.handlers.load_post.remove(_after_load)
+    del bpy.types.WindowManager.beyond_mocap_stale

@@ -168,6 +168,20 @@ def of_strips(track: bpy.types.NlaTrack) -> Hand:
     return Hand({place: table for place, table in keys.items() if len(table["co"])}, gone, frozenset(whole), groups)
 
 
+def of_body(body: bpy.types.Object) -> tuple[Hand, str]:
+    """The user's part of what a body plays, action or strips of ours, and the clock that it was made by."""
+    action, slot = channels.playing(body)
+    made = read(action) if action is not None else None
+    if made is not None:
+        return found(action, slot), made.clock
+    tracks = body.animation_data.nla_tracks if body.animation_data is not None else ()
+    for track in tracks:
+        memories = [read(strip.action) for strip in track.strips if strip.action is not None]
+        if memories and all(memory is not None for memory in memories):
+            return of_strips(track), memories[0].clock
+    return Hand(), ""
+
+
 def shift_between(before: str, now: Clock) -> float | None:
     """Frames by which what was set by the clock `before` (as text) has to move; None where frames have another length."""
     old = Clock.read(before)

@@ -39,7 +39,9 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
     check(player)
     if result.state != "NONE" and not shown(context.scene, player):
         forget(player)
-    hand = _hand(player) if context.scene.beyond_mocap.keep_hand_keys else None
+    hand, clock = hand_keys.Hand(), ""
+    if context.scene.beyond_mocap.keep_hand_keys and player.body is not None and result.state != "NONE":
+        hand, clock = hand_keys.of_body(player.body)
     if result.state != "PREVIEW":
         _remember(context, player, made)
     player.take = take
@@ -50,10 +52,8 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
     action, slot = channels.playing(body)
     blocks.note(action, made.take, context.scene)
     hand_keys.note(action, slot, of_scene(context.scene))
-    result.hand_keys = 0
-    if hand is not None:
-        moved = hand_keys.shift_between(hand[1], of_scene(context.scene))
-        result.hand_keys = hand_keys.put(action, slot, hand[0], moved) if moved is not None else 0
+    moved = hand_keys.shift_between(clock, of_scene(context.scene))
+    result.hand_keys = hand_keys.put(action, slot, hand, moved) if moved is not None else 0
     result.state = "PREVIEW"
     error_curves.renew(context.scene, player)
     share(context)
@@ -204,23 +204,6 @@ def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: sessi
     result.track = ribbon.data if ribbon is not None and ribbon.type == "CURVE" else None
     if fits:
         put_aside(result.motion, body)
-
-
-def _hand(player: BeyondMocapPlayer) -> tuple[hand_keys.Hand, str] | None:
-    """The user's keys on the player's result, and the clock that they were set by; None where there are none."""
-    body = player.body
-    if body is None or player.result.state == "NONE":
-        return None
-    action, slot = channels.playing(body)
-    track = blocks.track_of(body)
-    if action is not None and hand_keys.read(action) is not None:
-        found, source = hand_keys.found(action, slot), action
-    elif track is not None:
-        found, source = hand_keys.of_strips(track), track.strips[0].action
-    else:
-        return None
-    made = hand_keys.read(source)
-    return (found, made.clock) if len(found) and made is not None else None
 
 
 def _settle(player: BeyondMocapPlayer) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 _waiting: list["Entry"] = []
+_busy = [False]  # whether somebody works it off
 
 
 @dataclass(eq=False)
@@ -46,6 +47,16 @@ def remove(player: str) -> bool:
 def names() -> list[str]:
     """The players that wait, in their order."""
     return [entry.player for entry in _waiting]
+
+
+def work(busy: bool) -> None:
+    """Somebody begins, or ends, to work the queue off."""
+    _busy[0] = busy
+
+
+def worked() -> bool:
+    """Whether somebody works it off."""
+    return _busy[0]
 
 
 def clear() -> None:

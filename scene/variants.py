@@ -42,8 +42,10 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, number: int) -> 
 def _summary(report: dict, apart: float) -> str:
     """A take's figures in a few words."""
     root, slide = report["root_error_m"]["mean"], report["skate"]["contact_cm_s"]
-    words = f"off {100 * root:.1f} cm, slide {slide:.1f} cm/s" if slide is not None else f"off {100 * root:.1f} cm"
-    return f"{words}, {apart:.0%} other footage" if apart else words
+    words = f"slide {slide:.1f} cm/s" if slide is not None else f"off {100 * root:.1f} cm"
+    jerk = report.get("seam_jerk_ratio", {}).get("median")
+    words += f", seams {jerk:.2f}" if jerk is not None else ""
+    return f"{words}, {apart:.0%} other" if apart else words
 
 
 def _apart(first, other) -> float:
