@@ -67,7 +67,7 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
     monkeypatch.setattr(orders, "work", work)
 
     class Button(turns.TurnsVerb):
-        bl_label = "Synthesize"
+        bl_label, player = "Synthesize", ""
 
         def report(self, kind, text):
             hand.told.append(text)
