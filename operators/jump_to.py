@@ -12,13 +12,17 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_jump_to(Verb, bpy.types.Operator):
-    """Go to the frame that this line is about, and select the player's body.
-Shift-click also brings the body into view"""
+    """Go to the frame that this line is about, and select the player's body. Where a line names several, each press
+goes to the next. Shift-click also brings the body into view"""
 
     bl_idname = "beyond_mocap.jump_to"
     bl_label = "Jump To"
 
     seconds: FloatProperty(name="Seconds", description="Second on the tracking file's clock to go to")
+    stops: StringProperty(
+        name="Stops", description="Seconds with blanks between, instead: to the next one behind the current frame, from the "
+        "last to the first"
+    )
     player: StringProperty(name="Player", description="Whose body; empty: the active player's")
     frame_view: BoolProperty(name="Bring into View", description="Move the 3D views so that the body is seen")
 
@@ -27,13 +31,22 @@ Shift-click also brings the body into view"""
         self.frame_view = self.frame_view or event.shift
         return self.execute(context)
 
+    def frame(self, scene) -> int:
+        """The scene frame to go to."""
+        try:
+            seconds = [float(text) for text in self.stops.split()] or [self.seconds]
+        except ValueError:
+            raise InputError("stops", repr(self.stops), "seconds with blanks between") from None
+        frames = sorted(int(round(bake.frame_at(scene, second))) for second in seconds)
+        return next((frame for frame in frames if frame > scene.frame_current), frames[0])
+
     def do(self, context):
         """Set the frame, select the body."""
         settings = context.scene.beyond_mocap
         if self.player and self.player not in settings.players:
             raise InputError("player", self.player, "a name in the list", "look at step 2")
         player = settings.players[self.player] if self.player else active_player(settings)
-        context.scene.frame_set(int(round(bake.frame_at(context.scene, self.seconds))))
+        context.scene.frame_set(self.frame(context.scene))
         body = player.body if player is not None else None
         if body is None or body.name not in context.view_layer.objects:
             return

@@ -32,8 +32,8 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         header.label(text=f"Warnings: {len(lines)}" if lines else "No Warnings", icon="ERROR" if lines else "CHECKMARK")
         if body:
             for line in lines:
-                text, _, second = line.partition("\t")
-                self.jump(body, player, text, second, "ERROR")
+                text, _, seconds = line.partition("\t")
+                self.jump(body, player, text, seconds, "ERROR")
         header, body = layout.panel("beyond_mocap_quality_moments")
         header.label(text="Key Moments")
         if body:
@@ -49,9 +49,9 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         if body:
             self.figures(body, player.quality)
 
-    def jump(self, layout, player, text: str, second: str, icon: str) -> None:
-        """A line over as many rows as it takes; the first is a button where the line has a time."""
-        if not second:
+    def jump(self, layout, player, text: str, seconds: str, icon: str) -> None:
+        """A line over as many rows as it takes; the first is a button where the line has times."""
+        if not seconds:
             paragraph(layout, text, icon)
             return
         column = layout.column(align=True)
@@ -60,7 +60,7 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         row = column.row(align=True)
         row.alignment = "LEFT"
         button = row.operator("beyond_mocap.jump_to", text=first, icon=icon, emboss=False)
-        button.seconds, button.player = float(second), player.name
+        button.stops, button.player = seconds, player.name
         for line in rest:
             column.label(text=line, icon="BLANK1")
 

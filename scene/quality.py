@@ -2,13 +2,12 @@
 
 - quality: name and value ("Feet slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as `evaluation.judged` has it)
 - moments: text, seconds, status
-- warnings: text, seconds ("" where it is about no time)
+- warnings: text, seconds at which its stretches begin, with blanks between ("" where it is about no time)
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 FIGURES = (  # name, path in the report, factor (a negative one counts from 1), form, unit
     ("Off the track, mean", "root_error_m.mean", 100, "{:.2f}", " cm"),
@@ -29,15 +28,6 @@ FIGURES = (  # name, path in the report, factor (a negative one counts from 1), 
     ("Into the ground", "ground_mm.min", 1, "{:.1f}", " mm"),
     ("Time to make", "seconds.total", 1, "{:.1f}", " s"),
 )
-
-
-class Line(NamedTuple):
-    """One line in columns. text; second: where it is about, None for nowhere; target; status."""
-
-    text: str
-    second: float | None = None
-    target: str = ""
-    status: str = ""
 
 
 def quality(report: Mapping) -> str:
@@ -98,5 +88,5 @@ def warnings(report: Mapping, more: Iterable[str] = (), known: Iterable[str] = (
     for text in dict.fromkeys((*more, *seconds)):
         spans = seconds.get(text) or spans_of(text)
         if text not in known:
-            lines.append("\t".join((str(text), f"{spans[0][0]:.3f}" if spans else "")))
+            lines.append(f"{text}\t{' '.join(f'{first:.3f}' for first, _ in spans)}")
     return "\n".join(lines)

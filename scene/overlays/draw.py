@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import bpy
 import gpu
-import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
@@ -119,15 +118,11 @@ def _draw_overlay(context, view, name: str, shown: Shown) -> None:
 def _ghost_frames(view, shown: Shown) -> list[int]:
     """Frames of the figures near the playhead; the one at the playhead is the body itself."""
     prepared = shown.prepared
-    first, last = (prepared.frame(shown.seconds + side * view.reach) for side in (-1, 1))
-    now = prepared.frame(shown.seconds)
+    first, now, last = (prepared.frame(shown.seconds + side * view.reach) for side in (-1, 0, 1))
     if view.ghosts_at == "SEAMS":
-        return [int(f) for f in prepared.seams if first <= f <= last]
-    start = prepared.times[0]
-    steps = range(int(np.ceil((prepared.times[first] - start) / view.ghost_step - 1e-6)),
-                  int((prepared.times[last] - start) / view.ghost_step + 1e-6) + 1)
-    frames = {prepared.frame(start + step * view.ghost_step) for step in steps}
-    return sorted(frames - {now})
+        return [frame for frame in prepared.seams if first <= frame <= last]
+    step = max(1, round(view.ghost_step * prepared.fps))
+    return [frame for frame in range(-(-first // step) * step, last + 1, step) if frame != now]
 
 
 def _figure(prepared: Prepared, frame: int) -> Mesh:

@@ -18,15 +18,16 @@ _square: list = []
 
 def write(x: float, y: float, lines, scale: float, strength: float = 1.0) -> None:
     """Lines of text, the first on top, on a dark ground whose lower left corner is at pixel x, y."""
-    size = SIZE * scale
+    size, margin, text = SIZE * scale, MARGIN * scale, "\n".join(lines)
     blf.size(FONT, size)
-    step, margin = LINE * size, MARGIN * scale
-    width = max(blf.dimensions(FONT, line)[0] for line in lines)
-    box(x, y, width + 2 * margin, len(lines) * step + 1.2 * margin, (*GROUND[:3], GROUND[3] * strength))
+    blf.enable(FONT, blf.WORD_WRAP)  # breaks at line ends too, so that one call draws all lines
+    blf.word_wrap(FONT, 10000)
+    width, height = blf.dimensions(FONT, text)
+    box(x, y, width + 2 * margin, height + 2 * margin, (*GROUND[:3], GROUND[3] * strength))
     blf.color(FONT, 1.0, 1.0, 1.0, strength)
-    for number, line in enumerate(reversed(lines)):
-        blf.position(FONT, x + margin, y + margin + number * step + 0.15 * size, 0.0)
-        blf.draw(FONT, line)
+    blf.position(FONT, x + margin, y + margin + height - 0.75 * size, 0.0)
+    blf.draw(FONT, text)
+    blf.disable(FONT, blf.WORD_WRAP)
 
 
 def box(x: float, y: float, width: float, height: float, colour) -> None:

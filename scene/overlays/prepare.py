@@ -59,12 +59,14 @@ class Label:
 class Prepared:
     """All that is shown of one take.
 
-    times (T,) s. meshes: overlay -> its meshes. pelvis (T, 3) m; toes (T, 2, 3) m and stands (T, 2) of left and right
-    foot; figures (T, J, 3) m, pairs (B, 2) and pair_colours (2 B, 4) of stick figures. seams (S,) frames. pieces,
-    labels: in the order of time. figures_of: the figures of every frame.
+    start: the first second; fps: frames per second; count: frames. meshes: overlay -> its meshes. pelvis (T, 3) m; toes (T, 2, 3) m and stands (T, 2) of left and right
+    foot; figures (T, J, 3) m, pairs (B, 2) and pair_colours (2 B, 4) of stick figures. seams: frames. pieces, labels:
+    in the order of time.
     """
 
-    times: np.ndarray
+    start: float
+    fps: float
+    count: int
     meshes: dict[str, tuple[Mesh, ...]]
     pelvis: np.ndarray
     toes: np.ndarray
@@ -72,16 +74,13 @@ class Prepared:
     figures: np.ndarray
     pairs: np.ndarray
     pair_colours: np.ndarray
-    seams: np.ndarray
+    seams: tuple[int, ...]
     pieces: tuple[Piece, ...]
     labels: tuple[Label, ...]
-    figures_of: "PerFrame"
 
     def frame(self, seconds: float) -> int:
         """The output frame nearest to a second; the first or last beyond the ends."""
-        last = len(self.times) - 1
-        fps = last / (self.times[-1] - self.times[0]) if last else 1.0
-        return int(min(max(round((seconds - self.times[0]) * fps), 0), last))
+        return min(max(round((seconds - self.start) * self.fps), 0), self.count - 1)
 
     def piece(self, seconds: float) -> Piece | None:
         """The piece that is played at a second."""
@@ -108,7 +107,9 @@ def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
         "speed": _speed(ground, figures),
     }
     return Prepared(
-        times=figures.times,
+        start=float(take.start_time),
+        fps=float(take.motion.fps),
+        count=len(take.motion),
         meshes={name: found for name, found in meshes.items() if found},
         pelvis=positions[:, view.played.body.hips],
         toes=view.played.feet[:, :, 1].astype(np.float32),
@@ -116,10 +117,9 @@ def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
         figures=positions,
         pairs=pairs,
         pair_colours=_pair_colours(skeleton.names, pairs),
-        seams=np.asarray(take.seams, int),
+        seams=tuple(int(seam) for seam in take.seams),
         pieces=_pieces(plan, take, library, view.played.pelvis),
         labels=tuple(_label(strike) for strike in met),
-        figures_of=figures,
     )
 
 

@@ -1,0 +1,263 @@
+"""What is drawn over the 3D view: every overlay, cheap to draw, and nothing left behind or broken by undo, delete, load."""
+
+import importlib
+import time
+
+import bpy
+from mathutils import Euler, Quaternion
+from tab import EXTENSION, PICTURES, TAB, output, sample, window
+from window import Stand
+
+LIMIT = 300
+OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
+
+
+def room(name):
+    """One of the extension's modules."""
+    return importlib.import_module(f"{EXTENSION}.{name}")
+
+
+def settings():
+    """The settings of the window's scene; looked up each time, since undo replaces them."""
+    return window.window.scene.beyond_mocap
+
+
+def switch(*names):
+    """Switch on these overlays and no other."""
+    for name in OVERLAYS:
+        setattr(settings().view, name, name in names)
+
+
+def prepared(limit=30.0):
+    """Wait until every player that is shown is prepared."""
+    store, start = room("scene.overlays.store"), time.monotonic()
+    while any(store.prepared(player.take) is None for player in store.shown_players(settings())):
+        assert time.monotonic() - start < limit, "not prepared in time"
+        yield 0.1
+
+
+def made(seconds=8.0):
+    """The sample with the takes of both players shown, the playhead near a kick."""
+    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
+    yield 1.0
+    with bpy.context.temp_override(window=window.window):
+        assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    bpy.context.scene.frame_set(round(1 + seconds * bpy.context.scene.render.fps))
+    yield 0.3
+
+
+def look(kind):
+    """Turn the view to the active player, from "above" or from the "side"."""
+    view = window.area("VIEW_3D").spaces.active.region_3d
+    body = settings().players[settings().active_player].body
+    place = body.matrix_world @ body.pose.bones[0].head
+    view.view_perspective, view.view_location = "PERSP", (place.x, place.y, 0.6)
+    turn, view.view_distance = {"above": (Quaternion(), 9.0), "side": (Euler((1.3, 0, 0.5)).to_quaternion(), 6.5)}[kind]
+    view.view_rotation = turn
+
+
+def redrawn(count):
+    """Draw the 3D view `count` times."""
+    for _ in range(count):
+        window.area("VIEW_3D").tag_redraw()
+        yield 0.12
+
+
+class timed:
+    """Counts how long the two handlers take, and how many batches they draw, while a `with` lasts."""
+
+    def __init__(self):
+        self.draw, self.seconds, self.drawn = room("scene.overlays.draw"), [], 0
+
+    def __enter__(self):
+        names = ("_draw_shapes", "_draw_texts", "_draw_batches", "_draw_contacts")
+        self.kept, self.blf = {name: getattr(self.draw, name) for name in names}, None
+        self.draw.unregister()
+        for name in ("_draw_shapes", "_draw_texts"):
+            setattr(self.draw, name, self.clocked(self.kept[name]))
+        self.draw._draw_batches = self.counted
+        self.draw.register()
+        return self
+
+    def clocked(self, function):
+        def run():
+            start = time.perf_counter()
+            function()
+            self.seconds.append((function.__name__, time.perf_counter() - start))
+        return run
+
+    def counted(self, context, batches):
+        self.drawn += len(batches)
+        self.kept["_draw_batches"](context, batches)
+
+    def __exit__(self, *error):
+        self.draw.unregister()
+        if self.blf is not None:
+            self.draw.legend.blf, self.draw.legend.box = self.blf, self.box
+        for name, function in self.kept.items():
+            setattr(self.draw, name, function)
+        self.draw.register()
+
+    def without_graphics(self):
+        """From here on all is done but the drawing itself: what remains is Python's time. llvmpipe's says nothing."""
+        legend = self.draw.legend
+        self.blf, self.box = legend.blf, legend.box
+        legend.blf, legend.box = Stand(self.blf, draw=lambda *_: None), lambda *_: None
+        self.counted, self.seconds = None, []
+        self.draw._draw_batches = lambda context, batches: [mesh for _, mesh in batches]
+        self.draw._draw_contacts = lambda shown: shown.prepared.frame(shown.seconds)
+
+    def per_redraw(self):
+        """Median milliseconds of both handlers together."""
+        shapes, texts = ([s for name, s in self.seconds if name == which] for which in ("_draw_shapes", "_draw_texts"))
+        return 1000.0 * (sorted(shapes)[len(shapes) // 2] + sorted(texts)[len(texts) // 2])
+
+
+def check_every_overlay_is_drawn():
+    yield from made()
+    switch("track")
+    yield from prepared()
+    for kind in ("side", "above"):
+        look(kind)
+        for name in OVERLAYS:
+            switch(name)
+            yield 0.5
+            window.picture(PICTURES / f"view-{name}-{kind}.png")
+        switch(*OVERLAYS)
+        yield 0.5
+        window.picture(PICTURES / f"view-{kind}.png")
+
+
+def check_drawing_is_cheap():
+    yield from made()
+    look("side")
+    switch(*OVERLAYS)
+    yield from prepared()
+    yield from redrawn(3)
+    for whose, most in (("ACTIVE", 3.0), ("TICKED", 6.0)):
+        settings().view.players = whose
+        yield from prepared()
+        yield from redrawn(3)
+        with timed() as clock:
+            yield from redrawn(12)
+            count = len([1 for name, _ in clock.seconds if name == "_draw_shapes"])
+            told = f"{clock.drawn / max(count, 1):.0f} batches, {clock.per_redraw():.1f} ms on this renderer"
+            clock.without_graphics()
+            yield from redrawn(12)
+            output.say(f"     {whose}: {told}, {clock.per_redraw():.2f} ms of it Python")
+            assert clock.per_redraw() < most, clock.per_redraw()
+    switch()
+    yield from redrawn(3)
+    with timed() as clock:
+        yield from redrawn(10)
+    output.say(f"     switched off: {clock.per_redraw():.3f} ms, {clock.drawn} batches")
+    assert clock.drawn == 0 and clock.per_redraw() < 0.2
+
+
+def check_nothing_stays_of_what_is_gone():
+    yield from made()
+    switch(*OVERLAYS)
+    settings().view.players = "TICKED"
+    yield from prepared()
+    yield from redrawn(3)
+    draw, store = room("scene.overlays.draw"), room("scene.overlays.store")
+    assert draw._batches and store._prepared
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.ed.undo_push(message="before")
+        bpy.data.objects.remove(settings().players[0].body)
+        yield from redrawn(2)
+        bpy.ops.ed.undo_push(message="removed")
+        bpy.ops.ed.undo()
+        yield from redrawn(2)
+        bpy.ops.beyond_mocap.discard()
+        bpy.ops.ed.undo_push(message="discarded")
+    yield 0.3
+    yield from redrawn(3)
+    assert not store._prepared, "takes that nobody shows are still prepared"
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    yield from redrawn(2)
+    bpy.context.scene.beyond_mocap.view.track = True
+    yield from redrawn(2)
+    assert not [key for key in draw._batches if key[0]], "batches of takes that are gone"
+
+
+def check_the_panels_are_quick_with_22_players():
+    yield from made()
+    yield from prepared()
+    one = settings().players[0]
+    for number in range(20):
+        more = settings().players.add()
+        more.name, more.take, more.body = f"player {number + 3}", one.take, one.body
+        more.quality, more.moments, more.warnings = one.quality, one.moments, one.warnings
+    area = window.area("VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    spent = {}
+
+    def clocked(cls, draw):
+        def drawn(self, context):
+            start = time.perf_counter()
+            draw(self, context)
+            spent.setdefault(cls.__name__, []).append(time.perf_counter() - start)
+        return drawn
+
+    opened = []
+    for name in ("quality", "view"):
+        cls = getattr(room(f"panels.{name}"), f"BEYOND_MOCAP_PT_{name}")
+        own = {key: value for key, value in vars(cls).items() if not key.startswith("__") and key != "bl_rna"}
+        own.update(bl_options=set(), bl_order=cls.bl_order - 10, draw=clocked(cls, cls.draw))
+        opened.append(type(f"{cls.__name__}_opened", cls.__bases__, own))
+        bpy.utils.register_class(opened[-1])
+    for _ in range(10):
+        for region in area.regions:
+            region.tag_redraw()
+        yield 0.15
+    window.picture(PICTURES / "view-panels.png")
+    for cls in opened:
+        bpy.utils.unregister_class(cls)
+    told = {name: 1000 * sorted(values)[len(values) // 2] for name, values in spent.items()}
+    output.say("     " + ", ".join(f"{name.rpartition('_')[2]}: {value:.2f} ms" for name, value in told.items()))
+    assert len(told) == 2 and sum(told.values()) < 5.0, told
+
+
+def check_a_warning_goes_to_its_frame():
+    yield from made()
+    player = settings().players[0]
+    player.warnings = "5.0-5.2, 7.0 s: planted\t5.000 7.000"
+    area = window.area("VIEW_3D")
+    body = player.body
+    before = area.spaces.active.region_3d.view_location.copy()
+    with bpy.context.temp_override(window=window.window, area=area, region=next(r for r in area.regions if r.type == "WINDOW")):
+        bpy.context.scene.frame_set(1)
+        bpy.ops.beyond_mocap.jump_to("INVOKE_DEFAULT", stops="5.000 7.000", player=player.name, frame_view=True)
+    yield 0.5
+    assert bpy.context.scene.frame_current == 1 + 5 * bpy.context.scene.render.fps
+    assert bpy.context.view_layer.objects.active == body
+    assert (area.spaces.active.region_3d.view_location - before).length > 0.1, "the view has not moved"
+    assert bpy.context.window_manager.beyond_mocap_playhead.why or not room("scene.overlays.store")._prepared
+
+
+def check_error_curves_are_in_the_graph_editor():
+    yield from made()
+    with bpy.context.temp_override(window=window.window):
+        body = settings().players[0].body
+        for thing in bpy.context.selected_objects:
+            thing.select_set(False)
+        body.select_set(True)
+        bpy.context.view_layer.objects.active = body
+        bpy.ops.beyond_mocap.error_curves()
+    area = window.area("VIEW_3D")
+    area.type = "GRAPH_EDITOR"
+    yield 0.8
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window.window, area=area, region=region):
+        area.spaces.active.dopesheet.filter_text = ""
+        names = [curve.data_path for curve in bpy.context.visible_fcurves or ()]
+        bpy.ops.graph.view_all()
+    yield 0.8
+    window.picture(PICTURES / "view-curves.png")
+    area.type = "VIEW_3D"
+    yield 0.5
+    assert any("Root Error" in name for name in names), names[:20]
+
+
