@@ -78,9 +78,9 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         for line in text.splitlines():
             told, target, status = (*line.split("\t"), "", "")[:3]
             name, _, value = told.partition(": ")
-            row = column.split(factor=0.5)
+            row = column.split(factor=0.54)
             row.label(text=name, icon=MARKS.get(status, "BLANK1"))
-            right = row.split(factor=0.55)
+            right = row.split(factor=0.54)
             right.label(text=value)
             aim = right.row()
             aim.active = False

@@ -25,7 +25,7 @@ CURVES = (  # name, what it says
     ("Correction Right (cm)", "How far polish moved the right foot from where the clips had it"),
     ("Jerk (of real)", "Hardest jerk around, over the 95th percentile of recordings at that speed"),
     ("Speed Gap (m/s)", "By how much the body is faster than the track asks"),
-    ("Piece", "Number of the piece of a clip that is played: each step is a cut"),
+    ("Piece (0 or 1)", "Changes between 0 and 1 at every cut between two clips"),
 )
 
 
@@ -51,6 +51,8 @@ def write(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bpy.types.Action
     curves = {_path(name): (GROUP, row[at][:, None]) for (name, _), row in zip(CURVES, values)}
     action = channels.animate(body.data, f"{player.name} errors", frames, curves)
     action[MARK] = True
+    for curve in channels.curves(action, body.data.animation_data.action_slot).values():
+        curve.keyframe_points.foreach_set("select_control_point", np.zeros(len(frames), bool))
     return action
 
 
@@ -81,7 +83,7 @@ def _values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
     piece[np.asarray(take.seams, int)] = 1.0
     rows = (
         100.0 * figures.root_error, *(100.0 * figures.slide.T), *(100.0 * figures.correction.T), figures.jerk,
-        figures.speed_gap, 1.0 + np.cumsum(piece),
+        figures.speed_gap, np.cumsum(piece) % 2.0,
     )  # fmt: skip
     return np.nan_to_num(np.array(rows))
 

@@ -10,22 +10,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 FIGURES = (  # name, path in the report, factor (a negative one counts from 1), form, unit
-    ("Off the track, mean", "root_error_m.mean", 100, "{:.2f}", " cm"),
-    ("Off the track, 95 %", "root_error_m.p95", 100, "{:.2f}", " cm"),
+    ("Off track", "root_error_m.mean", 100, "{:.2f}", " cm"),
+    ("Off track, 95 %", "root_error_m.p95", 100, "{:.2f}", " cm"),
     ("Feet slide", "skate.contact_cm_s", 1, "{:.1f}", " cm/s"),
-    ("Slide of a step", "skate.stance_mm_median", 1, "{:.1f}", " mm"),
-    ("Steps that slide 21 mm", "skate.stances_over_21mm", 100, "{:.1f}", " %"),
+    ("Slide a step", "skate.stance_mm_median", 1, "{:.1f}", " mm"),
+    ("Steps over 21 mm", "skate.stances_over_21mm", 100, "{:.1f}", " %"),
     ("Feet moved", "foot_correction_m.p95", 100, "{:.1f}", " cm"),
-    ("Legs too short", "ik_miss_share", 100, "{:.1f}", " %"),
-    ("Cuts harder than real", "seam_jerk_ratio.share_above_real", 100, "{:.0f}", " %"),
-    ("Hardest cut", "seam_jerk_ratio.max", 1, "{:.2f}", " x real"),
-    ("Hardest elsewhere", "seam_jerk_ratio.rest_max", 1, "{:.2f}", " x real"),
-    ("Words met", "annotation_similarity.all", -50, "{:.0f}", " %"),  # -1 is all, +1 none
+    ("Legs short", "ik_miss_share", 100, "{:.1f}", " %"),
+    ("Hard cuts", "seam_jerk_ratio.share_above_real", 100, "{:.0f}", " %"),
+    ("Hardest cut", "seam_jerk_ratio.max", 1, "{:.2f}", " x"),
+    ("Hardest between", "seam_jerk_ratio.rest_max", 1, "{:.2f}", " x"),
+    ("Words met", "annotation_similarity.all", -50, "{:.1f}", " %"),  # -1 is all, +1 none
     ("Slowest clip", "warp_rate.min", 1, "{:.2f}", " x"),
     ("Fastest clip", "warp_rate.max", 1, "{:.2f}", " x"),
-    ("Poses unlike any recorded", "pose_realism", 100, "{:.1f}", " %"),
-    ("Replayed stretches", "loop_share", 100, "{:.1f}", " %"),
-    ("Into the ground", "ground_mm.min", 1, "{:.1f}", " mm"),
+    ("Odd poses", "pose_realism", 100, "{:.1f}", " %"),
+    ("Replayed", "loop_share", 100, "{:.1f}", " %"),
+    ("Lowest point", "ground_mm.min", 1, "{:.1f}", " mm"),
     ("Time to make", "seconds.total", 1, "{:.1f}", " s"),
 )
 
