@@ -32,7 +32,7 @@ LOWEST = 10.0  # letters; a lower editor has no room for the menu, and it is dra
 REPEATING = {"EARLIER", "LATER", "PREVIOUS", "NEXT"}
 STATUS = (
     "1-9: words   I, O: in, out   M: mirror   Left, Right: key moments   Up, Down: players   , . : a frame   "
-    "X: remove   Space: play   Esc: leave"
+    "X: remove   H: hide the list   Space: play   Esc: leave"
 )
 
 _menu: dict = {}  # what is drawn: the box, in which region and for which (by pointer), the word under the mouse
@@ -80,7 +80,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             now(context)
         except BeyondMocapError as error:
             return self.failed(str(error))
-        self.pointer = None
+        self.pointer, self.folded = None, False
         _watch()
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set(STATUS)
@@ -97,6 +97,10 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         if event.type in ("MOUSEMOVE", "LEFTMOUSE"):
             return self.moused(context, event, area, region)
         key = _key(event)
+        if event.type == "H" and event.value == "PRESS" and not _held_down(event):
+            self.folded = not self.folded
+            self.show(context, event)
+            return {"RUNNING_MODAL"}
         if key is None:
             return {"PASS_THROUGH"}
         if event.value == "PRESS" and (not event.is_repeat or key in REPEATING):
@@ -106,6 +110,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
     def press(self, context, event, how):
         """One key or click: the next state, and what it asks for."""
         try:
+            self.who = name_of(context)
             before = replace(self.state, held=held(context.scene))
             self.state, commands = how(before, now(context))
             self.told = "" if commands else self.told
@@ -153,7 +158,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         if region.height < LOWEST * popup.letters():
             area, region = _largest(context)
         at = (self.pointer[0] - region.x, self.pointer[1] - region.y) if self.state.trail and self.pointer else None
-        content = popup.content(self.state, self.who, self.told)
+        content = popup.content(self.state, self.who, self.told, self.folded)
         box = popup.laid_out(content, at, popup.free_part(area, region), popup.letters(), popup.width_of)
         _menu.update(box=box, region=region.as_pointer(), under=under.as_pointer(), hovered=None)
         _redraw(context)
@@ -193,11 +198,13 @@ def _draw() -> None:
 
 def _key(event: bpy.types.Event) -> str | None:
     """What a Blender event means; None for what is not ours, also with Ctrl, Alt or the system's key."""
-    if event.ctrl or event.alt or event.oskey:
-        return None
     if event.type == "TAB" and event.shift:
         return "PREVIOUS_PLAYER"
-    return None if event.shift else KEYS.get(event.type)
+    return None if _held_down(event) else KEYS.get(event.type)
+
+
+def _held_down(event: bpy.types.Event) -> bool:
+    return event.ctrl or event.alt or event.oskey or event.shift
 
 
 def _under(context, event) -> tuple[bpy.types.Area | None, bpy.types.Region | None]:

@@ -67,6 +67,7 @@ class Timeline:
 
     def tools(self, layout):
         """Words of what is selected, spans, text form."""
+        layout.operator("beyond_mocap.annotate", icon="SYNTAX_ON")
         column = layout.column(align=True)
         column.operator("beyond_mocap.edit_words", icon="GREASEPENCIL")
         column.operator("beyond_mocap.mirror_side", icon="MOD_MIRROR")

@@ -16,11 +16,10 @@ from ..beyond_mocap.annotation import KeyMoment, Span, annotating, swap_sides
 from ..beyond_mocap.annotation.annotating import AddMoment, AddSpan, AtPlayhead, Command, Go, Now, Tell
 from ..beyond_mocap.annotation.decision import Held
 from ..beyond_mocap.errors import InputError
-from . import lanes, lay_strips, plans, session, strips
+from . import lanes, lay_strips, session, subject, word_checks
 from .clock import Clock, of_scene
 from .lanes import PlacedMoment, PlacedSpan
 from .settings import absolute, active_player
-from .tracks import read_track
 
 AT_PLAYHEAD = 0.06
 """Seconds from the playhead at which a key moment counts as being there, at least a frame."""
@@ -42,18 +41,18 @@ def held(scene: bpy.types.Scene) -> Held | None:
 
 def name_of(context: bpy.types.Context) -> str:
     """Who is annotated, for the eye; empty where there is nobody."""
-    clip, player = _clip(context), active_player(context.scene.beyond_mocap)
-    return clip.name if clip else player.name if player else ""
+    target, player = subject.subject(context), active_player(context.scene.beyond_mocap)
+    return subject.name_of(target) if target is not None else player.name if player is not None else ""
 
 
 def now(context: bpy.types.Context) -> Now:
-    """The playhead on the clock of who is annotated."""
-    scene, (target, clock) = context.scene, _subject(context)
-    time = clock.seconds(scene.frame_current_final)
-    if target is None:
-        return Now(time, 1.0 / clock.fps)
-    ends = [placed.span.end for placed in lanes.spans(target) if not (placed.off or placed.automatic)]
-    ends += [placed.time for placed in lanes.moments(target) if not placed.off]
+    """The playhead on the clock of who is annotated; InputError where there is nobody."""
+    target = subject.subject(context)
+    if target is None and not subject.can_have(context):
+        raise InputError("annotate", "no player", "a player in the list", "import tracking in step 2 first")
+    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
+    time = clock.seconds(context.scene.frame_current_final)
+    ends = [placed.span.end for placed in _asked_spans(target)] + [placed.time for placed in _asked_moments(target)]
     return Now(time, 1.0 / clock.fps, max((end for end in ends if end < time - 0.5 / clock.fps), default=None))
 
 
@@ -67,15 +66,10 @@ class Done(NamedTuple):
 def do(context: bpy.types.Context, command: Command) -> Done:
     """Carry out one command on the strips or the scene. InputError where it cannot be done; nothing has changed
     then."""
-    if isinstance(command, AddMoment):
-        return Done(_add_moment(context, KeyMoment(command.time, command.words)), True)
-    if isinstance(command, AddSpan):
-        return Done(_add_span(context, Span(command.start, command.end, command.words)), True)
-    if isinstance(command, AtPlayhead):
-        return _at_playhead(context, command.what)
-    if isinstance(command, Go):
-        return Done(_next_player(context, command.step) if command.to == "player" else _next_moment(context, command.step))
-    return Done(command.line if isinstance(command, Tell) else "")
+    done = _done(context, command)
+    if done.words:
+        word_checks.keep(context)
+    return done
 
 
 def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
@@ -87,6 +81,18 @@ def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
     return told
 
 
+def _done(context: bpy.types.Context, command: Command) -> Done:
+    if isinstance(command, AddMoment):
+        return Done(_add_moment(context, KeyMoment(command.time, command.words)), True)
+    if isinstance(command, AddSpan):
+        return Done(_add_span(context, Span(command.start, command.end, command.words)), True)
+    if isinstance(command, AtPlayhead):
+        return _at_playhead(context, command.what)
+    if isinstance(command, Go):
+        return Done(_next_player(context, command.step) if command.to == "player" else _next_moment(context, command.step))
+    return Done(command.line if isinstance(command, Tell) else "")
+
+
 def _combinations(library, mirror: bool) -> Held:
     allowed = np.array([mirror or not clip.mirrored for clip in library.clips])
     recorded = [key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made]
@@ -96,41 +102,19 @@ def _combinations(library, mirror: bool) -> Held:
     return Held(tuple(dict.fromkeys(frozenset(key.words) for key in recorded)), tuple(spans))
 
 
-def _clip(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active object, where it has lanes and is nobody's dot."""
-    active = context.view_layer.objects.active
-    if active is None or not lanes.has(active):
-        return None
-    dots = {player.dot for player in context.scene.beyond_mocap.players}
-    return None if active in dots or active.beyond_mocap_dot.player else active
+def _asked_moments(target: bpy.types.Object | None) -> list[PlacedMoment]:
+    return [] if target is None else [moment for moment in lanes.moments(target) if not moment.off]
 
 
-def _subject(context: bpy.types.Context) -> tuple[bpy.types.Object | None, Clock]:
-    """Whose lanes are meant and the clock of his seconds; None where he has no lanes yet."""
-    clip = _clip(context)
-    if clip is not None:
-        return clip, lanes.written_for(clip)
-    player = active_player(context.scene.beyond_mocap)
-    if player is None:
-        raise InputError("annotate", "no player", "a player in the list", "import tracking in step 2 first")
-    return strips.dot_of(player, context.scene), of_scene(context.scene)
-
-
-def _lanes(context: bpy.types.Context) -> tuple[bpy.types.Object, Clock]:
-    """The same, with lanes: a player without any gets them, with the words of his text or file."""
-    target, clock = _subject(context)
-    if target is not None:
-        return target, clock
-    settings = context.scene.beyond_mocap
-    player = active_player(settings)
-    strips.write(context, player, plans.written_words(player, settings.rate, read_track(settings, player)))
-    return player.dot, clock
+def _asked_spans(target: bpy.types.Object | None) -> list[PlacedSpan]:
+    return [] if target is None else [span for span in lanes.spans(target) if not (span.off or span.automatic)]
 
 
 def _add_moment(context: bpy.types.Context, key: KeyMoment) -> str:
     """A key moment; one that stands on its frame already gets its words."""
-    target, clock = _lanes(context)
-    there = next((m for m in lanes.moments(target) if m.frame == clock.whole(key.time) and not m.off), None)
+    target = subject.with_lanes(context)
+    clock = subject.clock(context, target)
+    there = next((moment for moment in _asked_moments(target) if moment.frame == clock.whole(key.time)), None)
     if there is not None:
         lay_strips.change_moment(target, there.strip, there.index, replace(there.key, words=key.words))
         return f"{_spoken(key.words)} at {there.time:.2f} s, in place of {_spoken(there.words)}"
@@ -139,16 +123,17 @@ def _add_moment(context: bpy.types.Context, key: KeyMoment) -> str:
 
 
 def _add_span(context: bpy.types.Context, span: Span) -> str:
-    target, clock = _lanes(context)
-    asked = [p.span for p in lanes.spans(target) if not (p.off or p.automatic) and p.span.words]
-    others = [s for s in asked if s.start < span.end - 1e-6 and span.start < s.end - 1e-6]
-    lay_strips.add_span(target, span, clock)
+    target = subject.with_lanes(context)
+    asked = [placed.span for placed in _asked_spans(target) if placed.span.words]
+    others = [one for one in asked if one.start < span.end - 1e-6 and span.start < one.end - 1e-6]
+    lay_strips.add_span(target, span, subject.clock(context, target))
     over = f"; it overlaps {_spoken(others[0].words)}, shorten one of them" if others else ""
     return f"{_spoken(span.words)} from {span.start:.2f} to {span.end:.2f} s{over}"
 
 
 def _at_playhead(context: bpy.types.Context, what: str) -> Done:
-    target, clock = _subject(context)
+    target = subject.subject(context)
+    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
     found = None if target is None else _found(context, target, clock)
     if what in ("earlier", "later"):
         step = 1 if what == "later" else -1
@@ -165,7 +150,7 @@ def _found(context, target, clock: Clock) -> PlacedMoment | PlacedSpan | None:
     """The key moment nearest to the playhead within a frame or AT_PLAYHEAD, else the stretch that is asked for there."""
     time = clock.seconds(context.scene.frame_current_final)
     reach = max(AT_PLAYHEAD, 1.0 / clock.fps) + 1e-6
-    near = [moment for moment in lanes.moments(target) if abs(moment.time - time) <= reach and not moment.off]
+    near = [moment for moment in _asked_moments(target) if abs(moment.time - time) <= reach]
     if near:
         return min(near, key=lambda moment: abs(moment.time - time))
     span = lanes.span_at(target, time)
@@ -199,9 +184,10 @@ def _nudge(context, target, found: PlacedMoment, clock: Clock, step: int) -> str
 
 
 def _next_moment(context: bpy.types.Context, step: int) -> str:
-    target, clock = _subject(context)
+    target = subject.subject(context)
+    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)
-    ahead = [m for m in (lanes.moments(target) if target else ()) if step * (m.time - time) > 0.75 / clock.fps]
+    ahead = [moment for moment in _asked_moments(target) if step * (moment.time - time) > 0.75 / clock.fps]
     if not ahead:
         return "no key moment " + ("after" if step > 0 else "before") + " this one"
     moment = min(ahead, key=lambda m: step * m.time)
@@ -218,10 +204,13 @@ def _show(context: bpy.types.Context, moment: PlacedMoment, clock: Clock) -> Non
 
 
 def _next_player(context: bpy.types.Context, step: int) -> str:
+    """The neighbour in the list becomes active, his dot selected where that can be, so that the NLA editor shows it."""
     settings = context.scene.beyond_mocap
-    count = len(settings.players)
-    if count:
-        settings.active_player = min(max(settings.active_player + step, 0), count - 1)
+    if not settings.players:
+        return "no player"
+    settings.active_player = min(max(settings.active_player + step, 0), len(settings.players) - 1)
+    if context.mode == "OBJECT":
+        subject.show(context, settings.players[settings.active_player])
     return name_of(context)
 
 

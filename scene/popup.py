@@ -65,8 +65,8 @@ class Box:
         return "" if _inside(self.box, x, y) else None
 
 
-def content(state: State, who: str, told: str = "") -> Content:
-    """What the menu says in a state; told: what was done last."""
+def content(state: State, who: str, told: str = "", folded: bool = False) -> Content:
+    """What the menu says in a state. told: what was done last; folded: no list before a first word is chosen."""
     rows = tuple(
         Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.instead)}" if option.instead else "",
             option.word, not option.served, option.chosen)
@@ -76,7 +76,8 @@ def content(state: State, who: str, told: str = "") -> Content:
     if not state.trail:
         begun = [f"in {state.start:.2f} s, O: out"] if state.start is not None else ["I in  O out"]
         hints = "   ".join([*begun, *more, "Esc leave"])
-        return Content(f"{who}: key moment at the playhead", rows, (hints, told) if told else (hints,))
+        shown = () if folded else rows
+        return Content(f"{who}: key moment at the playhead", shown, (hints, told) if told else (hints,))
     walk = state.walk
     when = f"{state.time:.2f} s" if walk.kind == "moment" else f"{state.start:.2f} to {state.end:.2f} s"
     head = f"{who}: {' '.join(walk.words) or '...'}   {when}"
@@ -100,7 +101,7 @@ def laid_out(
     lines = 1 + len(content.foot)
     per_column = max(1, int((free[3] - free[1] - 2 * edge) / row) - lines)
     columns = max(1, -(-len(content.rows) // per_column))
-    tallest = -(-len(content.rows) // columns)
+    tallest = -(-len(content.rows) // columns) if content.rows else 0
     column = math.ceil(key + text + note + (gap if columns > 1 else 0.0))
     wide = math.ceil(max([columns * column, width_of(content.head), *map(width_of, content.foot)])) + 2 * edge
     tall = (tallest + lines) * row + 2 * edge

@@ -264,6 +264,15 @@ def test_the_menu_lies_within_the_editor_and_no_row_on_another(room, at, free, p
     assert box.word_at(box.box[2] + 5, box.box[1]) is None
 
 
+def test_the_list_in_the_corner_can_be_folded(room):
+    popup, core = room("popup"), import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
+    folded = popup.content(core.State(), "me", folded=True)
+    assert folded.rows == () and popup.content(core.State(), "me").rows
+    assert popup.content(core.press(core.State(), "2", core.Now(1.0))[0], "me", folded=True).rows
+    box = popup.laid_out(folded, None, (0, 0, 800, 600), 14.0, lambda text: 7.0 * len(text))
+    assert box.box[3] - box.box[1] < 100
+
+
 def test_a_word_that_the_library_lacks_is_faint_with_the_nearest(room):
     popup, core = room("popup"), import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
     held = import_module(f"{EXTENSION}.beyond_mocap.annotation.decision").Held((frozenset({"jump", "high"}),), ())
