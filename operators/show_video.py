@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene import areas
 from ..scene.video import drive
 from .verb import Verb
 
@@ -28,10 +29,7 @@ class BEYOND_MOCAP_OT_show_video(Verb, bpy.types.Operator):
 
 def beside(context: bpy.types.Context, clip: bpy.types.MovieClip) -> None:
     """Show the clip in a clip editor: one that is open, else the left half of the largest 3D view, else nowhere."""
-    window = context.window
-    if bpy.app.background or window is None:
-        return
-    area = _largest(window.screen, "CLIP_EDITOR") or _split(context, window)
+    area = areas.editor(context, "CLIP_EDITOR", "VERTICAL", 0.45)
     if area is None:
         return
     space = area.spaces.active
@@ -42,21 +40,3 @@ def beside(context: bpy.types.Context, clip: bpy.types.MovieClip) -> None:
             setattr(space, part, False)
     space.lock_selection = False
     area.tag_redraw()
-
-
-def _split(context: bpy.types.Context, window: bpy.types.Window) -> bpy.types.Area | None:
-    """A new clip editor in the left half of the largest 3D view."""
-    view = _largest(window.screen, "VIEW_3D")
-    if view is None:
-        return None
-    before = {area.as_pointer() for area in window.screen.areas}
-    with context.temp_override(window=window, area=view, region=view.regions[-1]):
-        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.45)
-    halves = [area for area in window.screen.areas if area.as_pointer() not in before] or [view]
-    new = min((*halves, view), key=lambda area: area.x)
-    new.type = "CLIP_EDITOR"
-    return new
-
-
-def _largest(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
-    return max((area for area in screen.areas if area.type == kind), key=lambda a: a.width * a.height, default=None)

@@ -119,6 +119,7 @@ ROWS = {
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
+    "show_timeline": Row("imported", changes=False),
     "show_video": Row("video", changes=False),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
     "synthesize": Row("imported"),

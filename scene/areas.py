@@ -1,0 +1,35 @@
+"""Editors of the window: one that is open, or a part of the largest 3D view made into one."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
+    """The largest editor of a kind (an area's type); where there is none, the left or lower part of the largest 3D view
+    becomes one.
+
+    direction: "VERTICAL" splits into left and right, "HORIZONTAL" into below and above; factor: the new editor's share.
+    None without a window, or where the screen has no 3D view to split.
+    """
+    window = context.window
+    if bpy.app.background or window is None:
+        return None
+    return _largest(window.screen, kind) or _split(context, window, kind, direction, factor)
+
+
+def _split(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
+    view = _largest(window.screen, "VIEW_3D")
+    if view is None:
+        return None
+    before = {area.as_pointer() for area in window.screen.areas}
+    with context.temp_override(window=window, area=view, region=view.regions[-1]):
+        bpy.ops.screen.area_split(direction=direction, factor=factor)
+    halves = [area for area in window.screen.areas if area.as_pointer() not in before]
+    new = min((*halves, view), key=lambda area: area.x if direction == "VERTICAL" else area.y)
+    new.type = kind
+    return new
+
+
+def _largest(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
+    return max((area for area in screen.areas if area.type == kind), key=lambda a: a.width * a.height, default=None)
