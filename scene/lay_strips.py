@@ -112,6 +112,7 @@ def change_moment(target: bpy.types.Object, strip_name: str, index: int, key: Ke
 
 def pick(target: bpy.types.Object, strip_name: str, index: int) -> None:
     """Let this key moment be the only picked one; an empty name picks none."""
+    check_editable(target)
     for _, strip in strips(target):
         markers = strip.action.pose_markers
         for number, marker in enumerate(markers):

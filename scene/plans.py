@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from ..beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
+from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion.track import Track, clean
 from ..beyond_mocap.plan import Plan, gait_choices
 from . import strips
 from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 from .tracks import read_track
+from .written import written_in, written_words
 
 
 def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
@@ -51,23 +52,6 @@ def timeline_of(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline
     return written_words(player, fps, track) if asked is None else asked
 
 
-def written_words(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
-    """The words of the player's text or file, as they are before they become strips; fps: of times in frames."""
-    start = float(track.times[0])
-    if player.annotation_text is not None:
-        return parse_timeline(player.annotation_text.as_string(), written_in(player), fps, start)
-    if player.annotation_file:
-        return read_timeline(written_in(player), fps, start)
-    return Timeline()
-
-
 def words_from(player: BeyondMocapPlayer) -> str:
     """Where the words that count are written, for messages."""
     return written_in(player) if strips.dot_of(player, player.id_data) is None else strips.where(player)
-
-
-def written_in(player: BeyondMocapPlayer) -> str:
-    """The text or file with the player's words, for messages."""
-    if player.annotation_text is not None:
-        return f"text {player.annotation_text.name}"
-    return absolute(player.annotation_file) or f"player {player.name}"

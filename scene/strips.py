@@ -11,6 +11,8 @@ from .clock import Clock, of_scene
 from .lanes import PlacedMoment, PlacedSpan
 from .settings import BeyondMocapPlayer
 from .strip_lines import said
+from .tracks import read_track
+from .written import written_words
 
 
 def read(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> Timeline | None:
@@ -91,12 +93,12 @@ def where(player: BeyondMocapPlayer) -> str:
 
 
 def with_lanes(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
-    """The dot, its lane of key moments as long as the track."""
-    dot = dots.ensure(context, player)
-    if not lanes.has(dot):
-        clock = of_scene(context.scene)
-        lay_strips.write(dot, Timeline(), clock, _extent(dot, clock))
-    return dot
+    """The player's dot; where it has no lanes yet, it gets them with the words of his text or file, so that none is
+    lost. InputError where track or words cannot be read."""
+    if dot_of(player, context.scene) is None:
+        settings = context.scene.beyond_mocap
+        write(context, player, written_words(player, settings.rate, read_track(settings, player)))
+    return player.dot
 
 
 def _extent(dot: bpy.types.Object, clock: Clock) -> tuple[float, float] | None:

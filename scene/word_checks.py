@@ -35,20 +35,20 @@ def built(scene: bpy.types.Scene):
     return session.library(folder, settings.library_unit or None) if folder else None
 
 
-def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment) -> list[str]:
+def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True) -> list[str]:
     """What is wrong with one span or key moment: words out of the vocabulary, and words of key moments that the built
-    library does not have, with the nearest that it has."""
+    library does not have, with the nearest that it has. asked: of a player; what a clip shows need not be there yet."""
     library = built(scene)
     timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
     found = [_short(error) for error in problems(timeline, library.words if library else ())]
-    if library is not None and isinstance(item, KeyMoment) and not found:
+    if asked and library is not None and isinstance(item, KeyMoment) and not found:
         found += _missing(scene, timeline, library)
     return found
 
 
 def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
     """(frame, line) for everything that is wrong with an object's strips, in time order."""
-    found, timeline = [], []
+    found, timeline, asked = [], [], bool(target.beyond_mocap_dot.player)
     clock, where = lanes.written_for(target), name_of(target)
     for track, strip in lanes.strips(target):
         if strip.mute or track.mute:
@@ -60,8 +60,10 @@ def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int
                 frame = lanes.marker_frame(strip, marker)
                 found += _readable(timeline, marker.name, frame, lambda: key_of(marker, frame, clock, where))
     for frame, item in timeline:
-        found += [(frame, line) for line in lines_for(scene, item)]
-    return sorted(found + _together(target, [item for _, item in timeline]))
+        found += [(frame, line) for line in lines_for(scene, item, asked)]
+    if asked:  # what a clip shows may overlap: a kick within a run
+        found += _together(target, [item for _, item in timeline])
+    return sorted(found)
 
 
 def keep(context: bpy.types.Context) -> None:

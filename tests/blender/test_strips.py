@@ -221,6 +221,19 @@ def test_bad_words_do_not_keep_the_track_out(room, tmp_path, player):
     assert room("plans").words_from(second).endswith("player1.txt")
 
 
+def test_a_first_strip_does_not_put_the_words_of_a_file_out_of_force(room, player):
+    """As in a file of the time before strips."""
+    for track in list(player.dot.animation_data.nla_tracks):
+        player.dot.animation_data.nla_tracks.remove(track)
+    player.dot.beyond_mocap_lanes.clock = ""
+    strips, scene = room("strips"), bpy.context.scene
+    assert strips.read(player, scene) is None
+    strips.add_span(bpy.context, player, 8.0, 9.0, ("walking", "-dribble"))
+    asked = strips.read(player, scene)
+    assert [span.words for span in asked.spans] == [("running",), ("walking",)] and len(asked.keys) == 1
+    assert asked.spans[1].avoid == ("dribble",)
+
+
 def test_the_track_is_read_once(room, tmp_path, player, monkeypatch):
     tracks = room("tracks")
     monkeypatch.setattr(tracks.tracking, "read_track_csv", lambda path: pytest.fail("read again"))
