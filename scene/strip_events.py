@@ -23,16 +23,16 @@ DELAY = 0.1  # seconds after an edit
 UNDER_WAY = ("TRANSFORM_OT_", "NLA_OT_", "ACTION_OT_", "ANIM_OT_", "MARKER_OT_")  # what must come to its end first
 
 
-def put_in_order(scene: bpy.types.Scene) -> bool:
+def put_in_order(scene: bpy.types.Scene, only: set[str] | None = None) -> bool:
     """All strips of the scene; those of players are laid anew where the scene's clock has changed. Whether anything
-    was to be done."""
+    was to be done. only: names of the objects that may have changed; all where None."""
     clock, changed = of_scene(scene), False
     for player in scene.beyond_mocap.players:
         if player.dot is not None and _ours_to_change(player.dot):
             changed |= dots.relay(player.dot, clock)
             changed |= has(player.dot) and relay(player.dot, clock)
     for target in scene.objects:
-        if has(target) and _ours_to_change(target):
+        if (only is None or target.name in only) and has(target) and _ours_to_change(target):
             changed |= tidy(target)
     return changed
 
@@ -40,9 +40,7 @@ def put_in_order(scene: bpy.types.Scene) -> bool:
 def tidy(target: bpy.types.Object) -> bool:
     """The strips of one object; whether anything was to be done. A name that is no words is left for the user to see."""
     clock, changed = written_for(target), _name_lanes(target)
-    for track, strip in list(strips(target)):
-        if strip not in list(track.strips):  # within a meta strip, where no strip can be put elsewhere
-            continue
+    for track, strip in _outermost(target):
         if strip.action.beyond_mocap.kind == "moments":
             changed |= _tidy_moments(strip, clock, target.name)
             continue
@@ -55,6 +53,13 @@ def tidy(target: bpy.types.Object) -> bool:
             _renew(target, track, strip, span, clock)
             changed = True
     return changed | _onto_frames(target, clock)
+
+
+def _outermost(target: bpy.types.Object) -> list:
+    """(track, strip) of a timeline but for those within meta strips, where no strip can be put elsewhere."""
+    within = [inner for track in target.animation_data.nla_tracks for top in track.strips if top.type == "META"
+              for inner in top.strips]
+    return [(track, strip) for track, strip in strips(target) if not within or strip not in within]
 
 
 def _ours_to_change(target: bpy.types.Object) -> bool:
@@ -197,41 +202,59 @@ def _drop(action: bpy.types.Action) -> None:
         bpy.data.actions.remove(action)
 
 
-def _soon() -> None:
-    """Put the strips in order a moment later; without a window nothing happens by itself."""
-    if not bpy.app.background and not bpy.app.timers.is_registered(_later):
+def _soon(names: set[str] | None) -> None:
+    """Put the strips of these objects (None: all) in order a moment later; without a window nothing happens by
+    itself."""
+    global _waiting
+    if bpy.app.background:
+        return
+    _waiting = None if names is None or _waiting is None else _waiting | names
+    if not bpy.app.timers.is_registered(_later):
         bpy.app.timers.register(_later, first_interval=DELAY, persistent=True)
 
 
 def _later():
     """The timer: waits while the user is still dragging."""
+    global _waiting
     running = [operator.bl_idname for window in bpy.context.window_manager.windows for operator in window.modal_operators]
     if any(name.startswith(UNDER_WAY) for name in running):
         return DELAY
-    if put_in_order(bpy.context.scene):
+    names, _waiting = _waiting, set()
+    if put_in_order(bpy.context.scene, names):
         moment_names.redraw(bpy.context)
     word_checks.keep(bpy.context)
     return None
 
 
 @persistent
-def _changed(scene, depsgraph):
-    """An object with lanes, an action or a scene has changed."""
+def _changed(_scene, depsgraph):
+    """An object with lanes, one of our actions or the scene's clock may have changed."""
+    names, wanted = set(), False
     for update in depsgraph.updates:
-        thing = update.id
-        if isinstance(thing, (bpy.types.Action, bpy.types.Scene)) or (
-            isinstance(thing, bpy.types.Object) and thing.original.beyond_mocap_lanes.clock
-        ):
-            _soon()
-            return
+        thing = update.id.original
+        if isinstance(thing, bpy.types.Action) and thing.beyond_mocap.kind != "none":
+            return _soon(None)
+        if isinstance(thing, bpy.types.Object) and thing.beyond_mocap_lanes.clock:
+            names.add(thing.name)
+        wanted |= isinstance(thing, bpy.types.Scene) and (_other_clock(thing) or word_checks.out_of_date(thing))
+    if names or wanted:
+        _soon(names)
+
+
+def _other_clock(scene: bpy.types.Scene) -> bool:
+    """Whether a player's strips stand on the frames of another clock than the scene's."""
+    clock = of_scene(scene).spelled()
+    return any(player.dot is not None and player.dot.beyond_mocap_lanes.clock not in ("", clock)
+               for player in scene.beyond_mocap.players)
 
 
 @persistent
 def _restored(*_):
     """Undo, redo or a file has brought back strips as they were."""
-    _soon()
+    _soon(None)
 
 
+_waiting: set[str] | None = set()
 HANDLERS = (("depsgraph_update_post", _changed), ("undo_post", _restored), ("redo_post", _restored), ("load_post", _restored))
 
 

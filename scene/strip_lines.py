@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import lru_cache
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
@@ -25,6 +26,7 @@ KINDS = (
     ("moments", "Moments", "The lane of key moments"),
     ("moment", "Moment", "A key moment"),
 )
+KEPT = 8192  # lines that are remembered as read: all of a match, since strips are read after every edit
 _MOST_BLANKS = 24
 _NEAR = 1.0 - 1e-3  # frames; what was moved by less still stands where its line says
 
@@ -43,6 +45,7 @@ def frames_of(span: Span, clock: Clock) -> tuple[int, int]:
     return first, max(first + 1, clock.whole(span.end))
 
 
+@lru_cache(maxsize=KEPT)
 def line_of(item: Span | KeyMoment) -> str:
     """The line of the text form that says this, exactly."""
     timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
@@ -66,6 +69,8 @@ def span_of(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
         end = kept.end if abs(strip.frame_end - was[1]) < _NEAR else end
     if kept is None or base_name(strip.name) != base_name(record.shown):
         kept = _parsed("0 1", strip.name, f"{where}, strip on frame {first}").spans[0]
+    elif (start, end) == (kept.start, kept.end):
+        return kept
     return replace(kept, start=start, end=end, line=None)
 
 
@@ -73,12 +78,14 @@ def key_of(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: st
     """The key moment that a marker shown on scene frame `frame` stands for; InputError as `span_of`."""
     record, kept = marker.beyond_mocap, None
     if record.line:
-        kept = parse_timeline(record.line).keys[0]
+        kept = _kept(record.line)
     on_time = kept is not None and clock.whole(kept.time) == frame
     time = kept.time if on_time else clock.seconds(frame)
     if kept is None or marker.name != record.shown:
         place = f"{where}, key moment on frame {frame}"
         kept = _parsed("0", marker.name, place).keys[0]
+    elif on_time:
+        return kept
     return replace(kept, time=time, line=None)
 
 
@@ -92,7 +99,7 @@ def said(text: str, start: float, end: float | None = None, where: str = "words"
 def recorded_span(action: bpy.types.Action) -> Span | None:
     """The span that an action was written for, None where it was not written by us."""
     line = action.beyond_mocap.line
-    return replace(parse_timeline(line).spans[0], line=None) if line else None
+    return _kept(line) if line else None
 
 
 def remember(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
@@ -116,6 +123,13 @@ def tell(marker: bpy.types.TimelineMarker, key: KeyMoment, frame: int) -> None:
 def base_name(name: str) -> str:
     """A strip's name without what keeps it apart from others: "running" of "running  " and "running.001"."""
     return re.sub(r"\.\d{3,}$", "", name).rstrip()
+
+
+@lru_cache(maxsize=KEPT)
+def _kept(line: str) -> Span | KeyMoment:
+    """What a kept line says."""
+    found = parse_timeline(line)
+    return replace((*found.spans, *found.keys)[0], line=None)
 
 
 def _parsed(times: str, name: str, place: str) -> Timeline:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import bpy
 
 from ..beyond_mocap.annotation import KeyMoment, Span, Timeline, missing_keys, problems
 from ..beyond_mocap.errors import InputError
 from . import lanes, session
 from .settings import absolute
-from .strip_lines import base_name, key_of, span_of
+from .strip_lines import KEPT, base_name, key_of, span_of
 from .subject import name_of
 
 
@@ -39,11 +41,10 @@ def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True
     """What is wrong with one span or key moment: words out of the vocabulary, and words of key moments that the built
     library does not have, with the nearest that it has. asked: of a player; what a clip shows need not be there yet."""
     library = built(scene)
-    timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
-    found = [_short(error) for error in problems(timeline, library.words if library else ())]
-    if asked and library is not None and isinstance(item, KeyMoment) and not found:
-        found += _missing(scene, timeline, library)
-    return found
+    unknown = _unknown(item, library.words if library else frozenset())
+    if asked and library is not None and isinstance(item, KeyMoment) and not unknown:
+        return _missing(scene, Timeline((), (item,)), library)
+    return list(unknown)
 
 
 def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
@@ -68,6 +69,8 @@ def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int
 
 def keep(context: bpy.types.Context) -> None:
     """Work the lines out anew for every timeline of the scene; for the panel, which only shows them."""
+    global _known
+    _known = _library_of(context.scene)
     found = [(target.name, *line) for target in context.scene.objects if lanes.has(target)
              for line in lines_of(context.scene, target)]
     kept = context.window_manager.beyond_mocap_problems.lines
@@ -79,6 +82,13 @@ def keep(context: bpy.types.Context) -> None:
         one.target, one.frame, one.line = target, frame, line
 
 
+@lru_cache(maxsize=KEPT)
+def _unknown(item: Span | KeyMoment, words: frozenset[str]) -> tuple[str, ...]:
+    """What is wrong with the words themselves; words: the library's own."""
+    timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
+    return tuple(str(error).removeprefix(f"{error.where}: ") for error in problems(timeline, words))
+
+
 def _readable(timeline: list, name: str, frame: float, read) -> list[tuple[int, str]]:
     """Adds what a strip or marker says to `timeline`; a line where its name cannot be read."""
     try:
@@ -86,6 +96,19 @@ def _readable(timeline: list, name: str, frame: float, read) -> list[tuple[int, 
         return []
     except InputError:
         return [(round(frame), f"'{base_name(name)}': words have no numbers and no '#'; rename it")]
+
+
+def out_of_date(scene: bpy.types.Scene) -> bool:
+    """Whether another library has been chosen or built since the lines were worked out."""
+    return _known != _library_of(scene)
+
+
+def _library_of(scene: bpy.types.Scene) -> tuple:
+    settings = scene.beyond_mocap
+    return settings.library_folder, settings.library_holds, settings.mirror
+
+
+_known: tuple = ()
 
 
 def _together(target: bpy.types.Object, items: list) -> list[tuple[int, str]]:
@@ -111,8 +134,3 @@ def _missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
         offers = ", ".join(f"'{' '.join(words)}'" for words in nearest)
         lines.append(f"the library has no '{' '.join(key.words)}'; nearest: {offers or 'nothing'}")
     return lines
-
-
-def _short(error: InputError) -> str:
-    """An error without the place in front, which the list shows by itself."""
-    return str(error).removeprefix(f"{error.where}: ")
