@@ -13,6 +13,8 @@ from . import (
     add_stage,
     annotate,
     annotate_clip,
+    bake_to_rig,
+    bone_map,
     build_library,
     cancel,
     choose_player,
@@ -24,6 +26,7 @@ from . import (
     export_bvh,
     export_words,
     go_to_moment,
+    export_motion,
     import_clip,
     import_clips,
     import_tracking,
@@ -113,6 +116,15 @@ CLASSES = (
     remove_video.BEYOND_MOCAP_OT_remove_video,
     jump_to.BEYOND_MOCAP_OT_jump_to,
     error_curves.BEYOND_MOCAP_OT_error_curves,
+    bone_map.BEYOND_MOCAP_OT_map_bones,
+    bone_map.BEYOND_MOCAP_OT_keep_bone_map,
+    bone_map.BEYOND_MOCAP_OT_save_bone_map,
+    bone_map.BEYOND_MOCAP_OT_load_bone_map,
+    bone_map.BEYOND_MOCAP_OT_use_selected_rig,
+    bake_to_rig.BEYOND_MOCAP_OT_bake_to_rig,
+    bake_to_rig.BEYOND_MOCAP_OT_unbake,
+    bake_to_rig.BEYOND_MOCAP_OT_reduce_keys,
+    export_motion.BEYOND_MOCAP_OT_export_motion,
 )
 
 

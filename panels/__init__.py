@@ -6,7 +6,7 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, library, menus, players, preferences, presets, quality, result, synthesis, timeline, video, view,
+    annotate, library, menus, players, preferences, presets, quality, result, rig, synthesis, timeline, video, view,
 )
 
 CLASSES = (
@@ -25,6 +25,8 @@ CLASSES = (
     timeline.BEYOND_MOCAP_MT_choose_player,
     timeline.BEYOND_MOCAP_PT_timeline,
     timeline.BEYOND_MOCAP_PT_timeline_dope_sheet,
+    rig.BEYOND_MOCAP_UL_bones,
+    rig.BEYOND_MOCAP_PT_rig,
     preferences.BeyondMocapPreferences,
 )
 

@@ -18,6 +18,9 @@
 - `view_settings`, `overlays`   what is drawn over the 3D view; `quality`, `error_curves` what a report says, in the file
 - `background`  long work in a thread; `queue`, `orders` which player is made next, and of what
 - `freshness`   what is out of date; `hand_keys` what of a result is the user's; `variants`, `stretch` other solutions
+- `rig`, `bone_maps`, `rig_controls`, `rig_bake`, `rig_copy`   a motion onto somebody's own rig, by a map of its bones
+- `key_reduction`   keys that curves do not need are left out
+- `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
 The classes are registered in the order of CLASSES: what others point to comes first.
@@ -26,8 +29,8 @@ The classes are registered in the order of CLASSES: what others point to comes f
 import bpy
 
 from . import (
-    background, clips, dots, freshness, lanes, migrate, moment_names, overlays, result, session, settings, strip_events,
-    strip_lines, video, view_settings, watch, word_checks,
+    background, clips, dots, freshness, lanes, migrate, moment_names, overlays, result, rig, session, settings,
+    strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
 
 CLASSES = (
@@ -40,6 +43,8 @@ CLASSES = (
     dots.BeyondMocapDot,
     word_checks.BeyondMocapProblem,
     word_checks.BeyondMocapProblems,
+    rig.BeyondMocapRigBone,
+    rig.BeyondMocapRig,
     settings.BeyondMocapPlayer,
     settings.BeyondMocapSettings,
     settings.BeyondMocapWork,

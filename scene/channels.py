@@ -25,9 +25,9 @@ def animate(
 ):
     """Give `target` a new action `name` and return it.
 
-    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n)). generated:
-    whether the keys are to be told from hand-made ones by their type. The action that was there before is kept in the
-    file.
+    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for one
+    key on the first frame). generated: whether the keys are to be told from hand-made ones by their type. The action that
+    was there before is kept in the file.
     """
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type=target.id_type, name=target.name)
@@ -36,14 +36,15 @@ def animate(
     keys[:, 0] = frames
     linear = np.full(len(frames), LINEAR, np.int32)
     for path, (group, values) in channels.items():
+        count = len(values)
         for index in range(values.shape[1]):
-            keys[:, 1] = values[:, index]
+            keys[:count, 1] = values[:, index]
             points = (curve := _new_curve(bag, path, index, group)).keyframe_points
-            points.add(len(frames))
-            points.foreach_set("co", keys.ravel())
-            points.foreach_set("interpolation", linear)
+            points.add(count)
+            points.foreach_set("co", keys[:count].ravel())
+            points.foreach_set("interpolation", linear[:count])
             if generated:
-                points.foreach_set("type", np.full(len(frames), GENERATED, np.int32))
+                points.foreach_set("type", np.full(count, GENERATED, np.int32))
             curve.update()
     assign(target, action, slot)
     return action

@@ -6,14 +6,12 @@ open is asked for, since a command has nothing open that it could lose.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import bpy
 
-from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.take import Take
-from . import action, armature, bake, ball, body
+from . import action, armature, bake, ball, body, export
 
 NAME = "Player"
 SHIRT = (0.75, 0.05, 0.06)
@@ -22,15 +20,7 @@ SHIRT = (0.75, 0.05, 0.06)
 def write(take: Take, out: Path) -> None:
     """Write a take to `out` in the form that its suffix names; beside it first, then renamed."""
     stage(take)
-    beside = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
-    try:
-        EXPORTERS[out.suffix.lower()](str(beside))
-        os.replace(beside, out)
-    except (RuntimeError, AttributeError) as error:  # what operators raise: trouble while writing; a disabled exporter
-        found, expected = f"this Blender could not write it ({error})", "an exporter that it has, and a place to write"
-        raise InputError(out, found, expected, "choose another ending or place") from None
-    finally:
-        beside.unlink(missing_ok=True)
+    export.saved(out, EXPORTERS[out.suffix.lower()])
 
 
 def stage(take: Take) -> None:
@@ -54,17 +44,10 @@ def _blend(path: str) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False)
 
 
-def _fbx(path: str) -> None:
-    bpy.ops.export_scene.fbx(filepath=path, add_leaf_bones=False, bake_anim_simplify_factor=0.0, check_existing=False)
+def _by(format: str):
+    """The exporter of a format for all that is in the file, axes as Blender's exporters have them."""
+    return lambda path: export.EXPORTERS[format](path, "BLENDER", False)
 
 
-def _glb(path: str) -> None:
-    bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", export_frame_range=True, check_existing=False)
-
-
-def _usd(path: str) -> None:
-    bpy.ops.wm.usd_export(filepath=path, export_animation=True, check_existing=False)
-
-
-EXPORTERS = {".blend": _blend, ".fbx": _fbx, ".glb": _glb, ".usdc": _usd}
+EXPORTERS = {".blend": _blend, ".fbx": _by("FBX"), ".glb": _by("GLB"), ".usdc": _by("USD")}
 WRITERS = dict.fromkeys(EXPORTERS, write)

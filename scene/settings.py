@@ -15,6 +15,7 @@ from bpy.props import (
 from .result import BeyondMocapResult, BeyondMocapShared
 from .video import BeyondMocapVideo, renew
 from .view_settings import BeyondMocapView
+from .rig import BeyondMocapRig
 
 METHODS = (
     ("path", "On the path", "The player's body is laid on the track, with the sway of the clips kept"),
@@ -78,6 +79,10 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
         name="Body", type=bpy.types.Object, poll=is_armature,
         description="The armature that this player's takes are shown on; made where it is missing",
     )
+    rig: PointerProperty(
+        name="Rig", type=bpy.types.Object, poll=is_armature,
+        description="This player's own rig for Bake to Rig with all players; a copy of the chosen rig where it is empty",
+    )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
     moments: StringProperty(
@@ -95,6 +100,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     version: IntProperty(
         name="Version", options={"HIDDEN"}, description="Form of what is kept here, see scene/migrate.py; 0: not saved yet"
     )
+    rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Folder of BVH clips with their annotations; may be relative to this file",

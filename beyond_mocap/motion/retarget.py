@@ -9,7 +9,8 @@ other lengths share the bend by arc length. Then size: everything on the ground 
 
 for the middle between the hip joints and for both ankles, which the target's legs reach by two-bone inverse kinematics
 with the knees pointing where the source's point. Travel is scaled with the legs, so a foot that stands still goes on
-standing still. Joints that a skeleton lacks go with the segment that carries them.
+standing still; where places count (a pitch, a ball) travel is kept instead, x' = x, and the legs take longer or shorter
+steps than their own. Joints that a skeleton lacks go with the segment that carries them.
 """
 
 from __future__ import annotations
@@ -68,11 +69,14 @@ class Retargeter:
         example: Motion | None = None,
         standing: np.ndarray | None = None,
         example_standing: np.ndarray | None = None,
+        keeps_travel: bool = False,
     ):
         """sample: frames of the recordings (their order does not matter); the others as in `retarget`.
 
-        standing, example_standing (T, 2) bool: feet on the ground in `sample` and in `example`.
+        standing, example_standing (T, 2) bool: feet on the ground in `sample` and in `example`. keeps_travel: footprints
+        and the way over the ground stay where they are, whatever the legs' length.
         """
+        self.keeps_travel = keeps_travel
         self.pairs = pair(sample, skeleton, bone_map, example)
         self.source = study(sample.skeleton, self.pairs.source, sample, standing)
         same = _same_rig(sample.skeleton, skeleton) if example is None else sample.skeleton.same_bones(skeleton)
@@ -82,7 +86,7 @@ class Retargeter:
 
     def carry(self, motion: Motion) -> Motion:
         """`motion`, a recording of the sample's skeleton, on the other skeleton."""
-        return _Transfer(motion, self.source, self.target, self.pairs).motion()
+        return _Transfer(motion, self.source, self.target, self.pairs, self.keeps_travel).motion()
 
 
 def _same_rig(a: Skeleton, b: Skeleton) -> bool:
@@ -97,10 +101,11 @@ def _same_rig(a: Skeleton, b: Skeleton) -> bool:
 class _Transfer:
     """One motion on its way from `source` to `target`."""
 
-    def __init__(self, motion: Motion, source: Anatomy, target: Anatomy, pairs: Pairs):
+    def __init__(self, motion: Motion, source: Anatomy, target: Anatomy, pairs: Pairs, keeps_travel: bool = False):
         self.fps, self.source, self.target, self.pairs = motion.fps, source, target, pairs
         self.places, self.world = forward_kinematics(motion)
         self.scale = target.leg / source.leg
+        self.travel = 1.0 if keeps_travel else self.scale
         soles = [self.places[:, side.foot, 2] - source.ankle for side in self._limbs(source)]
         soles += [self.places[:, side.toe, 2] - source.ball for side in self._limbs(source) if side.toe is not None]
         self.floor = float(np.percentile(np.min(soles, axis=0), 2))
@@ -199,7 +204,7 @@ class _Transfer:
         """Source positions (T, 3) at the target's size."""
         ground = self.floor + self.source.ankle
         heights = self.floor + self.target.ankle + self.scale * (positions[:, 2] - ground)
-        return np.column_stack([self.scale * positions[:, :2], heights])
+        return np.column_stack([self.travel * positions[:, :2], heights])
 
     def _root(self, world: np.ndarray) -> np.ndarray:
         """Where the target's root is, (T, 3): its hip joints' middle stands where the source's does."""
