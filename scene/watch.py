@@ -22,22 +22,34 @@ _look: dict = {}  # the thread that is looking, and what it saw
 
 
 def look(folder: str) -> dict[str, tuple[int, int]] | None:
-    """All recordings and words below a folder: path -> (size, time of change in ns); None where there is no folder."""
-    from ..beyond_mocap.errors import InputError
-    from ..beyond_mocap.library.converted import FOREIGN
-    from ..beyond_mocap.library.scan import find_recordings
+    """All recordings and words below a folder: path -> (size, time of change in ns); None where there is no folder.
 
-    try:
-        paths = find_recordings(folder, (".bvh", ".txt", "annotations.csv", *FOREIGN))
-    except (InputError, OSError):
-        return None if not os.path.isdir(folder) else {}
-    found = {}
-    for path in paths:
+    Plain strings and as few calls as can be, since it shares the interpreter with the window.
+    """
+    from ..beyond_mocap.library.converted import FOREIGN
+    from ..beyond_mocap.library.scan import CACHE_FOLDER, TABLE_NAME
+
+    if not os.path.isdir(folder):
+        return None
+    wanted, found, seen = (".bvh", ".txt", TABLE_NAME, *FOREIGN), {}, set()
+    for here, folders, files in os.walk(folder, followlinks=True):
         try:
-            status = os.stat(path)
+            status = os.stat(here)
         except OSError:
             continue
-        found[os.path.relpath(path, folder)] = (status.st_size, status.st_mtime_ns)
+        if (status.st_dev, status.st_ino) in seen:
+            folders.clear()
+            continue
+        seen.add((status.st_dev, status.st_ino))
+        folders[:] = [name for name in folders if name != CACHE_FOLDER]
+        for name in files:
+            if name.lower().endswith(wanted):
+                path = os.path.join(here, name)
+                try:
+                    status = os.stat(path)
+                except OSError:
+                    continue
+                found[os.path.relpath(path, folder)] = (status.st_size, status.st_mtime_ns)
     return found
 
 

@@ -71,7 +71,8 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
     """The `annotations.csv` files that may speak about `clips`: from each clip's folder up to the library's top, and
     the one in the folder above that, since a library is often one folder of a larger collection."""
     folder = Path(folder)
-    places = {parent for clip in clips for parent in clip.parents if parent == folder or folder in parent.parents}
+    homes = {clip.parent for clip in clips}
+    places = {place for home in homes for place in (home, *home.parents) if place == folder or folder in place.parents}
     places |= {folder, _absolute(folder).parent}
     return sorted(place / TABLE_NAME for place in places if (place / TABLE_NAME).is_file())
 
