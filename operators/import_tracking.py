@@ -96,6 +96,11 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
             entry.annotation_file = as_setting(str(words))
 
 
+def shirt_for(number: int) -> tuple[float, float, float]:
+    """The colour of the player with that number in a list whose players belong to no team."""
+    return SHIRTS[("home", "away")[number % 2]][number // 2 % 2]
+
+
 def free_name(wanted: str, taken: set[str]) -> str:
     """`wanted`, or the first "wanted 2", "wanted 3" ... that is not taken."""
     number, name = 1, wanted

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from ..beyond_mocap.annotation import Timeline
-from ..scene import freshness, preview, quality, session, strips, variants
+from ..scene import dots, freshness, preview, quality, session, strips, variants
 from .build_library import summary
 
 
@@ -24,6 +24,8 @@ def written(context, player, order, result) -> None:
         }
         shown.append((session.keep_take(one.plan, one.take, one.report), lines))
     preview.show(context, player, *shown[0])
+    if player.drawn_track is not None:
+        dots.renew(context, player)
     variants.keep(player, [(name, lines, one.report) for (name, lines), one in zip(shown, result.takes)])
     freshness.dirty()
     show_automatic(context, player)

@@ -13,6 +13,7 @@ CLASSES = (
     library.BEYOND_MOCAP_UL_clips,
     library.BEYOND_MOCAP_PT_library,
     players.BEYOND_MOCAP_UL_players,
+    players.BEYOND_MOCAP_UL_pins,
     players.BEYOND_MOCAP_PT_players,
     annotate.BEYOND_MOCAP_PT_annotate,
     video.BEYOND_MOCAP_PT_video,

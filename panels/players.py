@@ -32,6 +32,9 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         """List of players, and the files of the active one."""
         layout, settings = self.layout, context.scene.beyond_mocap
         layout.operator("beyond_mocap.import_tracking", icon="IMPORT")
+        row = layout.row(align=True)
+        row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
+        row.operator("beyond_mocap.track_object", icon="EMPTY_AXIS")
         row = layout.row()
         row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, "active_player", rows=3)
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
@@ -39,11 +42,15 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
             layout.operator("beyond_mocap.place_players", icon="NLA")
         player = active_player(settings)
         if player is None:
-            paragraph(layout, "Import a file with positions, or drop it into the view", "INFO")
+            paragraph(layout, "Import a file with positions, drop it into the view, or draw a track", "INFO")
             return
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
-        column.prop(player, "tracking_file")
+        column.prop(player, "drawn_track")
+        if player.drawn_track is not None:
+            drawn_on(column, player)
+        else:
+            column.prop(player, "tracking_file")
         if player.feed_id:
             column.prop(player, "feed_id")
             column.prop(settings, "section_start")
@@ -53,3 +60,49 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         file.prop(player, "annotation_file")
         column.prop(player, "annotation_text")
         column.prop(player, "body")
+        own(layout, player)
+        pinned(layout, player)
+
+
+class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
+    """A player's pins: what is held, when and how long."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One pin."""
+        row = layout.row(align=True)
+        row.prop(item, "part", text="", emboss=False)
+        if item.target is None:
+            row.label(text="its Empty is gone", icon="ERROR")
+            return
+        row.prop(item, "time", text="")
+        row.prop(item, "hold", text="")
+
+
+def drawn_on(column, player) -> None:
+    """What belongs to a drawn track."""
+    if player.drawn_track.type == "CURVE":
+        column.prop(player, "drawn_start")
+        column.operator("beyond_mocap.set_speed", icon="DRIVER_DISTANCE")
+
+
+def own(layout, player) -> None:
+    """What is this player's own: height, foot, style."""
+    header, body = layout.panel("beyond_mocap_player_own", default_closed=True)
+    header.label(text="Player")
+    if body:
+        body.use_property_split, body.use_property_decorate = True, False
+        for name in ("height", "strong_foot", "style", "style_weight"):
+            body.prop(player, name)
+
+
+def pinned(layout, player) -> None:
+    """Where hands, feet and gaze have to be."""
+    header, body = layout.panel("beyond_mocap_player_pins", default_closed=True)
+    header.label(text=f"Pins: {len(player.pins)}" if player.pins else "Pins")
+    if body:
+        row = body.row()
+        row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, "active_pin", rows=2)
+        row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")
+        row = body.row(align=True)
+        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Add Pin at Body", icon="PINNED").at = "BODY"
+        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="at Cursor", icon="PIVOT_CURSOR").at = "CURSOR"

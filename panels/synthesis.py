@@ -25,6 +25,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         row.scale_y = 1.3
         row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
+        row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
         self.queue(context)
         header, body = layout.panel("beyond_mocap_synthesis_more", default_closed=True)
         header.label(text="Choices")

@@ -7,7 +7,9 @@
 - `body`, `ball`, `curve`, `stage`, `material`   what is seen
 - `settings`    what the panels show, per scene; `session` what lives as long as Blender runs
 - `preferences` what the user sets once for all files
-- `tracks`, `plans`   the settings as tracks and plans of the core
+- `tracks`, `plans`   the settings as tracks and plans of the core; `drawn_track` curves and moving objects as tracks,
+                `drawn_labels` their speeds in the view; `pins` Empties where hands, feet and gaze have to be
+- `live`        sees that a player's track, pins or strips have been edited, and has him updated
 - `bake`        a take becomes all of that
 - `result`, `preview`, `set_aside`, `blocks`   a take is shown, kept or put away again; as one action or as NLA strips
 - `dots`        an Empty for each player that runs along the track; `clock` its seconds against frames
@@ -29,8 +31,8 @@ The classes are registered in the order of CLASSES: what others point to comes f
 import bpy
 
 from . import (
-    background, clips, dots, freshness, lanes, migrate, moment_names, overlays, result, rig, session, settings,
-    strip_events, strip_lines, video, view_settings, watch, word_checks,
+    background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, result, rig,
+    session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
 
 CLASSES = (
@@ -45,6 +47,7 @@ CLASSES = (
     word_checks.BeyondMocapProblems,
     rig.BeyondMocapRigBone,
     rig.BeyondMocapRig,
+    pins.BeyondMocapPin,
     settings.BeyondMocapPlayer,
     settings.BeyondMocapSettings,
     settings.BeyondMocapWork,
@@ -77,10 +80,14 @@ def register():
     strip_events.register()
     moment_names.register()
     freshness.register()
+    drawn_labels.register()
+    live.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    live.unregister()
+    drawn_labels.unregister()
     freshness.unregister()
     overlays.unregister()
     background.stop()

@@ -55,6 +55,18 @@ def ensure(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.O
     return dot
 
 
+def renew(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+    """Let the dot run along the player's track as that is now, unless somebody has given it other keys."""
+    dot = player.dot
+    action = channels.playing(dot)[0] if dot is not None else None
+    if action is None or not action.get(MARK):
+        return
+    track = read_track(context.scene.beyond_mocap, player)
+    seconds, places = _measured(track.times, track.positions)
+    channels.discard(dot, MARK)
+    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), of_scene(context.scene))
+
+
 def show(player: BeyondMocapPlayer) -> None:
     """Let the dot have its player's name and colour, and remember where he comes from."""
     dot = player.dot

@@ -77,13 +77,13 @@ def _feed(digest, value: Any) -> None:
 def parts(plan: Plan, folder: str, library: str = "") -> dict[str, str]:
     """What a take is made of, each by its fingerprint: the track, the words, the other choices, the library on disk
     (`library`, where its stamp is known)."""
+    return {**parts_of_plan(plan), "library": library or library_stamp(folder)}
+
+
+def parts_of_plan(plan: Plan) -> dict[str, str]:
+    """The same without the library, which takes a walk over the disk."""
     rest = replace(plan, track=None, timeline=Timeline(), library="")
-    return {
-        "track": fingerprint(plan.track),
-        "words": fingerprint(plan.timeline),
-        "choices": fingerprint(rest),
-        "library": library or library_stamp(folder),
-    }
+    return {"track": fingerprint(plan.track), "words": fingerprint(plan.timeline), "choices": fingerprint(rest)}
 
 
 def library_stamp(folder: str) -> str:

@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..beyond_mocap.annotation import validate
 from ..beyond_mocap.errors import InputError, NotInLibrary
 from ..beyond_mocap.plan import Plan
@@ -22,8 +24,9 @@ LIKE = 0.05  # seconds: ends of stretches nearer than that are the same
 
 @dataclass(frozen=True)
 class How:
-    """What is wanted. kind: "whole" a new take; "update" what has changed since the last; "stretch" another solution
-    from second start to end; "variants" as many takes as `count` says, each another solution."""
+    """What is wanted. kind: "whole" a new take; "update" what has changed since the last; "quick" the same, by a narrow
+    search where it has to be made as a whole; "stretch" another solution from second start to end; "variants" as many
+    takes as `count` says, each another solution."""
 
     kind: str = "whole"
     start: float = 0.0
@@ -126,7 +129,9 @@ def _single(order: Order, clips, progress, cancelled, hurry) -> One:
         take = resynthesize(clips, plan, order.before, *asked, anew=Anew(how.start, how.end, used))
         step = {"start": how.start, "end": how.end, "used": [asdict(piece) for piece in used]}
         steps = [*steps, step] if same and steps else None
-    elif how.kind == "update" and order.before is not None:
+    elif how.kind == "quick" and plan.method == "path" and not _same_span(plan, order.before):
+        take, steps = synthesize(clips, plan, progress, cancelled, _AfterFirst(hurry)), None
+    elif how.kind in ("update", "quick") and order.before is not None:
         take = resynthesize(clips, plan, order.before, *asked)
         steps = steps if same else None
     elif how.kind == "update" and same and steps:
@@ -134,6 +139,23 @@ def _single(order: Order, clips, progress, cancelled, hurry) -> One:
     else:
         take, steps = synthesize(clips, plan, *asked), [{}]
     return _judged(clips, plan, take, {"plan": stamp, "steps": steps}, perf_counter() - begun)
+
+
+def _same_span(plan: Plan, before: Take | None) -> bool:
+    """Whether an edit of the take may be made in part: a drawn track that has become longer has to be made as a whole."""
+    old = before.plan.track if before is not None and before.plan is not None else None
+    return old is not None and np.array_equal(plan.track.times[[0, -1]], old.times[[0, -1]])
+
+
+class _AfterFirst:
+    """Says "hurry" from the third question on: a search that is hurried from its second slot on has one to begin with."""
+
+    def __init__(self, hurry):
+        self.asked, self.hurry = 0, hurry
+
+    def __call__(self) -> bool:
+        self.asked += 1
+        return self.asked > 2 or self.hurry()
 
 
 def _variants(order: Order, clips, progress, cancelled, hurry) -> tuple[One, ...]:

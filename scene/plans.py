@@ -6,7 +6,7 @@ from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion.track import Track, clean
 from ..beyond_mocap.plan import Plan, gait_choices
-from . import strips
+from . import pins, strips
 from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 from .tracks import read_track
 from .written import written_in, written_words
@@ -41,6 +41,11 @@ def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> tuple[P
         track_window=settings.track_window,
         root_window=settings.root_window,
         gaits=gait_choices(text for text in settings.gaits.split(";") if text.strip()),
+        pins=pins.read(player.id_data, player),
+        height=player.height,
+        strong_foot=player.strong_foot.replace("any", ""),
+        style=tuple(text.strip() for text in player.style.split(";") if text.strip()),
+        style_weight=player.style_weight,
     )
     return plan, found.warnings
 

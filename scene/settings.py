@@ -12,6 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from .pins import BeyondMocapPin
 from .result import BeyondMocapResult, BeyondMocapShared
 from .video import BeyondMocapVideo, renew
 from .view_settings import BeyondMocapView
@@ -33,6 +34,18 @@ FORMS = (
 def is_armature(_settings, candidate: bpy.types.Object) -> bool:
     """Whether an object may be picked as a player's body."""
     return candidate.type == "ARMATURE"
+
+
+FEET = (
+    ("any", "Any", "Both feet alike"),
+    ("left", "Left", "Key moments that name no side take clips of the left foot"),
+    ("right", "Right", "Key moments that name no side take clips of the right foot"),
+)
+
+
+def is_track(_settings, candidate: bpy.types.Object) -> bool:
+    """Whether an object may be picked as a player's drawn track."""
+    return candidate.type in {"CURVE", "EMPTY", "MESH", "ARMATURE"}
 
 
 def show_on_dot(player, _context) -> None:
@@ -59,6 +72,29 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
         name="ID in the feed", description="Which player of the tracking file this is; empty for a file of one player"
     )
     provider: StringProperty(name="Provider", description="Whose form the tracking file has; empty guesses it")
+    drawn_track: PointerProperty(
+        name="Drawn Track", type=bpy.types.Object, poll=is_track,
+        description="A curve with speeds at its points, or an object that moves; it counts more than the tracking file",
+    )
+    drawn_start: FloatProperty(
+        name="Begins At", default=0.0, unit="TIME_ABSOLUTE", precision=2,
+        description="Second on the clock at which a drawn curve begins; a moving object has its own frames",
+    )
+    height: FloatProperty(
+        name="Height", default=0.0, min=0.0, max=3.0, precision=2,
+        description="Metres that the player is tall; 0: as tall as the library's skeleton",
+    )
+    strong_foot: EnumProperty(name="Strong Foot", items=FEET, default="any", description="For key moments without a side")
+    style: StringProperty(
+        name="Style",
+        description="Words, folders or clips (with * and ?) whose clips are taken rather than others; several with ;",
+    )
+    style_weight: FloatProperty(
+        name="Style Weight", default=0.5, min=0.0, max=10.0, precision=2,
+        description="Metres per second of missed speed that a clip of the style is worth",
+    )
+    pins: CollectionProperty(type=BeyondMocapPin, description="Where hands, feet and gaze have to be, and when")
+    active_pin: IntProperty(name="Pin", min=0, description="The pin that is shown below the list")
     annotation_file: StringProperty(
         name="Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Text file of lines 'START END words' and 'TIME words'; none means automatic locomotion",
@@ -115,6 +151,11 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         "nothing is built by itself",
     )
     library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
+    live: BoolProperty(
+        name="Live",
+        description="Update a player by itself when his drawn track, his pins or his strips have been edited: first "
+        "quickly, then as well as Synthesize does",
+    )
     players: CollectionProperty(type=BeyondMocapPlayer, description="Who is animated, in the order of the list")
     active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
     section_start: FloatProperty(

@@ -1,4 +1,4 @@
-"""Tracking files as players: which players a file has, and the samples of one of them."""
+"""Tracking files as players: which players a file has, and the samples of one of them, or of what is drawn instead."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files import tracking
+from . import drawn_track
 from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 
 if TYPE_CHECKING:
@@ -38,9 +39,12 @@ def players_in(path: str, metadata: str = "", provider: str = "") -> tuple[list[
 
 def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> "Track":
     """The samples of one player, within the section that the settings name where the file is a whole match."""
+    if player.drawn_track is not None:
+        return drawn_track.read(player.id_data, player.drawn_track, player.drawn_start)
     path = absolute(player.tracking_file)
     if not path:
-        raise InputError(f"player {player.name}", "no tracking file", "a file with positions", "choose one in step 2")
+        step = "choose one in step 2, or draw a track"
+        raise InputError(f"player {player.name}", "no tracking file", "a file with positions", step)
     if not player.feed_id:
         return _plain(path)
     match = _match(path, absolute(player.metadata_file), player.provider)
