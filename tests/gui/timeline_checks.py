@@ -271,6 +271,11 @@ def check_a_name_is_dragged_and_put_back_by_escape():
 
 def check_the_tab_in_the_nla_editor():
     yield from begin()
+    with in_nla():
+        bpy.ops.screen.area_split(direction="HORIZONTAL", factor=0.45)
+    yield 0.5
+    with in_nla():
+        bpy.ops.nla.view_all()
     area = nla()
     yield from window.open_tab(area, TAB)
     room("scene.strips").set_automatic(bpy.context, bpy.context.scene.beyond_mocap.players[0], room(
