@@ -13,7 +13,7 @@ from .timeline_verb import WritingVerb
 
 
 class BEYOND_MOCAP_OT_add_span(WritingVerb, bpy.types.Operator):
-    """Add a stretch with words: over the preview range where one is set (Ctrl-P), else one second from the playhead
+    """Add a stretch with words: over the preview range where one is set (P in the editor), else one second from the playhead
 on"""
 
     bl_idname = "beyond_mocap.add_span"

@@ -58,7 +58,9 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         file = column.column()
         file.active = player.annotation_text is None  # the text counts more
         file.prop(player, "annotation_file")
-        column.prop(player, "annotation_text")
+        row = column.row(align=True)
+        row.prop(player, "annotation_text")
+        row.operator("beyond_mocap.read_words", text="", icon="NLA")
         column.prop(player, "body")
         own(layout, player)
         pinned(layout, player)

@@ -26,8 +26,10 @@ In the 3D view press N and choose the tab "Beyond Mocap", then press from top to
   4  Accept           keeps it (Discard puts it away)
 
 Press Space to play.
-The words of the first player are in the text "player1 words" (Text Editor): change them and
-press Synthesize and Accept again.
+What the first player does and when are strips on "player1 dot": open an NLA editor, press N there and
+choose the tab "Beyond Mocap". Drag a strip or a key moment, press Synthesize and Accept again.
+The same words are in the text "player1 words" (Text Editor): after changing it press Words from Text or
+File in that tab.
 """
 
 
@@ -48,6 +50,7 @@ def relative_paths(settings) -> None:
     for player in settings.players:
         player.tracking_file = from_here(player.tracking_file)
         player.annotation_file = from_here(player.annotation_file)
+        player.dot.beyond_mocap_dot.tracking_file = player.tracking_file
 
 
 def open_the_tab(bpy) -> None:

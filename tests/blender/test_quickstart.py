@@ -17,7 +17,8 @@ def test_three_buttons(tmp_path):
     settings = bpy.context.scene.beyond_mocap
     paths = [settings.library_folder]
     paths += [path for player in settings.players for path in (player.tracking_file, player.annotation_file)]
-    assert len(paths) == 5 and all(path.startswith("//") for path in paths)
+    paths += [player.dot.beyond_mocap_dot.tracking_file for player in settings.players]
+    assert len(paths) == 7 and all(path.startswith("//") for path in paths)
     for player in settings.players:
         on_disk = pathlib.Path(bpy.path.abspath(player.annotation_file)).read_text("utf-8")
         assert player.annotation_text.as_string().strip() == on_disk.strip(), "run sample_blend/make_quickstart.py again"
