@@ -171,8 +171,8 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
     def cancel(self, context):
         """Blender takes the operator away (a file is loaded, the window closes), or it has ended."""
         unwatch()
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
+        for workspace in bpy.data.workspaces:  # the user may have gone to another one
+            workspace.status_text_set(None)
         _redraw(context)
 
 

@@ -264,6 +264,18 @@ def test_the_menu_lies_within_the_editor_and_no_row_on_another(room, at, free, p
     assert box.word_at(box.box[2] + 5, box.box[1]) is None
 
 
+def test_the_part_of_an_editor_that_nothing_lies_over(room):
+    def region(kind, x, y, width, height):
+        return SimpleNamespace(type=kind, x=x, y=y, width=width, height=height)
+
+    main = region("WINDOW", 100, 50, 800, 600)
+    others = [region("TOOLS", 100, 200, 60, 300), region("UI", 680, 50, 220, 560), region("HEADER", 100, 624, 800, 26),
+              region("FOOTER", 100, 50, 800, 1), region("CHANNELS", 0, 50, 100, 600)]
+    area = SimpleNamespace(regions=[main, *others])
+    assert room("popup").free_part(area, main) == (64, 4, 576, 570)
+    assert room("popup").free_part(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
+
+
 def test_the_list_in_the_corner_can_be_folded(room):
     popup, core = room("popup"), import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
     folded = popup.content(core.State(), "me", folded=True)
