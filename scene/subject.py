@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import dots, lanes, plans, strips
+from . import dots, lanes, strips
 from .clock import Clock, of_scene
 from .settings import active_player
-from .tracks import read_track
 
 
 def subject(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -32,16 +31,10 @@ def can_have(context: bpy.types.Context) -> bool:
 
 
 def with_lanes(context: bpy.types.Context) -> bpy.types.Object:
-    """The subject; a player without lanes gets dot and lanes, which say what his text or file says, so that these words
-    are not lost. InputError where track or words cannot be read."""
+    """The subject, the player's dot and lanes made where there are none; InputError where track or words cannot be
+    read."""
     found = subject(context)
-    if found is not None:
-        return found
-    settings = context.scene.beyond_mocap
-    player = active_player(settings)
-    if player.annotation_text is not None or player.annotation_file:
-        strips.write(context, player, plans.written_words(player, settings.rate, read_track(settings, player)))
-    return strips.with_lanes(context, player)
+    return strips.with_lanes(context, active_player(context.scene.beyond_mocap)) if found is None else found
 
 
 def clock(context: bpy.types.Context, target: bpy.types.Object) -> Clock:
