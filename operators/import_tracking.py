@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.tracking import PROVIDERS
-from ..scene import dots, plans, strips, tracks
+from ..scene import bake, dots, plans, strips, tracks
 from ..scene.settings import as_setting
 from .verb import ImportVerb
 
@@ -60,6 +60,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
         settings.active_player = len(settings.players) - sum(len(found) for _, found, _ in read)
         for player in list(settings.players)[settings.active_player :]:
             self.place(context, player)
+        self.lengthen(context.scene, list(settings.players)[settings.active_player :])
         self.report({"INFO"}, f"players in the list: {len(settings.players)}")
 
     @staticmethod
@@ -80,6 +81,16 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
                 strips.write(context, player, plans.written_words(player, context.scene.beyond_mocap.rate, track))
         except InputError as error:
             self.report({"WARNING"}, str(error))
+
+    def lengthen(self, scene, players):
+        """Let the scene reach to the end of what has been imported, so that all of it plays while it is annotated."""
+        before = scene.frame_end
+        for player in players:
+            frames = dots.keyed_frames(player.dot) if player.use and player.dot is not None else None
+            if frames is not None:
+                bake.lengthen(scene, frames[1])
+        if scene.frame_end != before:
+            self.report({"INFO"}, f"the scene ends at frame {scene.frame_end} now, with the tracks")
 
     def add(self, settings, path: str, found: tracks.Found, provider: str):
         """One more player in the list; of a whole match only the first is ticked."""

@@ -40,7 +40,7 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
     if settings.make_paths:
         ground = sample(made.plan.track, made.plan.fps).positions
         curve.write(context, track_name(order), ground, tuple(order.shirt), room)
-    _lengthen(scene, start + take.motion.duration * frames_per_second(scene))
+    lengthen(scene, start + take.motion.duration * frames_per_second(scene))
     return target
 
 
@@ -93,7 +93,7 @@ def fits(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) -> bool:
     return armature.skeleton_of(target, scene).same_bones(take.motion.skeleton)
 
 
-def _lengthen(scene: bpy.types.Scene, last: float) -> None:
+def lengthen(scene: bpy.types.Scene, last: float) -> None:
     """Let the scene's range end no earlier than `last`."""
     scene.frame_end = max(scene.frame_end, int(np.floor(last + 1e-4)))
 
