@@ -195,7 +195,7 @@ def _draw_texts():
 def _near_labels(context, view, shown: Shown) -> None:
     near = [label for label in shown.prepared.labels if abs(label.time - shown.seconds) <= view.reach]
     for label in near[:MOST_LABELS]:
-        _text(context, shown.world @ Vector(label.place), (label.text,), 1.0, (0, 14))
+        _text(context, shown.world @ Vector(label.place), (label.text,), 1.0, (8, 26))
 
 
 def _why(context, view, shown: Shown) -> None:

@@ -23,9 +23,9 @@ def write(x: float, y: float, lines, scale: float, strength: float = 1.0) -> Non
     blf.enable(FONT, blf.WORD_WRAP)  # breaks at line ends too, so that one call draws all lines
     blf.word_wrap(FONT, 10000)
     width, height = blf.dimensions(FONT, text)
-    box(x, y, width + 2 * margin, height + 2 * margin, (*GROUND[:3], GROUND[3] * strength))
+    box(x, y, width + 2 * margin, height + 2.4 * margin, (*GROUND[:3], GROUND[3] * strength))
     blf.color(FONT, 1.0, 1.0, 1.0, strength)
-    blf.position(FONT, x + margin, y + margin + height - 0.75 * size, 0.0)
+    blf.position(FONT, x + margin, y + margin + height - 0.78 * size, 0.0)
     blf.draw(FONT, text)
     blf.disable(FONT, blf.WORD_WRAP)
 
