@@ -38,6 +38,7 @@ def clip_file(rig: bpy.types.Object) -> tuple[Path, Path]:
 
 def lay(rig: bpy.types.Object, scene: bpy.types.Scene, motion: "Motion", timeline: Timeline) -> None:
     """Let the armature's strips say `timeline`: seconds from the recording's first frame."""
+    lay_strips.check_editable(rig)
     rig[RATE], rig[COUNT] = motion.fps, len(motion)
     lay_strips.write(rig, timeline, _clock(rig, scene), (0.0, motion.duration))
 

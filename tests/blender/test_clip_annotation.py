@@ -34,9 +34,9 @@ def rows_of(core, clip):
     return scan.Annotations(clip.parent, [clip]).of(clip, core("files.bvh").read(clip).motion.fps)
 
 
-@pytest.mark.parametrize("fps", [24, 30, 60])
-def test_a_clip_is_opened_with_its_words(core, rooms, library, fps):
-    bpy.context.scene.render.fps = fps
+@pytest.mark.parametrize("fps, base", [(24, 1.001), (25, 1.0), (30, 1.0), (60, 1.0)])
+def test_a_clip_is_opened_with_its_words(core, rooms, library, fps, base):
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = fps, base
     shutil.copy(SAMPLE / "kick_low_top.txt", library / "kick_low_top.txt")
     assert bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh") == {"FINISHED"}
     rig = bpy.context.object
@@ -44,7 +44,7 @@ def test_a_clip_is_opened_with_its_words(core, rooms, library, fps):
     assert rooms["clip_annotation"].said(rig) == rows_of(core, library / "kick_low_top.bvh")
     assert rig.animation_data.action is not None, "the strips took the motion's place"
     moment = rooms["lanes"].moments(rig)[0]
-    assert moment.frame == round(1 + 156 / 60 * fps)
+    assert moment.frame == round(1 + 156 / 60 * fps / base)
 
 
 def test_words_are_proposed_saved_and_used_by_the_library(core, rooms, library):
@@ -142,4 +142,21 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     before = state()
     with pytest.raises(RuntimeError, match="words.txt:1"):
         bpy.ops.beyond_mocap.import_words(filepath=str(words))
+    assert state() == before
+
+
+def test_a_clip_of_another_file_is_left_alone(rooms, library, tmp_path):
+    bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.context.scene.beyond_mocap.library_folder = str(library)
+    with bpy.data.libraries.load(str(tmp_path / "other.blend"), link=True) as (there, here):
+        here.objects = ["kick_low_top"]
+    rig = bpy.data.objects["kick_low_top"]
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    before = state()
+    for operator in (bpy.ops.beyond_mocap.propose_words, bpy.ops.beyond_mocap.remove_clip):
+        with pytest.raises(RuntimeError, match="file"):
+            operator()
     assert state() == before

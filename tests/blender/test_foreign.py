@@ -24,13 +24,15 @@ EXPORTERS = {
 }
 
 
-def exported(core, rooms, path, fps=30):
-    """A known motion on an armature with a body, written by Blender's exporter; the motion. The file is empty after."""
+def exported(core, rooms, path, fps=30, lie=lambda rig: None):
+    """A known motion on an armature with a body, written by Blender's exporter; the motion. The file is empty after.
+    lie: how the armature object itself is moved, turned and scaled before it gets its motion."""
     motion = made.motion(core, 61, float(fps))
     scene = bpy.context.scene
     scene.render.fps = fps
     scene.frame_start, scene.frame_end = 1, 61
     rig = rooms["armature"].create(bpy.context, motion.skeleton, "Somebody")
+    lie(rig)
     rooms["action"].write(rig, motion, scene, 1.0)
     rooms["body"].create(rig, "Somebody", (1, 0, 0), scene.collection, scene, motion)
     EXPORTERS[path.suffix](str(path))
@@ -61,6 +63,36 @@ def test_a_known_motion_comes_back_within_a_millimetre(core, rooms, tmp_path, en
     clip = rooms["foreign"].as_clip(back)
     apart = np.linalg.norm(places_of(core, clip.motion, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1)
     assert apart.max() < 1e-3, apart.max()
+
+
+@pytest.mark.parametrize("ending", [".fbx", ".glb"])
+def test_an_armature_that_is_turned_moved_and_scaled(core, rooms, tmp_path, ending):
+    def lie(rig):
+        rig.location, rig.rotation_euler, rig.scale = (3.0, -1.0, 0.5), (1.2, 0.3, -0.7), (2.0, 2.0, 2.0)
+
+    path = tmp_path / f"clip{ending}"
+    motion = exported(core, rooms, path, 30, lie)
+    back = rooms["foreign"].read(path)[0].motion
+    apart = np.linalg.norm(places_of(core, back, motion.skeleton.names)[:, 0] - motion.root_positions, axis=-1)
+    assert apart.max() < 1e-3
+    grown = np.linalg.norm(back.skeleton.offsets[back.skeleton.index("LeftLeg")])
+    assert grown == pytest.approx(2.0 * np.linalg.norm(motion.skeleton.offsets[motion.skeleton.index("LeftLeg")]), rel=1e-3)
+
+
+def test_several_animations_of_one_file(core, rooms, tmp_path):
+    path = tmp_path / "two.glb"
+    scene = bpy.context.scene
+    scene.render.fps = 30
+    motion = made.motion(core, 61)
+    rig = rooms["armature"].create(bpy.context, motion.skeleton, "Somebody")
+    for name, count in (("short", 31), ("long", 61)):
+        rooms["action"].write(rig, motion.frames(0, count), scene, 1.0, name)
+    bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_animation_mode="ACTIONS")
+    bpy.ops.wm.read_homefile(use_empty=True)
+    takes = rooms["foreign"].read(path)
+    assert [len(take.motion) for take in takes] == [61, 31] and "long" in takes[0].name
+    bpy.ops.beyond_mocap.import_clips(filepath=str(path))
+    assert len([thing for thing in bpy.data.objects if thing.type == "ARMATURE"]) == 2
 
 
 def test_files_without_a_motion_are_told(rooms, tmp_path):
