@@ -13,8 +13,8 @@ from .timeline_verb import WritingVerb
 
 
 class BEYOND_MOCAP_OT_add_span(WritingVerb, bpy.types.Operator):
-    """Add a stretch with words: over the preview range where one is set (P in the editor), else one second from the playhead
-on"""
+    """Add a stretch with words: over the preview range where one is set (P in the editor), else one second from the
+playhead on"""
 
     bl_idname = "beyond_mocap.add_span"
     bl_label = "Add Span"

@@ -31,7 +31,7 @@ class BeyondMocapDot(bpy.types.PropertyGroup):
     metadata_file: bpy.props.StringProperty(name="Metadata", description="The provider's second file")
     feed_id: bpy.props.StringProperty(name="ID in the feed", description="Which player of the tracking file this is")
     provider: bpy.props.StringProperty(name="Provider", description="Whose form the tracking file has")
-    clock: bpy.props.StringProperty(name="Clock", description="Start frame, seconds there, frames per second of its keys")
+    clock: bpy.props.StringProperty(name="Clock", description="Start frame, seconds there and rate of its keys")
     shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", description="Colour of the player's shirt")
 
 

@@ -38,7 +38,7 @@ def put_in_order(scene: bpy.types.Scene, only: set[str] | None = None) -> bool:
 
 
 def tidy(target: bpy.types.Object) -> bool:
-    """The strips of one object; whether anything was to be done. A name that is no words is left for the user to see."""
+    """The strips of one object; whether anything was to be done. A name that is no words is left as it is."""
     clock, changed = written_for(target), _name_lanes(target)
     for track, strip in _outermost(target):
         if strip.action.beyond_mocap.kind == "moments":
@@ -185,7 +185,8 @@ def _tidy_markers(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> bool:
             key = key_of(marker, marker_frame(strip, marker), clock, where)
         except InputError:
             continue
-        if shows(strip, marker) and (line_of(key) != marker.beyond_mocap.line or marker.name != marker.beyond_mocap.shown):
+        record = marker.beyond_mocap
+        if shows(strip, marker) and (line_of(key) != record.line or marker.name != record.shown):
             tell(marker, key, marker.frame)
             changed = True
     return changed
@@ -216,8 +217,8 @@ def _soon(names: set[str] | None) -> None:
 def _later():
     """The timer: waits while the user is still dragging."""
     global _waiting
-    running = [operator.bl_idname for window in bpy.context.window_manager.windows for operator in window.modal_operators]
-    if any(name.startswith(UNDER_WAY) for name in running):
+    windows = bpy.context.window_manager.windows
+    if any(running.bl_idname.startswith(UNDER_WAY) for window in windows for running in window.modal_operators):
         return DELAY
     names, _waiting = _waiting, set()
     if put_in_order(bpy.context.scene, names):
@@ -255,7 +256,12 @@ def _restored(*_):
 
 
 _waiting: set[str] | None = set()
-HANDLERS = (("depsgraph_update_post", _changed), ("undo_post", _restored), ("redo_post", _restored), ("load_post", _restored))
+HANDLERS = (
+    ("depsgraph_update_post", _changed),
+    ("undo_post", _restored),
+    ("redo_post", _restored),
+    ("load_post", _restored),
+)
 
 
 def register():

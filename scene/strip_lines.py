@@ -60,7 +60,8 @@ def words_of(item: Span | KeyMoment) -> str:
 def span_of(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
     """The stretch that a strip stands for, whatever was done to it; InputError where its name is not of the form."""
     record = strip.action.beyond_mocap
-    first, last = nearest_frame(strip.frame_start), max(nearest_frame(strip.frame_end), nearest_frame(strip.frame_start) + 1)
+    first = nearest_frame(strip.frame_start)
+    last = max(nearest_frame(strip.frame_end), first + 1)
     start, end = clock.seconds(first), clock.seconds(last)
     kept = recorded_span(strip.action)
     if kept is not None:

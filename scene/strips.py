@@ -35,7 +35,7 @@ def set_automatic(context: bpy.types.Context, player: BeyondMocapPlayer, timelin
 def add_span(
     context: bpy.types.Context, player: BeyondMocapPlayer, start_s: float, end_s: float, words: tuple[str, ...]
 ) -> PlacedSpan:
-    """One more span, in seconds on the track's clock; words as the text form has them, "-word" for one that must not be.
+    """One more span, in seconds on the track's clock; words as in the text form, "-word" for one that must not be.
     InputError where it is empty or its words are not of the form."""
     if end_s <= start_s:
         raise InputError("span", f"the end {end_s:g} is not after the start {start_s:g}", "START < END")

@@ -118,7 +118,8 @@ def _together(target: bpy.types.Object, items: list) -> list[tuple[int, str]]:
     clock, found = lanes.written_for(target), []
     for a, b in zip(timeline.spans, timeline.spans[1:]):
         if b.start < a.end - 1e-6:
-            found.append((clock.whole(b.start), f"'{' '.join(a.words)}' and '{' '.join(b.words)}' overlap; shorten one"))
+            both = f"'{' '.join(a.words)}' and '{' '.join(b.words)}'"
+            found.append((clock.whole(b.start), f"{both} overlap; shorten one"))
     for a, b in zip(timeline.keys, timeline.keys[1:]):
         if b.time - a.time <= 1e-6:
             found.append((clock.whole(b.time), f"'{' '.join(a.words)}' and '{' '.join(b.words)}' are at one time"))

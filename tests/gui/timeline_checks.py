@@ -336,3 +336,54 @@ def check_names_in_the_dope_sheet():
     bpy.context.scene.beyond_mocap.show_moment_names = False
     with bpy.context.temp_override(window=window.window, screen=window.window.screen, area=area, region=region):
         assert not room("scene.moment_names").shown(bpy.context)
+
+
+def check_an_automatic_strip_that_is_dragged_is_asked_for():
+    yield from begin()
+    parse, player = room("beyond_mocap.annotation").parse_timeline, bpy.context.scene.beyond_mocap.players[0]
+    room("scene.strips").set_automatic(bpy.context, player, parse("0 2.4 standing\n8 17 jogging\n"))
+    bpy.ops.ed.undo_push(message="synthesis")
+    before = asked()
+    select("jogging")
+    with in_nla():
+        bpy.ops.transform.transform("EXEC_DEFAULT", True, mode="TRANSLATION", value=(24, 0, 0, 0))
+    yield 0.6
+    touched = asked()
+    assert "9 18 jogging\n" in touched and in_order(), touched
+    assert not strip_of("jogging").mute
+    bpy.context.scene.frame_set(3)
+    bpy.ops.ed.undo_push(message="another step")
+    for expected in (touched, before):
+        yield from own_keys("Z", ctrl=True)
+        assert asked() == expected, asked()
+    assert strip_of("jogging").mute
+    for _ in range(2):
+        yield from own_keys("Z", ctrl=True, shift=True)
+        assert asked() == touched and in_order(), asked()
+
+
+def check_a_new_name_is_new_words():
+    yield from begin()
+    before = asked()
+    strip_of("jogging dribble").name = "Jogging  left"
+    bpy.ops.ed.undo_push(message="rename")
+    yield 0.6
+    renamed = asked()
+    assert "2.4 8 jogging left\n" in renamed and "jogging left" in strip_of("jogging left").action.name
+    yield from own_keys("Z", ctrl=True)
+    assert asked() == before
+    yield from own_keys("Z", ctrl=True, shift=True)
+    assert asked() == renamed
+
+
+def check_saved_in_the_middle_and_opened_again():
+    yield from begin()
+    select("jogging dribble")
+    with in_nla():
+        bpy.ops.transform.transform("EXEC_DEFAULT", True, mode="TIME_SCALE", value=(0.7, 0, 0, 0))
+    path = str((PICTURES / "timeline.blend").resolve())
+    bpy.ops.wm.save_as_mainfile(filepath=path)  # before the strips came in order
+    moved = asked()
+    bpy.ops.wm.open_mainfile(filepath=path)
+    yield 1.0
+    assert asked() == moved and strip_of("jogging dribble").scale == 1.0 and in_order()
