@@ -45,7 +45,8 @@ playhead on"""
 
     def do(self, context):
         """Lay the strip."""
-        start, end = (self.start, self.end) if self.end != self.start else self.stretch(context)
+        given = round(self.start, 4), round(self.end, 4)  # Blender's numbers are not finer
+        start, end = given if self.end != self.start else self.stretch(context)
         if end <= start:
             raise InputError("span", f"the end {end:g} is not after the start {start:g}", "START < END")
         span = said(self.words, start, end)

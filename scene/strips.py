@@ -95,9 +95,10 @@ def where(player: BeyondMocapPlayer) -> str:
 def with_lanes(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
     """The player's dot; where it has no lanes yet, it gets them with the words of his text or file, so that none is
     lost. InputError where track or words cannot be read."""
-    if dot_of(player, context.scene) is None:
-        settings = context.scene.beyond_mocap
-        write(context, player, written_words(player, settings.rate, read_track(settings, player)))
+    if player.dot is not None and lanes.has(player.dot):
+        return dots.ensure(context, player)
+    settings = context.scene.beyond_mocap
+    write(context, player, written_words(player, settings.rate, read_track(settings, player)))
     return player.dot
 
 

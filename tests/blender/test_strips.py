@@ -204,6 +204,7 @@ def test_the_dot_goes_with_its_player(player):
 
 def test_a_dot_that_was_deleted_in_the_view_comes_back_with_its_words(room, player):
     strips, scene = room("strips"), bpy.context.scene
+    strips.add_span(bpy.context, player, 7.0, 8.0, ("walking",))
     asked, dot = strips.read(player, scene), player.dot
     for collection in dot.users_collection:
         collection.objects.unlink(dot)
