@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from tab import EXTENSION, PICTURES, output, sample, window
 
-LIMIT = 400
+LIMIT = 600
 DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 # what is pressed at which second: a reception, the dribble from there to a kick, the kick, a header, a celebration
 PRESSED = [
@@ -46,8 +46,9 @@ def at(second):
     yield 0.1
 
 
-def begin(words=""):
-    """A new file with one player without words, 25 frames a second, the pointer in the 3D view, annotating."""
+def begin(words="", editor="CLIP_EDITOR"):
+    """A new file with one player and the words of his file, 25 frames a second; annotating, the pointer in an editor of
+    this type in the 3D view's place (an empty clip editor is drawn much faster)."""
     bpy.ops.wm.read_homefile(use_empty=False)
     yield 1.0
     scene = bpy.context.scene
@@ -59,6 +60,8 @@ def begin(words=""):
     track.with_suffix(".txt").write_text(words)
     bpy.ops.beyond_mocap.import_tracking(filepath=str(track))
     area = window.area("VIEW_3D")
+    area.type = editor
+    yield 0.5
     yield from window.move(area.x + area.width // 2, area.y + area.height // 2)
     yield from window.press("J")
     yield 0.5
@@ -123,14 +126,14 @@ def check_the_time_is_that_of_the_first_key_while_it_plays():
     last = scene.frame_current
     yield from window.press("SPACE")
     yield 0.3
-    assert last > first > before > 26 or last != first, (before, first, last)
+    assert last != first, "it did not play on"
     frame = scene_module("clock").of_scene(scene).whole(said()[1][0][0])
     assert before <= frame <= first, f"at frame {frame}, not in {before} to {first}; played on to {last}"
     yield from end()
 
 
 def check_the_menu_is_drawn_clicked_and_greyed():
-    yield from begin()
+    yield from begin(editor="VIEW_3D")
     settings = bpy.context.scene.beyond_mocap
     settings.library_folder = str(sample() / "library")
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
@@ -154,7 +157,7 @@ def check_the_menu_is_drawn_clicked_and_greyed():
 
 
 def check_the_menu_stays_within_every_editor():
-    yield from begin()
+    yield from begin(editor="VIEW_3D")
     annotate = importlib.import_module(f"{EXTENSION}.operators.annotate")
     for area in [a for a in window.window.screen.areas if a.type in annotate.SPACES]:
         region = next(r for r in area.regions if r.type == "WINDOW")
