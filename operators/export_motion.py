@@ -24,10 +24,10 @@ class BEYOND_MOCAP_OT_export_motion(Verb, bpy.types.Operator, ExportHelper):
     check_extension = None
 
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
-    format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX")
-    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER")
-    who: EnumProperty(name="Who", items=rig.WHO, default="ACTIVE")
-    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP")
+    format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Form of the file")
+    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
+    who: EnumProperty(name="Who", items=rig.WHO, default="ACTIVE", description="Whose motion")
+    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="What the root bone carries")
     own_rate: BoolProperty(name="Own Rate", default=False, description="At the rate that was synthesized")
     deform_only: BoolProperty(name="Deform Bones Only", default=True, description="Leave controls out")
     meshes: BoolProperty(name="Meshes", default=True, description="Export the meshes that the armature moves, too")

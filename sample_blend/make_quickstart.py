@@ -26,19 +26,17 @@ In the 3D view press N and choose the tab "Beyond Mocap", then press from top to
   4  Accept           keeps it (Discard puts it away)
 
 Press Space to play.
+<<<<<<< HEAD
 What the first player does and when are strips on "player1 dot": open an NLA editor, press N there and
 choose the tab "Beyond Mocap". Drag a strip or a key moment, press Synthesize and Accept again.
 The same words are in the text "player1 words" (Text Editor): after changing it press Words from Text or
 File in that tab.
+=======
+The words of both players lie on their dots: spans as strips and key moments as markers in the NLA editor.
+Change them there, or put the playhead somewhere, press J in the 3D view and say it by number keys;
+then press Update in step 3.
+>>>>>>> ba48a35 (wip2)
 """
-
-
-def words_as_texts(bpy, settings) -> None:
-    """Each player's words as a text of the file, where they can be edited without leaving Blender."""
-    for player in settings.players:
-        text = bpy.data.texts.new(f"{player.name} words")
-        text.write(pathlib.Path(player.annotation_file).read_text("utf-8"))
-        player.annotation_text = text
 
 
 def relative_paths(settings) -> None:
@@ -88,7 +86,6 @@ def main() -> int:
     scene = bpy.context.scene
     scene.frame_end, scene.beyond_mocap.active_player = 1201, 0
     scene.camera.data.show_passepartout = False
-    words_as_texts(bpy, scene.beyond_mocap)
     relative_paths(scene.beyond_mocap)
     bpy.data.texts.new("Read me").write(HOW_TO)
     open_the_tab(bpy)

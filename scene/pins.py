@@ -62,10 +62,11 @@ def add(context: bpy.types.Context, player, part: str, seconds: float, hold: flo
     pin.name, pin.target, pin.part, pin.time, pin.hold = target.name, target, part, seconds, hold
     player.active_pin = len(player.pins) - 1
     context.view_layer.update()
-    for other in context.selected_objects:
-        other.select_set(False)
-    target.select_set(True)
-    context.view_layer.objects.active = target
+    if target.name in context.view_layer.objects:  # else its collection is excluded
+        for other in context.selected_objects:
+            other.select_set(False)
+        target.select_set(True)
+        context.view_layer.objects.active = target
     return target
 
 

@@ -103,8 +103,8 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
         name="Rig", type=bpy.types.Object, poll=is_armature, update=_chosen,
         description="The rig that the motion is baked to: Rigify, Mixamo, Unreal, MetaHuman or any humanoid",
     )
-    bones: CollectionProperty(type=BeyondMocapRigBone)
-    active_bone: IntProperty(name="Part", min=0)
+    bones: CollectionProperty(type=BeyondMocapRigBone, description="Which bone of the rig is which part of the body")
+    active_bone: IntProperty(name="Part", min=0, description="The row that is chosen in the list")
     told: StringProperty(options={"HIDDEN"}, description="What the last step said")
     root: EnumProperty(name="Root Motion", items=ROOTS, default="KEEP", description="What the root bone carries")
     steps: EnumProperty(name="Steps", items=STEPS, default="AUTO", description="What legs of another length do")

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import bpy
 import pytest
+import rigs
 import worlds
 from undo import press, state
 
@@ -70,6 +71,41 @@ def lose_a_player():
     player.dot = None
 
 
+def two_variants():
+    bpy.ops.beyond_mocap.variants(count=2)
+
+
+def pin_a_hand():
+    bpy.ops.beyond_mocap.add_pin(part="right_hand")
+
+
+def draw():
+    """A drawn track, active."""
+    bpy.ops.beyond_mocap.draw_track()
+
+
+def bake_it():
+    bpy.ops.beyond_mocap.bake_to_rig()
+
+
+def unmapped():
+    """The rig's map is empty."""
+    bpy.context.scene.beyond_mocap.rig.bones.clear()
+
+
+def another_rig():
+    """A second rig is active; the panel still has the first."""
+    worlds.choose(rigs.unreal())
+
+
+def saved_map(places):
+    """A map in a file: of the rig before its map was taken away."""
+    bpy.ops.beyond_mocap.map_bones()
+    bpy.ops.beyond_mocap.save_bone_map(filepath=f"{places.out}/map.json")
+    unmapped()
+    return places.out / "map.json"
+
+
 def moved(folder):
     """A second copy of a folder, beside it."""
     other = folder.with_name(f"{folder.name} moved")
@@ -81,19 +117,23 @@ def moved(folder):
 ROWS = {
     "accept": Row("synthesized"),
     "add_moment": Row("imported", lambda places: {"words": "header"}),
+    "add_pin": Row("synthesized", lambda places: {"part": "right_hand"}),
     "add_preset": Row("imported", lambda places: {"name": "Tried"}, changes=False),
     "add_span": Row("imported", lambda places: {"words": "walking"}),
     "add_stage": Row("imported"),
     "annotate": Row("imported", lambda places: {"keys": "2 2 3 5 ENTER"}),
     "annotate_clip": Row("imported", prepare=list_clips),
+    "bake_to_rig": Row("rig"),
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
     "choose_player": Row("imported", lambda places: {"player": "player2"}),
     "delete_moment": Row("imported", prepare=pick_a_moment),
     "discard": Row("synthesized"),
+    "draw_track": Row("imported"),
     "edit_words": Row("imported", lambda places: {"words": "header"}, pick_a_moment),
     "error_curves": Row("synthesized"),
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
+    "export_motion": Row("accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
     "go_to_moment": Row("imported", lambda places: {"strip": "Moments", "index": 0}),
     "import_clip": Row("imported", prepare=list_clips),
@@ -102,9 +142,12 @@ ROWS = {
     "import_words": Row("imported", lambda places: {"filepath": f"{places.match}/player1.txt"}),
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
+    "keep_bone_map": Row("rig", changes=False),
     "list_clips": Row("imported", changes=False),
+    "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "make_assets": Row("imported", prepare=list_clips),
+    "map_bones": Row("rig", prepare=unmapped),
     "mirror": Row("accepted"),
     "mirror_side": Row("imported", prepare=pick_a_moment),
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
@@ -112,18 +155,29 @@ ROWS = {
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),
+    "preview": Row("synthesized", lambda places: {"number": 2}, two_variants),
     "propose_words": Row("clip"),
     "read_words": Row("imported", prepare=forget_dots),
+    "reduce_keys": Row("rig", prepare=bake_it),
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
+    "remove_pin": Row("synthesized", prepare=pin_a_hand),
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
+    "resynthesize_stretch": Row("synthesized", lambda places: {"player": "player1", "start": 1.0, "end": 2.0}),
+    "save_bone_map": Row("rig", lambda places: {"filepath": f"{places.out}/saved.json"}, changes=False),
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
+    "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_timeline": Row("imported", changes=False),
     "show_video": Row("video", changes=False),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
     "synthesize": Row("imported"),
+    "track_object": Row("imported", prepare=draw),
+    "unbake": Row("rig", prepare=bake_it),
     "update": Row("synthesized"),
+    "update_live": Row("synthesized", lambda places: {"player": "player1", "kind": "quick"}),
+    "use_selected_rig": Row("rig", prepare=another_rig),
+    "variants": Row("synthesized", lambda places: {"count": 2}),
     "words_to_text": Row("imported"),
 }
 

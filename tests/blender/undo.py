@@ -20,6 +20,8 @@ def state():
         "strips": sorted(strip for thing in bpy.data.objects for strip in strips(thing)),
         "markers": sorted((action.name, marker.name, marker.frame, str(ours(marker)))
                           for action in bpy.data.actions for marker in action.pose_markers),
+        "drawn": {curve.name: [(*point.co, point.radius) for spline in curve.splines
+                               for point in (spline.bezier_points or spline.points)] for curve in bpy.data.curves},
         "keys": {action.name: keys(action) for action in bpy.data.actions},
         "owned": {f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind) if (found := ours(item))},
         "frames": (scene.frame_start, scene.frame_end, scene.render.fps, scene.frame_current),

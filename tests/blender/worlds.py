@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
+import rigs
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
 CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside",
@@ -68,6 +69,15 @@ def accepted(places):
     choose(body)
 
 
+def rig(places):
+    """Somebody's own rig stands beside, chosen and mapped."""
+    settings = bpy.context.scene.beyond_mocap
+    body = settings.players[0].body
+    settings.rig.target = rigs.mixamo()
+    bpy.ops.beyond_mocap.map_bones()
+    choose(body)
+
+
 def video(places):
     """A reference video runs beside."""
     bpy.ops.beyond_mocap.load_video(filepath=str(places.match / PICTURE))
@@ -79,7 +89,7 @@ def clip(places):
     bpy.ops.beyond_mocap.annotate_clip()
 
 
-STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "video": video, "clip": clip}
+STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "rig": rig, "video": video, "clip": clip}
 
 
 def choose(*things):

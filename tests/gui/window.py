@@ -173,6 +173,15 @@ class Window:
         """Save the whole screen; by X itself, because Blender's own screenshot is black on a software renderer."""
         subprocess.run(["import", "-window", "root", path], check=True)
 
+    def part(self, path, x, y, width, height, *changes):
+        """Save a part of the screen, its corner given as Blender counts (from below), in 200 colours; changes:
+        ImageMagick's words for what is done to it besides."""
+        top = self.window.height - y - height
+        cut = ["-crop", f"{width}x{height}+{x}+{top}", "+repage", *changes, "-strip", "+dither", "-colors", "200"]
+        subprocess.run(["import", "-window", "root", "png:" + str(path) + ".whole"], check=True)
+        subprocess.run(["convert", "png:" + str(path) + ".whole", *cut, f"png8:{path}"], check=True)
+        os.unlink(str(path) + ".whole")
+
 
 class Stand:
     """Stands in for an object; what it does not define itself is the object's own."""
