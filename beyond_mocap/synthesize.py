@@ -260,7 +260,7 @@ def with_warnings(take: Take, recordings: Library, order: Wanted, hurried: int |
         since = take.start_time + hurried / recordings.fps
         told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
     told += [*_shown_all_the_same(take), *_pins_missed(take)]
-    return replace(take, warnings=(*told, *_gave_way(recordings, take.plan, take)))
+    return replace(take, cut_short=hurried is not None, warnings=(*told, *_gave_way(recordings, take.plan, take)))
 
 
 def _crowded_out(order: Wanted, edit: EditList) -> list[str]:

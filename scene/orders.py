@@ -25,7 +25,7 @@ LIKE = 0.05  # seconds: ends of stretches nearer than that are the same
 @dataclass(frozen=True)
 class How:
     """What is wanted. kind: "whole" a new take; "update" what has changed since the last; "quick" the same, by a narrow
-    search where it has to be made as a whole; "stretch" another solution from second start to end; "variants" as many
+    search where it has to be made as a whole, and without figures; "stretch" another solution from second start to end; "variants" as many
     takes as `count` says, each another solution."""
 
     kind: str = "whole"
@@ -138,7 +138,11 @@ def _single(order: Order, clips, progress, cancelled, hurry) -> One:
         take = _again(clips, plan, steps, asked)
     else:
         take, steps = synthesize(clips, plan, *asked), [{}]
-    return _judged(clips, plan, take, {"plan": stamp, "steps": steps}, perf_counter() - begun)
+    recipe = {"plan": stamp, "steps": steps}
+    if how.kind == "quick":  # its figures come with the take that follows
+        seconds = {**take.seconds, "total": perf_counter() - begun}
+        return One(plan, take, {"fps": plan.fps, "seconds": seconds, "warnings": list(take.warnings)}, recipe)
+    return _judged(clips, plan, take, recipe, perf_counter() - begun)
 
 
 def _same_span(plan: Plan, before: Take | None) -> bool:

@@ -1,0 +1,142 @@
+"""A track drawn in the window: its points dragged, the preview follows by itself; pins and the player's own choices."""
+
+import importlib
+import time
+
+import bpy
+from tab import EXTENSION, PICTURES, TAB, assert_no_trouble_since, output, sample, window
+
+LIMIT = 300
+
+
+def room(name):
+    """One of the extension's modules."""
+    return importlib.import_module(f"{EXTENSION}.{name}")
+
+
+def settings():
+    """The settings of the window's scene; looked up each time, since undo replaces them."""
+    return window.window.scene.beyond_mocap
+
+
+def player():
+    """The drawn player."""
+    return settings().players["Drawn"]
+
+
+def run(name, how="INVOKE_DEFAULT", **arguments):
+    """An operator as its button in the 3D view runs it."""
+    area = window.area("VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window.window, area=area, region=region):
+        group, verb = name.split(".")
+        return getattr(getattr(bpy.ops, group), verb)(how, True, **arguments)
+
+
+def until(true, limit=60.0):
+    """Wait until something is true; the seconds that it took."""
+    start = time.monotonic()
+    while not true():
+        work = bpy.context.window_manager.beyond_mocap_work
+        assert time.monotonic() - start < limit, f"not so after {limit} s: {work.kind} {work.text!r}"
+        yield 0.01
+    return time.monotonic() - start
+
+
+def idle():
+    """Nothing is being made."""
+    return not bpy.context.window_manager.beyond_mocap_work.kind and not window.window.modal_operators
+
+
+def made():
+    """The player's newest take."""
+    return room("scene.session").made(player().take)
+
+
+def hips(frame):
+    """Where the body's hips are in the world on a frame."""
+    window.window.scene.frame_set(frame)
+    body = player().body
+    return (body.matrix_world @ body.pose.bones[0].head).copy()
+
+
+def look_down(area, distance=30.0):
+    """The view from above, on the middle of the curve."""
+    view = area.spaces.active.region_3d
+    view.view_perspective, view.view_rotation, view.view_distance = "ORTHO", (1, 0, 0, 0), distance
+    view.view_location = (9.0, 0.0, 0.0)
+
+
+def drawn():
+    """An empty file with a drawn player who has been synthesized."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 1.0
+    settings().library_folder = str(sample() / "library")
+    assert run("beyond_mocap.draw_track") == {"FINISHED"}
+    area = window.area("VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    look_down(area)
+    run("beyond_mocap.synthesize")
+    yield from until(lambda: player().take and idle(), 120.0)
+
+
+def check_the_preview_follows_a_dragged_point():
+    mark = len(output.text())
+    yield from drawn()
+    area = window.area("VIEW_3D")
+    settings().live = True
+    yield 1.0
+    first, before = made(), hips(60)
+    bpy.context.view_layer.objects.active = player().drawn_track
+    run("object.mode_set", "EXEC_DEFAULT", mode="EDIT")
+    points = player().drawn_track.data.splines[0].bezier_points
+    for number, point in enumerate(points):
+        point.select_control_point = point.select_left_handle = point.select_right_handle = number == 1
+    place = tuple(points[1].co)
+    yield 0.5
+    yield from window.move(area.x + area.width // 3, area.y + area.height // 2)
+    yield from window.press("G")
+    for _ in range(6):
+        yield from window.move(window.pointer[0], window.pointer[1] + 12)
+        yield 0.03
+    yield from window.press("LEFTMOUSE")
+    start = time.monotonic()
+    moved = player().drawn_track.data.splines[0].bezier_points[1].co
+    assert (moved - type(moved)(place)).length > 0.3, "the point was not dragged"
+    yield from until(lambda: made() is not first)
+    output.say(f"     the preview followed {time.monotonic() - start:.2f} s after the hand had let go")
+    quick = made()
+    yield from until(lambda: made() is not quick)
+    assert not any("cut short" in line for line in made().take.warnings), "the whole take did not take the quick one's place"
+    assert (hips(60) - before).length > 0.1, "the body is where it was"
+    window.picture(PICTURES / "draw_live.png")
+    last = made()
+    yield 2.0
+    assert made() is last and idle(), "Live goes on by itself"
+    run("object.mode_set", "EXEC_DEFAULT", mode="OBJECT")
+    assert_no_trouble_since(mark)
+
+
+def check_a_pin_is_made_moved_and_followed():
+    mark = len(output.text())
+    window.window.scene.frame_set(80)
+    yield 0.3
+    assert run("beyond_mocap.add_pin", "EXEC_DEFAULT", part="right_hand", at="BODY") == {"FINISHED"}
+    run("beyond_mocap.add_pin", "EXEC_DEFAULT", part="gaze", at="BODY")
+    yield 1.0
+    yield from until(idle)
+    before, target = made(), player().pins[0].target
+    target.location.z += 0.3
+    yield from until(lambda: made() is not before)
+    yield from until(idle)
+    assert made().take.pins[0].miss < 0.02, made().take.pins
+    area = window.area("VIEW_3D")
+    view = area.spaces.active.region_3d
+    view.view_perspective, view.view_location, view.view_distance = "PERSP", target.location, 4.0
+    view.view_rotation = (0.75, 0.55, 0.22, 0.3)
+    player().height, player().strong_foot = 1.9, "left"
+    yield 2.5
+    yield from until(idle)
+    window.picture(PICTURES / "draw_pins.png")
+    settings().live = False
+    assert_no_trouble_since(mark)
