@@ -1,4 +1,4 @@
-"""Entries of Blender's own File menu."""
+"""Entries of Blender's own menus."""
 
 from __future__ import annotations
 
@@ -16,13 +16,21 @@ def draw_export(self, _context):
     self.layout.operator("beyond_mocap.export_bvh", text="Beyond Mocap Motion (.bvh)")
 
 
+def draw_strip(self, _context):
+    """The context menu of strips in the NLA editor."""
+    self.layout.separator()
+    self.layout.operator("beyond_mocap.resynthesize_stretch", icon="UV_SYNC_SELECT")
+
+
 def register():
     """Append ours."""
+    bpy.types.NLA_MT_context_menu.append(draw_strip)
     bpy.types.TOPBAR_MT_file_import.append(draw_import)
     bpy.types.TOPBAR_MT_file_export.append(draw_export)
 
 
 def unregister():
     """Take ours away."""
+    bpy.types.NLA_MT_context_menu.remove(draw_strip)
     bpy.types.TOPBAR_MT_file_import.remove(draw_import)
     bpy.types.TOPBAR_MT_file_export.remove(draw_export)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 
 from ..beyond_mocap.errors import InputError
-from . import bake, blocks, channels, error_curves, hand_keys, session, stage
+from . import bake, blocks, channels, error_curves, hand_keys, linked, session, stage
 from .bake import MARK
 from .clock import of_scene
 from .set_aside import bring_back, drop, play_as_before, put_aside
@@ -23,9 +23,7 @@ def check(player: BeyondMocapPlayer) -> None:
     body = player.body
     if body is None:
         return
-    if body.library is not None:
-        raise InputError(f"body {body.name}", "linked from another file", "an armature of this file",
-                         "choose another body in step 2, or make this one local")
+    linked.refuse(body)
     override = body.override_library
     if override is not None and override.is_system_override:
         raise InputError(f"body {body.name}", "an override that cannot be edited", "an editable override",

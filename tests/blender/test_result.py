@@ -165,7 +165,7 @@ def test_a_linked_body_is_refused(one, tmp_path):
         target.objects = source.objects[:]
     linked = next(thing for thing in target.objects if thing.type == "ARMATURE")
     one.body = linked
-    refused(bpy.ops.beyond_mocap.synthesize, "linked from another file")
+    refused(bpy.ops.beyond_mocap.synthesize, "linked from .*Make Local")
 
 
 def test_the_report_is_kept_with_the_take(extension, one, session):  # noqa: F811
@@ -181,3 +181,49 @@ def test_the_body_deleted_under_a_preview(one):
     bpy.data.objects.remove(one.body)
     assert bpy.ops.beyond_mocap.discard() == {"FINISHED"}
     assert one.result.state == "NONE" and one.body is None
+
+
+def test_an_overridden_body_serves_and_comes_back(one, tmp_path):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept()
+    bpy.data.libraries.write(str(tmp_path / "body.blend"), {one.body})
+    with bpy.data.libraries.load(str(tmp_path / "body.blend"), link=True) as (source, target):
+        target.objects = [name for name in source.objects if name == one.body.name]
+    own = target.objects[0].override_create()
+    bpy.context.scene.collection.objects.link(own)
+    one.body, one.take = own, ""
+    one.result.state = "NONE"
+    before = own.animation_data and own.animation_data.action
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    assert one.body == own and own.animation_data.action.get("beyond_mocap_take")
+    assert bpy.ops.beyond_mocap.discard() == {"FINISHED"}
+    assert one.body == own and (own.animation_data and own.animation_data.action) == before
+
+
+@pytest.mark.parametrize("verb, arguments", [
+    ("resynthesize_stretch", {"player": "player1", "start": 3.0, "end": 4.5}),
+    ("variants", {"count": 2}),
+    ("synthesize", {}),
+    ("update", {"player": "player1"}),
+])
+def test_each_is_one_step_back(one, verb, arguments):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept()
+    assert_one_step(getattr(bpy.ops.beyond_mocap, verb), **arguments)
+
+
+def test_another_variant_is_one_step_back(one):
+    bpy.ops.beyond_mocap.variants(count=2)
+    assert_one_step(bpy.ops.beyond_mocap.preview, number=2)
+    assert_one_step(bpy.ops.beyond_mocap.accept, form="STRIPS")
+
+
+@pytest.mark.parametrize("fps, base", [(24, 1.001), (60, 1.0)])
+def test_strips_at_any_rate(one, fps, base):
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = fps, base
+    bpy.ops.beyond_mocap.synthesize()
+    frames = np.linspace(1, 11 * fps / base, 40)
+    whole = poses(one.body, frames)
+    bpy.ops.beyond_mocap.accept(form="STRIPS")
+    np.testing.assert_allclose(poses(one.body, frames), whole, atol=1e-5)
