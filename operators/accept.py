@@ -14,7 +14,9 @@ from .verb import Verb
 class ResultVerb(Verb):
     """A verb about the results of one player, or of all that are ticked."""
 
-    player: StringProperty(name="Player", description="Whose result; empty: of all ticked players", options={"SKIP_SAVE"})
+    player: StringProperty(
+        name="Player", options={"SKIP_SAVE"}, description="Whose result; empty: of all ticked players",
+    )
 
     def chosen(self, context) -> list:
         """The players in question."""

@@ -11,13 +11,15 @@ from .turns import TurnsVerb
 
 
 class BEYOND_MOCAP_OT_resynthesize_stretch(TurnsVerb, bpy.types.Operator):
-    """Search these seconds anew, without the clips that are shown there where that can be: those of the selected strip of
-an accepted result, of a selected span of words, or the preview range. All else stays to the last bit"""
+    """Search these seconds anew, without the clips that are shown there where that can be: those of the selected strip
+of an accepted result, of a selected span of words, or the preview range. All else stays to the last bit"""
 
     bl_idname = "beyond_mocap.resynthesize_stretch"
     bl_label = "Resynthesize Stretch"
 
-    start: FloatProperty(name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE", description="Second on the track's clock")
+    start: FloatProperty(
+        name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE", description="Second on the track's clock",
+    )
     end: FloatProperty(
         name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
         description="Second on the track's clock; 0: as selected",

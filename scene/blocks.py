@@ -44,7 +44,7 @@ def noted(action: bpy.types.Action) -> tuple[Block, ...]:
 
 
 def blocks_of(take: Take, scene: bpy.types.Scene) -> tuple[Block, ...]:
-    """The pieces of a take in scene frames, seams on the nearest whole frame; pieces shorter than a frame are left out."""
+    """The pieces of a take in scene frames, seams on the nearest whole frame; shorter ones are left out."""
     seams = [0, *(int(seam) for seam in take.seams), len(take.motion)]
     rate = frames_per_second(scene) / take.motion.fps
     first = bake.frame_at(scene, take.start_time)

@@ -28,6 +28,7 @@ from .settings import BeyondMocapPlayer, absolute
 
 SECONDS = 1.0  # between two looks
 LIBRARY_SECONDS = 10.0  # between two looks at the library's folder
+PLAIN = {"STRING", "INT", "FLOAT", "BOOLEAN", "ENUM"}
 CHANGED = {  # what is told where a part of `parts` is another
     "words": "its words have changed since",
     "track": "its track has changed since",
@@ -35,7 +36,9 @@ CHANGED = {  # what is told where a part of `parts` is another
     "library": "the library's files have changed since",
 }
 
-_now: dict = {"dirty": True, "left": [], "files": {}, "stamps": {}, "looked": 0.0, "thread": None, "seen": []}
+_now: dict = {
+    "dirty": True, "left": [], "files": {}, "stamps": {}, "looked": 0.0, "thread": None, "seen": [], "hand": {},
+}
 
 
 class BeyondMocapStale(bpy.types.PropertyGroup):
@@ -159,11 +162,15 @@ def _body(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> str:
 
 def _notes(player: BeyondMocapPlayer) -> list[str]:
     """How many hand-made keys the result carries."""
-    if player.body is None or player.result.state == "NONE":
+    body = player.body
+    if body is None or player.result.state == "NONE":
         return []
-    count = len(hand_keys.of_body(player.body)[0])
+    key = (body.session_uid, player.take, player.result.state)
+    if bpy.app.background or key not in _now["hand"]:  # without a window no handler tells of changes
+        _now["hand"][key] = len(hand_keys.of_body(body)[0])
+    count = _now["hand"][key]
     keys = "hand-made key" if count == 1 else "hand-made keys"
-    return [f"{count} {keys} on it: kept when it is made anew"] if count else []
+    return [f"{count} {keys}: kept by Update"] if count else []
 
 
 def dirty(*_) -> None:
@@ -193,15 +200,15 @@ def _tick():
         if number < len(players) and (players[number].take or _told(scene, players[number])):
             renew(scene, players[number])
             break
-    return 0.2 if _now["left"] else SECONDS
+    return SECONDS
 
 
 def _seen(scene: bpy.types.Scene) -> list:
     """The settings of a scene and its players, as far as they are plain values, and the words that are texts."""
     found = []
     for group in (scene.beyond_mocap, *scene.beyond_mocap.players):
-        found += [getattr(group, place.identifier) for place in group.bl_rna.properties
-                  if place.type in {"STRING", "INT", "FLOAT", "BOOLEAN", "ENUM"} and not getattr(place, "is_array", False)]
+        plain = [place for place in group.bl_rna.properties if place.type in PLAIN]
+        found += [getattr(group, place.identifier) for place in plain if not getattr(place, "is_array", False)]
     for player in scene.beyond_mocap.players:
         text, body = player.annotation_text, player.body
         found += [text.as_string() if text is not None else None, body is not None and body.name in scene.objects]
@@ -256,18 +263,22 @@ def _after_load(*_):
     manager.beyond_mocap_work.kind = manager.beyond_mocap_work.waiting = ""
     manager.beyond_mocap_stale.clear()
     queue.clear()
+    _now["hand"].clear()
     dirty()
 
 
 @persistent
 def _after_change(_scene, graph):
     """Objects, actions, texts or settings have changed."""
+    if any(isinstance(update.id, (bpy.types.Action, bpy.types.Object)) for update in graph.updates):
+        _now["hand"].clear()
     if not _now["dirty"] and len(graph.updates):
         dirty()
 
 
 @persistent
 def _after_undo(*_):
+    _now["hand"].clear()
     dirty()
 
 

@@ -1,11 +1,11 @@
 """Keys that a user has set, moved, changed or deleted on a take's action: recognised, and kept when it is made anew.
 
-An action of ours remembers the values that it was made with, as an array of floats that Blender saves and undoes with it.
-Whatever is otherwise now is the user's: keys of another value, at another time, of another interpolation, channels that
-had none, and frames whose key is gone. A key's type alone would not do, since keying a pose over a generated key leaves
-its type as it was; but a key whose type has been changed (R in the dope sheet) counts too, which marks a key as one's own
-without moving it. Of a bone's quaternion all four channels are kept where one of them was changed. A locked channel is
-kept as a whole.
+An action of ours remembers the values that it was made with, as an array of floats that Blender saves and undoes with
+it. Whatever is otherwise now is the user's: keys of another value, time or interpolation, channels that had none, and
+frames whose key is gone. A key's type alone would not do, since keying a pose over a generated key leaves its type as
+it was; but a key whose type has been changed (R in the dope sheet) counts too, which marks a key as one's own without
+moving it. Of a bone's quaternion all four channels are kept where one of them was changed. A locked channel is kept as
+a whole.
 """
 
 from __future__ import annotations
@@ -103,6 +103,9 @@ def found(action: bpy.types.Action, slot) -> Hand:
     if made is None:
         return Hand()
     curves = channels.curves(action, slot)
+    same_channels = set(made.values) == set(curves)
+    if same_channels and all(_as_made(curve, made.values[place], made) for place, curve in curves.items()):
+        return Hand()
     tables = {place: channels.keys_of(curve) for place, curve in curves.items()}
     whole = frozenset(place for place, curve in curves.items() if _locked(curve))
     mine = {place: _changed(table, made.values.get(place), made) for place, table in tables.items()}
@@ -183,11 +186,28 @@ def of_body(body: bpy.types.Object) -> tuple[Hand, str]:
 
 
 def shift_between(before: str, now: Clock) -> float | None:
-    """Frames by which what was set by the clock `before` (as text) has to move; None where frames have another length."""
+    """Frames by which what was set by the clock `before` (as text) has to move; None where a frame lasts otherwise."""
     old = Clock.read(before)
     if old is None or abs(old.fps - now.fps) > 1e-6:
         return None
     return round(now.frame(old.seconds(0.0)), 4)
+
+
+def _as_made(curve: bpy.types.FCurve, values: np.ndarray, made: Made) -> bool:
+    """Whether a channel is just as it was made: the usual case, told without reading all that keys have."""
+    points = curve.keyframe_points
+    if len(points) != made.count or _locked(curve):
+        return False
+    co, figures = np.empty(2 * made.count, np.float32), np.empty(made.count, np.int32)
+    points.foreach_get("co", co)
+    frames = np.arange(made.first, made.first + made.count)
+    if not np.array_equal(co[1::2], values) or np.any(np.abs(co[::2] - frames) > SAME_FRAME):
+        return False
+    points.foreach_get("type", figures)
+    if np.any(figures != channels.GENERATED):
+        return False
+    points.foreach_get("interpolation", figures)
+    return bool(np.all(figures == channels.LINEAR))
 
 
 def _locked(curve: bpy.types.FCurve) -> bool:

@@ -128,7 +128,8 @@ def forget(player: BeyondMocapPlayer) -> None:
 
 
 def share(context: bpy.types.Context) -> None:
-    """Let ball and camera follow the takes that are shown; what they did before any preview comes back with the last."""
+    """Let ball and camera follow the takes that are shown; with the last preview what they did before
+    comes back."""
     scene, settings = context.scene, context.scene.beyond_mocap
     shared = settings.shared
     shown = [session.made(player.take) for player in settings.players if player.result.state != "NONE"]

@@ -1,4 +1,4 @@
-"""What a player's result is just now, and what it took the place of: properties of the file, so that undo knows them."""
+"""What a player's result is just now, and what it took the place of: saved, and known to undo."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def drop(before: BeyondMocapBefore, mark: str) -> None:
 
 
 def purge_action(action: bpy.types.Action, mark: str) -> None:
-    """Remove an action that carries `mark` and has no user; one without the mark is saved with the file, used or not."""
+    """Remove an action that carries `mark` and has no user; one without the mark stays in the file."""
     if action.users - action.use_fake_user:
         return
     if action.get(mark):

@@ -90,7 +90,7 @@ def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made,
     session.clear()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     player = bpy.context.scene.beyond_mocap.players[0]
-    assert "not in this session" in renew().lines and "1 hand-made key on it" in renew().notes
+    assert "not in this session" in renew().lines and "1 hand-made key:" in renew().notes
     assert player.result.state == "ACCEPTED"
     bpy.ops.beyond_mocap.update()
     after = session.made(player.take).take

@@ -38,7 +38,7 @@ def states():
     return [player.result.state for player in settings().players]
 
 
-def until(true, limit=60.0):
+def until(true, limit=120.0):
     """Wait until something is true."""
     start = time.monotonic()
     while not true():
@@ -147,17 +147,17 @@ def check_escape_cancels_and_finish_early_keeps():
         window.picture(PICTURES / "result-running.png")
         yield from window.move(900, 500)
         yield from window.press("ESC")
-        yield from until(idle, 3.0)
+        yield from until(idle, 15.0)
         assert states() == ["NONE", "NONE"]
         run("beyond_mocap.synthesize")
         yield 0.3
         run("beyond_mocap.cancel", "EXEC_DEFAULT", keep=True)
-        yield from until(idle, 20.0)
+        yield from until(idle)
         assert states() == ["PREVIEW", "NONE"], states()
         run("beyond_mocap.synthesize")
         yield 0.3
         run("beyond_mocap.cancel", "EXEC_DEFAULT")
-        yield from until(idle, 3.0)
+        yield from until(idle, 15.0)
         assert states() == ["PREVIEW", "NONE"], states()
 
 
@@ -206,14 +206,15 @@ def check_keys_by_hand_and_what_is_out_of_date():
     yield from window.press("I")
     yield 0.5
     run("object.mode_set", "EXEC_DEFAULT", mode="OBJECT")
-    yield from until(lambda: "hand-made" in told(), 15.0)
+    yield from until(lambda: "hand-made" in told(), 40.0)
     output.say(f"     told: {told().strip()}")
     settings().alpha = 0.35
-    yield from until(lambda: "choices" in told(), 15.0)
+    yield from until(lambda: "choices" in told(), 40.0)
+    yield 0.6
     window.picture(PICTURES / "result-out-of-date.png")
     run("beyond_mocap.update", player=settings().players[0].name)
     yield from until(idle)
-    yield from until(lambda: "choices" not in told(), 15.0)
+    yield from until(lambda: "choices" not in told(), 40.0)
     assert settings().players[0].result.hand_keys, told()
     window.window.scene.frame_set(77)
     turned = settings().players[0].body.pose.bones["LeftArm"].rotation_quaternion
