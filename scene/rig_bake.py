@@ -28,6 +28,7 @@ BEFORE = "beyond_mocap_before"
 ROOTS = ("KEEP", "SMOOTH", "STRAIGHT", "IN_PLACE")
 LEGS_ALIKE = (0.8, 1.25)
 _FLOOR = (-0.01, 0.05)  # heights of standing toe joints, metres, whose soles are on the scene's own ground
+_MOST_LEAN = np.radians(30.0)
 _MISS, _OFF = 0.005, 1e-3  # metres that are told
 _IK_FOLLOWERS = (
     (re.compile(r"(?i)^(.*:)?(ik_foot|foot_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "foot"),
@@ -241,7 +242,7 @@ class _Fit:
         from ..beyond_mocap.motion.retarget import Retargeter
         from ..beyond_mocap.polish.foot_plant import plant
 
-        motion, skeleton = source.motion, driven.skeleton
+        motion, skeleton = source.motion, _looking_ahead(driven.skeleton, source.motion.skeleton)
         points = contacts.points(motion)
         if source.standing is not None:
             points = points | source.standing[:, :, None]
@@ -276,6 +277,31 @@ class _Fit:
                 lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm too short for its place in "
                              f"{int(np.sum(short[:, side] > _MISS))} frames")
         return lines
+
+
+def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
+    """The driven skeleton with a crown on its head, as far off the vertical as the source's crown is in its rest pose,
+    so that heads which look straight ahead at rest do so together. Unchanged where the source's rest pose says nothing.
+    """
+    from ..beyond_mocap.motion.humanoid import identify
+
+    body = identify(source)
+    if body.head is None or body.head not in source.end_parents or "Head" not in skeleton.names:
+        return skeleton
+    rest = armature.rest_positions(source)
+    crown = source.end_offsets[source.end_parents.index(body.head)]
+    across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
+    trunk = rest[body.head] - 0.5 * (rest[body.left.upper_leg] + rest[body.right.upper_leg])
+    if min(np.linalg.norm(v) for v in (crown, across, trunk)) < 1e-3:
+        return skeleton
+    up = _nearest_axis(trunk)
+    ahead = np.cross(across - (across @ up) * up, up)
+    lean = np.arctan2(crown @ ahead / np.linalg.norm(ahead), crown @ up)
+    if trunk @ up < 0.9 * np.linalg.norm(trunk) or abs(lean) > _MOST_LEAN:
+        return skeleton
+    tip = 0.2 * np.array([np.sin(lean), 0.0, np.cos(lean)])
+    return Skeleton(skeleton.names, skeleton.parents, skeleton.offsets,
+                    (*skeleton.end_parents, skeleton.names.index("Head")), np.vstack([skeleton.end_offsets, tip]))
 
 
 def _stand_spread(motion: Motion, points: np.ndarray) -> float:

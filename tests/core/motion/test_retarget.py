@@ -16,7 +16,7 @@ from beyond_mocap.motion.bone_map import load, pair, save
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading, identify, leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.motion.retarget import retarget
+from beyond_mocap.motion.retarget import Retargeter, retarget
 from beyond_mocap.motion.skeleton import Skeleton
 
 MOCAP = Path(__file__).resolve().parents[4] / "shared/data/mocap"
@@ -280,3 +280,12 @@ def test_recordings_are_found_by_structure_alone(folder):
     motion = recorded(folder)
     blind = renamed(motion, lambda i, old: f"J{i}")
     assert apart(retarget(blind, motion.skeleton, example=motion), motion) < 0.05
+
+
+def test_footprints_can_be_kept_on_other_legs(run):
+    longer = Skeleton(run.skeleton.names, run.skeleton.parents, run.skeleton.offsets * 1.08, run.skeleton.end_parents,
+                      run.skeleton.end_offsets * 1.08)
+    for keeps, ratio in ((True, 1.0), (False, 1.08)):
+        found = Retargeter(run, longer, keeps_travel=keeps).carry(run)
+        travel = [np.linalg.norm(m.root_positions[-1, :2] - m.root_positions[0, :2]) for m in (found, run)]
+        assert travel[0] / travel[1] == pytest.approx(ratio, abs=0.01)

@@ -1,0 +1,115 @@
+"""A motion baked to a control rig that Rigify generates in this Blender, by the panel's own buttons, and undone again."""
+
+import importlib
+
+import addon_utils
+import bpy
+from mathutils import Euler
+from tab import EXTENSION, PICTURES, moves, operator_of, output, press_all, sample, window
+
+LIMIT = 240
+
+
+def room(name):
+    """A module of the extension."""
+    return importlib.import_module(f"{EXTENSION}.scene.{name}")
+
+
+def generated():
+    """A control rig as Rigify makes it."""
+    assert addon_utils.enable("rigify", default_set=True)
+    bpy.ops.object.armature_basic_human_metarig_add()
+    meta = bpy.context.object
+    bpy.ops.pose.rigify_generate()
+    rig = meta.data.rigify_target_rig
+    bpy.data.objects.remove(meta)
+    return rig
+
+
+def check_bake_to_a_rigify_rig():
+    bpy.ops.wm.read_homefile(use_empty=False)
+    yield 1
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    scene = bpy.context.scene
+    bpy.ops.beyond_mocap.import_clips(filepath=str(sample() / "library" / "kick_low_inside.bvh"))
+    body = next(thing for thing in scene.objects if thing.type == "ARMATURE")
+    rig = generated()
+    name = rig.name
+    settings = scene.beyond_mocap.rig
+    settings.source, settings.target = body, rig
+    assert len(room("rig").table_of(settings)) >= 22, settings.told
+    bpy.ops.ed.undo_push(message="before the bake")
+    pressed = yield from press_all(["bake_to_rig"], then=just_wait)
+    assert "bake_to_rig" in [operator_of(call) for call in pressed], pressed
+    yield 1
+    rig = bpy.data.objects[name]
+    output.say(f"     {bpy.context.scene.beyond_mocap.rig.told.splitlines()[-2:]}")
+    assert rig.animation_data.action and moves(rig), "the rig does not move"
+    assert rig.pose.bones["thigh_parent.L"]["IK_FK"] == 1.0
+    yield from look(rig, bpy.context.scene.beyond_mocap.rig.source)
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.ed.undo()
+    yield 0.5
+    rig = bpy.data.objects[name]
+    assert rig.animation_data.action is None and rig.pose.bones["thigh_parent.L"]["IK_FK"] == 0.0
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.ed.redo()
+    yield 0.5
+    assert bpy.data.objects[name].animation_data.action is not None
+
+
+def just_wait():
+    yield 1.5
+    return "done"
+
+
+def look(rig, body):
+    """A picture: the rig beside the body it has the motion from."""
+    for collection in rig.data.collections_all:
+        collection.is_visible = collection.name == "DEF"
+    rig.show_in_front = True
+    rig.location.x = -1.5
+    scene = bpy.context.scene
+    scene.frame_set(round(sum(rig.animation_data.action.frame_range) / 2))
+    view = window.area("VIEW_3D").spaces.active.region_3d
+    view.view_perspective = "ORTHO"
+    view.view_rotation = Euler((1.4, 0, 0)).to_quaternion()
+    bone = body.pose.bones[0]
+    view.view_location = (body.matrix_world @ bone.matrix).translation
+    view.view_location.x -= 0.5
+    view.view_distance = 5
+    yield 1
+    window.picture(PICTURES / "rig.png")
+    rig.location.x = 0
+
+
+def check_the_map_and_the_export_draw():
+    """Every part of the panel unfolded, with a map in it, draws without complaint."""
+    from window import unfold
+
+    panel = next(p for p in bpy.types.Panel.__subclasses__() if p.__name__ == "BEYOND_MOCAP_PT_rig")
+    fold_again = unfold(panel)
+    bpy.context.scene.beyond_mocap.rig.reduces = True
+    area = window.area("VIEW_3D")
+    yield from window.open_tab(area, "Beyond Mocap")
+    for _ in range(12):
+        if not (yield from window.scroll(window.sidebar(area))):
+            break
+    yield 0.5
+    window.picture(PICTURES / "rig_panel.png")
+    fold_again()
+
+
+def check_export_from_the_window():
+    """FBX and glTF are written from a window and leave it as it was."""
+    name = bpy.context.scene.beyond_mocap.rig.target.name
+    scene, shown = bpy.context.scene.name, [thing.name for thing in bpy.data.objects]
+    for format, suffix in (("FBX", ".fbx"), ("GLB", ".glb"), ("BVH", ".bvh")):
+        path = (PICTURES / f"rig{suffix}").resolve()
+        with bpy.context.temp_override(window=window.window):
+            bpy.ops.beyond_mocap.export_motion(filepath=str(path), format=format)
+        assert path.stat().st_size > 1000
+        yield 0.5
+        assert bpy.context.scene.name == scene and [thing.name for thing in bpy.data.objects] == shown
+        assert len(bpy.data.scenes) == 1 and bpy.data.objects[name].animation_data.action is not None
