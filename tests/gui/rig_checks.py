@@ -7,7 +7,7 @@ import bpy
 from mathutils import Euler
 from tab import EXTENSION, PICTURES, moves, operator_of, output, press_all, sample, window
 
-LIMIT = 240
+LIMIT = 480
 
 
 def room(name):
