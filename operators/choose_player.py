@@ -11,7 +11,7 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
-    """Make this player the active one and select his dot, so that the NLA editor shows his strips"""
+    """Make this player the active one and select his dot; pressed in the NLA editor, that shows the selected only"""
 
     bl_idname = "beyond_mocap.choose_player"
     bl_label = "Show Player's Strips"
@@ -35,3 +35,5 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
         if player is None:
             raise InputError("player", f"{self.player!r} is not in the list", "a player in the list")
         show(context, player)
+        if context.area is not None and context.area.type == "NLA_EDITOR":
+            context.space_data.dopesheet.show_only_selected = True

@@ -1,4 +1,4 @@
-"""Bring to the Timeline: players that have no dot yet, as in files of earlier versions, get theirs, and their words as
+"""Bring to the Timeline: players that have no strips yet, as in files of earlier versions, get a dot and their words as
 strips."""
 
 from __future__ import annotations
@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..beyond_mocap.errors import InputError
-from ..scene import dots, plans, strips, tracks
+from ..scene import plans, strips, tracks
 from .verb import Verb
 
 
@@ -19,16 +19,16 @@ strips. Files of earlier versions need this once; texts and files stay as they a
 
     @classmethod
     def poll(cls, context):
-        """A player without a dot."""
-        cls.poll_message_set("Every player in the list has a dot already")
-        return any(player.dot is None for player in context.scene.beyond_mocap.players)
+        """A player without strips."""
+        cls.poll_message_set("Every player in the list has strips already")
+        return any(strips.dot_of(player, context.scene) is None for player in context.scene.beyond_mocap.players)
 
     def do(self, context):
         """Read all tracks and words, then place those that could be read, and tell the others."""
         settings, read = context.scene.beyond_mocap, []
         troubles = []
         for player in settings.players:
-            if player.dot is not None:
+            if strips.dot_of(player, context.scene) is not None:
                 continue
             try:
                 read.append((player, plans.written_words(player, settings.rate, tracks.read_track(settings, player))))
@@ -37,9 +37,7 @@ strips. Files of earlier versions need this once; texts and files stay as they a
         if not read:
             raise InputError("no player could be brought to the timeline", troubles[0])
         for player, timeline in read:
-            dots.ensure(context, player)
-            if timeline.spans or timeline.keys:
-                strips.write(context, player, timeline)
+            strips.write(context, player, timeline)
         for trouble in troubles:
             self.report({"WARNING"}, trouble)
         self.report({"INFO"}, f"players brought to the timeline: {len(read)}")

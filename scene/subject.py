@@ -51,7 +51,7 @@ def show(context: bpy.types.Context, player) -> None:
     """Make a player the active one, his dot alone selected, so that the NLA editor shows his strips."""
     settings = context.scene.beyond_mocap
     settings.active_player = next(n for n, other in enumerate(settings.players) if other == player)
-    dot = dots.ensure(context, player)
+    dot = strips.with_lanes(context, player) if player.dot is None else dots.ensure(context, player)
     for other in context.view_layer.objects.selected:
         other.select_set(False)
     if dot.name in context.view_layer.objects:
