@@ -102,7 +102,7 @@ def _watches():
 
 @persistent
 def _file_changed(_what, *_more):
-    if bpy.context.scene is not None:
+    if bpy.context.scene is not None and not bpy.app.is_job_running("RENDER"):
         sync(bpy.context.scene)
         tell_why(bpy.context.scene)
 

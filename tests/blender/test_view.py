@@ -108,6 +108,16 @@ def test_why_is_told_for_the_piece_at_the_playhead(prepared, shown, room):
     assert bpy.context.window_manager.beyond_mocap_playhead.why == ""
 
 
+@pytest.mark.parametrize("method", ["distance", "blocks"])
+def test_takes_of_the_other_methods_are_told_too(shown, room, method):
+    shown.method = method
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    room("overlays.store").prepare_now(bpy.context.scene)
+    found = room("overlays.store").prepared(bpy.context.scene.beyond_mocap.players[0].take)
+    assert found.pieces and all(len(piece.lines) >= 3 for piece in found.pieces)
+    assert "track" in found.meshes and "footprints" in found.meshes
+
+
 def test_what_no_player_shows_is_forgotten(prepared, shown, room):
     store = room("overlays.store")
     take = shown.players[0].take

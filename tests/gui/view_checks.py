@@ -8,7 +8,7 @@ from mathutils import Euler, Quaternion
 from tab import EXTENSION, PICTURES, TAB, output, sample, window
 from window import Stand
 
-LIMIT = 300
+LIMIT = 600
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
 
 
@@ -37,11 +37,14 @@ def prepared(limit=30.0):
 
 
 def made(seconds=8.0):
-    """The sample with the takes of both players shown, the playhead near a kick."""
-    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
-    yield 1.0
-    with bpy.context.temp_override(window=window.window):
-        assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    """The sample with the takes of both players shown, made once for all checks, the playhead near a kick."""
+    session = room("scene.session")
+    if not settings().players or session.made(settings().players[0].take) is None:
+        bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
+        yield 1.0
+        with bpy.context.temp_override(window=window.window):
+            assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    settings().view.players = "ACTIVE"
     bpy.context.scene.frame_set(round(1 + seconds * bpy.context.scene.render.fps))
     yield 0.3
 
@@ -154,34 +157,6 @@ def check_drawing_is_cheap():
     assert clock.drawn == 0 and clock.per_redraw() < 0.2
 
 
-def check_nothing_stays_of_what_is_gone():
-    yield from made()
-    switch(*OVERLAYS)
-    settings().view.players = "TICKED"
-    yield from prepared()
-    yield from redrawn(3)
-    draw, store = room("scene.overlays.draw"), room("scene.overlays.store")
-    assert draw._batches and store._prepared
-    with bpy.context.temp_override(window=window.window):
-        bpy.ops.ed.undo_push(message="before")
-        bpy.data.objects.remove(settings().players[0].body)
-        yield from redrawn(2)
-        bpy.ops.ed.undo_push(message="removed")
-        bpy.ops.ed.undo()
-        yield from redrawn(2)
-        bpy.ops.beyond_mocap.discard()
-        bpy.ops.ed.undo_push(message="discarded")
-    yield 0.3
-    yield from redrawn(3)
-    assert not store._prepared, "takes that nobody shows are still prepared"
-    bpy.ops.wm.read_homefile(use_empty=True)
-    yield 0.5
-    yield from redrawn(2)
-    bpy.context.scene.beyond_mocap.view.track = True
-    yield from redrawn(2)
-    assert not [key for key in draw._batches if key[0]], "batches of takes that are gone"
-
-
 def check_the_panels_are_quick_with_22_players():
     yield from made()
     yield from prepared()
@@ -215,6 +190,8 @@ def check_the_panels_are_quick_with_22_players():
     window.picture(PICTURES / "view-panels.png")
     for cls in opened:
         bpy.utils.unregister_class(cls)
+    while len(settings().players) > 2:
+        settings().players.remove(2)
     told = {name: 1000 * sorted(values)[len(values) // 2] for name, values in spent.items()}
     output.say("     " + ", ".join(f"{name.rpartition('_')[2]}: {value:.2f} ms" for name, value in told.items()))
     assert len(told) == 2 and sum(told.values()) < 5.0, told
@@ -261,3 +238,29 @@ def check_error_curves_are_in_the_graph_editor():
     assert any("Root Error" in name for name in names), names[:20]
 
 
+def check_nothing_stays_of_what_is_gone():
+    yield from made()
+    switch(*OVERLAYS)
+    settings().view.players = "TICKED"
+    yield from prepared()
+    yield from redrawn(3)
+    draw, store = room("scene.overlays.draw"), room("scene.overlays.store")
+    assert draw._batches and store._prepared
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.ed.undo_push(message="before")
+        bpy.data.objects.remove(settings().players[0].body)
+        yield from redrawn(2)
+        bpy.ops.ed.undo_push(message="removed")
+        bpy.ops.ed.undo()
+        yield from redrawn(2)
+        bpy.ops.beyond_mocap.discard()
+        bpy.ops.ed.undo_push(message="discarded")
+    yield 0.3
+    yield from redrawn(3)
+    assert not store._prepared, "takes that nobody shows are still prepared"
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    yield from redrawn(2)
+    bpy.context.scene.beyond_mocap.view.track = True
+    yield from redrawn(2)
+    assert not [key for key in draw._batches if key[0]], "batches of takes that are gone"
