@@ -26,16 +26,9 @@ In the 3D view press N and choose the tab "Beyond Mocap", then press from top to
   4  Accept           keeps it (Discard puts it away)
 
 Press Space to play.
-<<<<<<< HEAD
-What the first player does and when are strips on "player1 dot": open an NLA editor, press N there and
-choose the tab "Beyond Mocap". Drag a strip or a key moment, press Synthesize and Accept again.
-The same words are in the text "player1 words" (Text Editor): after changing it press Words from Text or
-File in that tab.
-=======
 The words of both players lie on their dots: spans as strips and key moments as markers in the NLA editor.
 Change them there, or put the playhead somewhere, press J in the 3D view and say it by number keys;
 then press Update in step 3.
->>>>>>> ba48a35 (wip2)
 """
 
 

@@ -18,13 +18,9 @@ def test_three_buttons(extension, tmp_path):
     settings = bpy.context.scene.beyond_mocap
     paths = [settings.library_folder]
     paths += [path for player in settings.players for path in (player.tracking_file, player.annotation_file)]
-<<<<<<< HEAD
     paths += [player.dot.beyond_mocap_dot.tracking_file for player in settings.players]
     assert len(paths) == 7 and all(path.startswith("//") for path in paths)
-=======
-    assert len(paths) == 5 and all(path.startswith("//") for path in paths)
     rooms = {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("plans", "strips", "tracks")}
->>>>>>> ba48a35 (wip2)
     for player in settings.players:
         track = rooms["tracks"].read_track(settings, player)
         on_disk = rooms["plans"].written_words(player, settings.rate, track)
