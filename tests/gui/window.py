@@ -135,7 +135,7 @@ class Window:
                 bpy.ops.ui.copy_data_path_button(full_path=True)
         return manager.clipboard
 
-    def find(self, area, region, wanted, what, step=9):
+    def find(self, area, region, wanted, what, step=14):
         """Where the first thing is that `wanted(text)` is true of, looked for from the top of the region, page by page.
         what(area, region): the text of what is under the pointer."""
         while (yield from self.scroll(region, "WHEELUPMOUSE")):
@@ -143,7 +143,7 @@ class Window:
         more = True
         while more:
             for y in range(region.y + region.height - 8, region.y + 4, -step):
-                for share in (0.3, 0.7, 0.12, 0.9):
+                for share in (0.3, 0.75, 0.9):
                     yield from self.move(region.x + region.width * share, y)
                     if wanted(what(area, region)):
                         return region.x + int(region.width * share), y - 3
