@@ -7,6 +7,7 @@ Every import of every file is written as one dotted name from the clone's top, s
 
 import ast
 import pathlib
+import re
 import sys
 import tomllib
 from typing import NamedTuple
@@ -217,3 +218,10 @@ def test_one_version_everywhere():
     manifest = tomllib.loads((TOP / "blender_manifest.toml").read_text("utf-8"))
     project = tomllib.loads((TOP / "pyproject.toml").read_text("utf-8"))
     assert manifest["version"] == project["project"]["version"]
+
+
+def test_links_in_the_docs_lead_somewhere():
+    pages = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
+    links = [(page, link) for page in pages for link in re.findall(r"\]\(([^)#\s]+)", page.read_text("utf-8"))]
+    assert links
+    assert [f"{page.name}: {link}" for page, link in links if "://" not in link and not (page.parent / link).exists()] == []
