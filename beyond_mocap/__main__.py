@@ -325,7 +325,8 @@ def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     from .evaluation.plots import require_matplotlib
     from .evaluation.report import evaluate_played
     from .files import bvh
-    from .files.tables import atomic_write, read_ball, read_provenance, write_report
+    from .files.tables import read_ball, read_provenance, write_report
+    from .files.whole import atomic_write
     from .files.tracking import read_track_csv
     from .motion.track import clean
 

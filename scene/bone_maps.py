@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.files.whole import atomic_write
 from ..beyond_mocap.motion.humanoid import Humanoid, identify, roles_of, side_and_part
 from ..beyond_mocap.motion.skeleton import Skeleton
 
@@ -207,9 +208,9 @@ def kept(rig: bpy.types.Object) -> dict[str, str] | None:
 
 
 def save(path: Path, rig: bpy.types.Object, table: dict[str, str]) -> None:
-    """Write a map as a JSON file."""
+    """Write a map as a JSON file, whole or not at all; InputError where that cannot be done."""
     text = json.dumps({"skeleton": fingerprint(rig), "rig": rig.name, "bones": table}, indent=1, ensure_ascii=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    atomic_write(path, text + "\n")
 
 
 def load(path: Path) -> dict[str, str]:

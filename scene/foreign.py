@@ -80,18 +80,20 @@ class Queue:
 
     def step(self) -> None:
         """Convert the next one; one that cannot be converted is told and left out."""
+        from ..beyond_mocap.library.converted import stamp_of
+
         path = self.todo.pop(0)
+        stamp = stamp_of(path)  # before it is read: what is changed meanwhile is converted again
         try:
-            takes = read(path)
-            self._keep(path, takes)
+            self._keep(path, read(path), stamp)
         except InputError as error:
             self.notes.append(f"left out: {error}")
 
-    def _keep(self, path: Path, takes: list[Take]) -> None:
+    def _keep(self, path: Path, takes: list[Take], stamp: list[int]) -> None:
         from ..beyond_mocap.files import bvh
 
         bvh.write(self.conversions.prepare(path), takes[0].motion)
-        self.conversions.keep(path)
+        self.conversions.keep(path, stamp)
         if len(takes) > 1:
             others = ", ".join(take.name for take in takes[1:4])
             self.notes.append(f"{path.name}: the longest of {len(takes)} animations is its clip, left out {others}")

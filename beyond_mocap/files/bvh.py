@@ -11,7 +11,6 @@ unrotated.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Mapping
@@ -26,6 +25,7 @@ from ..motion.skeleton import Skeleton
 from . import bvh_scale, bvh_text
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import document
+from .whole import beside
 
 _STILL_METRES = 1e-3
 _STILL_ROTATION = np.cos(np.radians(0.1) / 2)
@@ -113,15 +113,8 @@ def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
     if not target.name:
         raise InputError(path, "no file name", "a BVH file to write")
     pieces, notes = document(motion, form or BvhForm())
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with open(beside, "w", encoding="utf-8", newline="\n") as file:
-            file.writelines(pieces)
-        os.replace(beside, target)
-    except OSError as error:
-        raise InputError(path, f"cannot be written ({error.strerror})", "a writable folder", "choose another") from None
-    finally:
-        beside.unlink(missing_ok=True)
+    with beside(target) as part, open(part, "w", encoding="utf-8", newline="\n") as file:
+        file.writelines(pieces)
     return notes
 
 

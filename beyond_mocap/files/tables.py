@@ -5,13 +5,11 @@ Every writer writes beside its target and renames, so that nobody ever sees half
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import json
 import math
 import os
-import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..motion.skeleton import frozen_array
 from ..take import BallPath, Take
+from .whole import atomic_write
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
 PROVENANCE_COLUMNS = (
@@ -121,23 +120,6 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
     if len(rows) < 2:
         raise InputError(path, f"{len(rows)} points", "at least two rows under x_m,y_m[,z_m]")
     return np.column_stack(columns)
-
-
-def atomic_write(path: str | os.PathLike, content: str | bytes) -> None:
-    """Writes a file whole or not at all: beside its place first, then renamed. Text as UTF-8 with line ends as given.
-
-    InputError where the folder is missing or cannot be written.
-    """
-    path = Path(path)
-    beside = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.part")
-    try:
-        beside.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
-        os.replace(beside, path)
-    except OSError as error:
-        raise InputError(path, error.strerror or "cannot be written", "a place where files can be written") from None
-    finally:
-        with contextlib.suppress(OSError):
-            beside.unlink()
 
 
 def plain(value):

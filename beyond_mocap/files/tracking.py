@@ -20,7 +20,8 @@ import numpy as np
 from ..errors import InputError
 from ..motion.skeleton import frozen_array
 from ..motion.track import Track
-from .tables import atomic_write, number, read_rows
+from .tables import number, read_rows
+from .whole import atomic_write
 
 PROVIDERS = ("tracab", "metrica", "skillcorner", "sportec", "secondspectrum", "statsperform")
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
+from ..files.whole import atomic_write
 
 FOREIGN = (".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 _TABLE = "converted.json"
@@ -48,7 +49,7 @@ class Conversions:
         """Whether a recording can be read as it is now."""
         if not is_foreign(path):
             return True
-        return self._stamps.get(self._name(path)) == _stamp(path) and self.readable(path).is_file()
+        return self._stamps.get(self._name(path)) == stamp_of(path) and self.readable(path).is_file()
 
     def waiting(self, paths: Sequence[Path]) -> list[Path]:
         """Those of `paths` that are still to be converted."""
@@ -64,12 +65,10 @@ class Conversions:
             raise InputError(target.parent, found, "a folder for converted clips", "choose another cache folder") from None
         return target
 
-    def keep(self, path: Path) -> None:
-        """Notes that a recording has been converted as it is now; the table is written beside and then renamed."""
-        self._stamps[self._name(path)] = _stamp(path)
-        beside = self.room / f".{_TABLE}.{os.getpid()}.part"
-        beside.write_text(json.dumps(self._stamps, indent=0, sort_keys=True), "utf-8")
-        os.replace(beside, self.room / _TABLE)
+    def keep(self, path: Path, stamp: list[int]) -> None:
+        """Notes that a recording has been converted as it was when its `stamp` was taken."""
+        self._stamps[self._name(path)] = stamp
+        atomic_write(self.room / _TABLE, json.dumps(self._stamps, indent=0, sort_keys=True))
 
     def _name(self, path: Path) -> str:
         return path.relative_to(self.folder).as_posix()
@@ -84,7 +83,7 @@ def told(waiting: Sequence[Path]) -> list[str]:
             "Build Library in Blender converts them"]
 
 
-def _stamp(path: Path) -> list[int]:
+def stamp_of(path: Path) -> list[int]:
     """Size and time of change of a file; zeros where it cannot be seen."""
     try:
         status = os.stat(path)

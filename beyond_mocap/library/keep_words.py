@@ -15,6 +15,7 @@ from pathlib import Path
 from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, read_annotation_csv
 from ..annotation.text import read_text
 from ..errors import InputError
+from ..files.whole import atomic_write
 from .scan import TABLE_NAME, Annotations
 
 TEXT, TABLE = "TEXT", "TABLE"
@@ -82,10 +83,10 @@ def keep(clip: Path, folder: Path, rows: Sequence[ClipAnnotation], fps: float, o
         what = "has other words for this clip already"
         raise InputError(target, what, "a clip without words", "say that they may be overwritten")
     if form == TEXT:
-        _write(target, text_of(rows))
+        atomic_write(target, text_of(rows))
     else:
         name = Path(os.path.normpath(clip.absolute())).relative_to(target.parent).as_posix()
-        _write(target, _table(target, name, rows, fps))
+        atomic_write(target, _table(target, name, rows, fps))
     return target
 
 
@@ -114,15 +115,3 @@ def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float) -
     before = len([row for row in old[:first] if row["file"].strip() != name])
     writer.writerows([*kept[:before], *new, *kept[before:]])
     return out.getvalue()
-
-
-def _write(target: Path, text: str) -> None:
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        beside.write_text(text, "utf-8", newline="")
-        os.replace(beside, target)
-    except OSError as error:
-        found = f"cannot be written ({error.strerror})"
-        raise InputError(target, found, "a folder of yours", "copy the library to a place that can be written") from None
-    finally:
-        beside.unlink(missing_ok=True)

@@ -12,7 +12,6 @@ from beyond_mocap.annotation import Timeline
 from beyond_mocap.errors import InputError
 from beyond_mocap.files.tables import (
     Provenance,
-    atomic_write,
     read_ball,
     read_curve,
     read_provenance,
@@ -20,6 +19,7 @@ from beyond_mocap.files.tables import (
     write_provenance,
     write_report,
 )
+from beyond_mocap.files.whole import atomic_write
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.take import BallPath, Take

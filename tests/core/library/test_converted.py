@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.library.cache import place
-from beyond_mocap.library.converted import Conversions
+from beyond_mocap.library.converted import Conversions, stamp_of
 from beyond_mocap.library.library import build
 
 
@@ -27,7 +27,7 @@ def foreign(clips_folder, tmp_path):
 def convert(folder, fbx, bvh):
     conversions = Conversions(folder, place(folder, None)[0])
     conversions.prepare(fbx).write_bytes(bvh)
-    conversions.keep(fbx)
+    conversions.keep(fbx, stamp_of(fbx))
 
 
 def test_what_nobody_has_converted_is_left_out_and_told(foreign):
