@@ -48,13 +48,19 @@ class BEYOND_MOCAP_OT_export_motion(Verb, bpy.types.Operator, ExportHelper):
         self.filename_ext = export.SUFFIXES[self.format]
         return ExportHelper.invoke(self, context, event)
 
+    def check(self, _context):
+        """The name in the file browser ends as the file will, so that Blender warns of one that is there."""
+        named = Path(self.filepath)
+        if not named.name:
+            return False
+        before, self.filepath = self.filepath, str(export.with_ending(named, export.SUFFIXES[self.format]))
+        return self.filepath != before
+
     def do(self, context):
         """Write it."""
         if not self.filepath:
             raise InputError("export", "no file given", "where to write it", "choose a place")
-        path = Path(bpy.path.abspath(self.filepath))
-        suffix = export.SUFFIXES[self.format]
-        path = path if path.suffix.lower() == suffix else path.with_name(path.name + suffix)
+        path = export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
         rigs = self.rigs(context)
         wanted = export.Wanted(path, self.format, self.engine, self.rate(context), self.root, self.deform_only, self.meshes)
         for line in export.write(context, rigs, wanted):

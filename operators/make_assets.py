@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..beyond_mocap.errors import Cancelled, InputError
-from ..scene import action, assets, channels, clip_annotation, clips, recordings
+from ..scene import action, assets, channels, clip_annotation, clips, export, recordings
 from .verb import BackgroundVerb
 
 WHICH = (
@@ -37,7 +37,9 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
     kind = "assets"
 
     which: EnumProperty(name="Clips", items=WHICH, default="CHOSEN", description="Which clips become assets")
-    apart: BoolProperty(name="As a File", description="Write a .blend of their own and leave this file as it is")
+    apart: BoolProperty(
+        name="As a File", description="Write a .blend of their own and leave this file as it is", options={"SKIP_SAVE"}
+    )
     overwrite: BoolProperty(name="Overwrite", description="Replace a file that is there", options={"SKIP_SAVE"})
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}, description="The .blend to write")
     filter_glob: StringProperty(default="*.blend", options={"HIDDEN"})
@@ -57,7 +59,8 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         self.check_target()
         settings = context.scene.beyond_mocap
         if self.which == "SELECTED":
-            return Order(Path(), (), tuple(_draft_of(rig, context) for rig in _playing(context)))
+            drafts = {one.action: one for one in (_draft_of(rig, context) for rig in _playing(context))}
+            return Order(Path(), (), tuple(drafts.values()))
         rows = context.window_manager.beyond_mocap_clips.shown
         chosen = clips.active(context.window_manager)
         wanted = list(rows) if self.which == "SHOWN" else [chosen] if chosen else []
@@ -67,13 +70,17 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         files = tuple((row.path, *recordings.file_of(settings, row.path), row.figures) for row in wanted)
         return Order(folder, files, ())
 
+    def target(self) -> Path:
+        """The .blend to write."""
+        return export.with_ending(Path(bpy.path.abspath(self.filepath)), ".blend")
+
     def check_target(self):
         """InputError where the file may not be written."""
         if not self.apart:
             return
         if not self.filepath:
             raise InputError("assets", "no file given", "a .blend to write", "choose where")
-        target = Path(bpy.path.abspath(self.filepath)).with_suffix(".blend")
+        target = self.target()
         if target.exists() and not self.overwrite:
             raise InputError(target, "is there already", "a new file", "choose another name, or say Overwrite")
         if bpy.data.filepath and target.resolve() == Path(bpy.data.filepath).resolve():
@@ -103,28 +110,33 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         """Make the actions; write them into their own file, or leave them here."""
         drafts, pictures = result
         catalogs = {assets.catalog_of(one.words) for one in drafts}
-        made = assets.make(bpy.context, drafts, pictures)
         if self.apart:
-            self.write_apart(made, drafts, catalogs)
-            return
-        self.report({"INFO"}, f"assets in this file: {len(made)}")
-        if not bpy.data.filepath:
-            self.report({"INFO"}, "their catalogs get their names when this file is saved and this is done again")
-            return
-        assets.define_catalogs(Path(bpy.data.filepath).parent, catalogs)
-
-    def write_apart(self, made, drafts, catalogs):
-        """Into a .blend; what was made for it goes, what was an action of this file is one again."""
-        target = Path(bpy.path.abspath(self.filepath)).with_suffix(".blend")
-        try:
-            assets.write_library(target, made)
+            target = self.target()
+            write_apart(target, assets.make(bpy.context, drafts, pictures, apart=True), drafts)
             assets.define_catalogs(target.parent, catalogs)
-        finally:
-            for item, one in zip(made, drafts):
-                if one.action:
-                    item.asset_clear()
-            bpy.data.batch_remove([item for item, one in zip(made, drafts) if not one.action])
-        self.report({"INFO"}, f"{len(drafts)} assets written to {target}")
+            self.report({"INFO"}, f"{len(drafts)} assets written to {target}")
+            return
+        if bpy.data.filepath:
+            assets.define_catalogs(Path(bpy.data.filepath).parent, catalogs)
+        else:
+            self.report({"INFO"}, "their catalogs get their names when this file is saved and this is done again")
+        self.report({"INFO"}, f"assets in this file: {len(assets.make(bpy.context, drafts, pictures))}")
+
+
+def write_apart(target: Path, made, drafts) -> None:
+    """The actions into a .blend, under the names of the drafts; they are taken out of this file again."""
+    taken = {}
+    for item, one in zip(made, drafts):
+        if one.action:
+            taken[one.action] = own = bpy.data.actions[one.action]
+            own.name = f"{one.action} (original)"
+            item.name = one.action
+    try:
+        assets.write_library(target, made)
+    finally:
+        bpy.data.batch_remove(made)
+        for name, own in taken.items():
+            own.name = name
 
 
 def _playing(context) -> list[bpy.types.Object]:

@@ -6,7 +6,6 @@ identity that follows from its name, so that the same catalog is the same everyw
 
 from __future__ import annotations
 
-import os
 import uuid
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,7 +17,8 @@ import numpy as np
 
 from ..beyond_mocap.annotation import DISCRETE, LOCOMOTION
 from ..beyond_mocap.errors import InputError
-from . import action, armature
+from ..beyond_mocap.files.whole import atomic_write
+from . import action, armature, export
 
 if TYPE_CHECKING:
     from ..beyond_mocap.motion.motion import Motion
@@ -76,12 +76,15 @@ def catalog_id(catalog: str) -> str:
     return str(uuid.uuid5(_SPACE, catalog))
 
 
-def make(context: bpy.types.Context, drafts: list[Draft], pictures: list) -> list[bpy.types.Action]:
-    """The drafts as assets of this file: their own actions marked, or new ones made; returns the actions."""
+def make(context: bpy.types.Context, drafts: list[Draft], pictures: list, apart: bool = False) -> list[bpy.types.Action]:
+    """The drafts as assets: their own actions marked, or new ones made; returns the actions. apart: own actions are left
+    as they are, and copies of them marked."""
     made, rigs = [], []
     try:
         for one, pixels in zip(drafts, pictures):
             own = bpy.data.actions.get(one.action) if one.action else None
+            if own is not None and apart:
+                own = own.copy()
             if own is None:
                 rig = next((rig for rig, skeleton in rigs if skeleton.same_bones(one.motion.skeleton)), None)
                 if rig is None:
@@ -118,31 +121,18 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
     beside and renamed; returns that file. InputError where it cannot be written."""
     folder = Path(folder)
     target = next((place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()), folder / CATALOGS)
-    text = target.read_text("utf-8") if target.is_file() else _HEAD
+    try:
+        text = target.read_text("utf-8") if target.is_file() else _HEAD
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(target, f"cannot be read ({error})", "Blender's catalogs", "mend or remove the file") from None
     new = [name for name in sorted({TOP, *catalogs}) if catalog_id(name) not in text]
     if not new:
         return target
     text = text.rstrip("\n") + "\n" + "".join(f"{catalog_id(name)}:{name}:{name.replace('/', '-')}\n" for name in new)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        beside.write_text(text, "utf-8")
-        os.replace(beside, target)
-    except OSError as error:
-        found = f"cannot be written ({error.strerror})"
-        raise InputError(target, found, "a folder that can be written", "choose another place") from None
-    finally:
-        beside.unlink(missing_ok=True)
+    atomic_write(target, text)
     return target
 
 
 def write_library(path: Path, actions: list[bpy.types.Action]) -> None:
     """Actions as a .blend of their own, written beside and renamed; InputError where that cannot be done."""
-    beside = path.with_name(f".{path.stem}.{os.getpid()}.blend")
-    try:
-        bpy.data.libraries.write(str(beside), set(actions), fake_user=True, compress=True)
-        os.replace(beside, path)
-    except (OSError, RuntimeError) as error:
-        found = f"cannot be written ({getattr(error, 'strerror', None) or error})"
-        raise InputError(path, found, "a folder that can be written", "choose another place") from None
-    finally:
-        beside.unlink(missing_ok=True)
+    export.saved(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True, compress=True))

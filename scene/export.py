@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.files.whole import beside
 from ..beyond_mocap.motion import quaternion
 from . import bone_maps, channels
 from .measure import frames_per_second, units_per_metre
@@ -29,7 +30,7 @@ _EVEN = 1e-4  # scale that is none
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to write. rate: frames per second, None for the scene's. root: as `rig_bake.ROOTS`."""
+    """What to write. rate: frames per second, None for the scene's. root: one of `rig.ROOTS`."""
 
     path: Path
     format: str = "FBX"
@@ -368,19 +369,23 @@ def _save(stage, copies, meshes, wanted: Wanted) -> None:
     saved(wanted.path, lambda path: EXPORTERS[wanted.format](path, wanted.engine, True))
 
 
+def with_ending(path: Path, ending: str) -> Path:
+    """A path with this ending: in place of another form's, else behind what stands there ("walk.v2" keeps its ".v2")."""
+    if path.suffix.lower() in {ending, *SUFFIXES.values()}:
+        return path.with_suffix(ending)
+    return path.with_name(path.name + ending)
+
+
 def saved(out: Path, write_to) -> None:
     """Let `write_to(path)` write beside `out`, then rename; InputError for what exporters raise."""
-    beside = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
     try:
-        write_to(str(beside))
-        if not beside.is_file():
-            raise RuntimeError("nothing was written")
-        os.replace(beside, out)
+        with beside(out, out.suffix) as part:
+            write_to(str(part))
+            if not part.is_file():
+                raise RuntimeError("nothing was written")
     except (RuntimeError, AttributeError) as error:  # what operators raise: trouble while writing; a disabled exporter
         found, expected = f"this Blender could not write it ({error})", "an exporter that it has, and a place to write"
         raise InputError(out, found, expected, "choose another ending or place") from None
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:

@@ -85,6 +85,21 @@ def test_what_selected_armatures_play(assets, library):
         bpy.ops.beyond_mocap.make_assets(which="SELECTED")
 
 
+def test_an_asset_of_the_users_stays_his_when_a_file_is_written(assets, library, tmp_path):
+    bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
+    own = bpy.context.object.animation_data.action
+    own.asset_mark()
+    own.asset_data.description, own.asset_data.catalog_id = "mine", assets.catalog_id("Mine")
+    own.asset_data.tags.new("precious")
+    before, target = state(), tmp_path / "walk.v2"
+    assert press(bpy.ops.beyond_mocap.make_assets, which="SELECTED", apart=True, filepath=str(target)) == {"FINISHED"}
+    assert state() == before and own.asset_data.description == "mine" and len(own.asset_data.tags) == 1
+    with bpy.data.libraries.load(str(tmp_path / "walk.v2.blend"), assets_only=True) as (there, _):
+        assert list(there.actions) == ["kick_low_top"]
+    bpy.ops.beyond_mocap.remove_clip()
+    assert bpy.data.actions["kick_low_top"].asset_data.description == "mine"
+
+
 def test_catalogs_are_added_to_those_above(assets, tmp_path):
     (tmp_path / assets.CATALOGS).write_text("# mine\nVERSION 1\n\n1f5a:Chairs:Chairs\n")
     (tmp_path / "below").mkdir()
