@@ -63,15 +63,26 @@ def said_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipAnnotati
 
 
 def remove(rig: bpy.types.Object) -> None:
-    """Take the armature, its body and its actions out of the file, where nobody else uses them."""
-    things = [rig, *rig.children_recursive]
+    """Take the armature, its body and its actions out of the file, where nobody else uses them. What the user hung on it
+    stays where it is, and an action that was made an asset stays too."""
+    things = [rig, *(child for child in rig.children if _moved_by(child, rig))]
+    for child in rig.children:
+        if child not in things:
+            place = child.matrix_world.copy()
+            child.parent, child.matrix_world = None, place
     data = [thing.data for thing in things if thing.data is not None and thing.data.users == 1]
     strips = [strip.action for _, strip in lanes.strips(rig)] if lanes.has(rig) else []
     playing = rig.animation_data.action if rig.animation_data is not None else None
     actions = {item.name: item for item in [*strips, playing] if item is not None}
     bpy.data.batch_remove(things)
     bpy.data.batch_remove(data)
-    bpy.data.batch_remove([item for item in actions.values() if item.users - item.use_fake_user <= 0])
+    unused = [item for item in actions.values() if item.users - item.use_fake_user <= 0]
+    bpy.data.batch_remove([item for item in unused if item.asset_data is None])
+
+
+def _moved_by(thing: bpy.types.Object, rig: bpy.types.Object) -> bool:
+    """Whether an object is a mesh that the armature bends, as its body is."""
+    return thing.type == "MESH" and any(one.type == "ARMATURE" and one.object == rig for one in thing.modifiers)
 
 
 def _clock(rig: bpy.types.Object, scene: bpy.types.Scene) -> Clock:

@@ -99,6 +99,15 @@ def test_undo_and_removal_leave_nothing_behind(library):
         assert after[kind] == before[kind], kind
 
 
+def test_what_hangs_on_a_clip_stays_when_it_goes(library):
+    bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
+    lamp = bpy.data.objects.new("Lamp", None)
+    bpy.context.scene.collection.objects.link(lamp)
+    lamp.parent = bpy.context.object
+    bpy.ops.beyond_mocap.remove_clip()
+    assert lamp.name in bpy.context.scene.objects and len(bpy.context.scene.objects) == 1
+
+
 def test_proposals_beside_what_is_there(rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     bpy.ops.beyond_mocap.propose_words(least=0.99)
