@@ -34,27 +34,26 @@ on the ground. What the rig played before is kept as an action"""
     def poll(cls, context):
         """A rig and something to bake."""
         settings = context.scene.beyond_mocap
-        if settings.rig.target is None and not any(o.type == "ARMATURE" for o in context.selected_objects):
+        rigs = (settings.rig.target, *(player.rig for player in settings.players))
+        if not any(rigs) and not any(o.type == "ARMATURE" for o in context.selected_objects):
             cls.poll_message_set("Choose the rig to bake to")
             return False
         cls.poll_message_set("Synthesize and accept first, or choose a source armature that moves")
         return source_body(settings) is not None
 
     def do(self, context):
-        """All pairs are checked before the first is baked."""
+        """All is worked out before the first rig is changed."""
         scene, settings = context.scene, context.scene.beyond_mocap
-        pairs = self.pairs(context)
-        work = []
-        for body, player, target, table in pairs:
-            rig_bake.check(target, body)
-            bone_maps.check(target, table)
-            work.append((target, table, rig_bake.source_of(body, scene, standing_of(scene, player))))
+        wishes, work = wishes_of(settings.rig), []
+        for body, player, target, table in self.pairs(context):
+            source = rig_bake.source_of(body, scene, standing_of(scene, player))
+            work.append((rig_bake.fitted(target, table, source, scene, wishes), target, table))
         lines = []
-        for target, table, source in work:
-            baked = rig_bake.bake(target, table, source, scene, wishes_of(settings.rig))
+        for fitted, target, table in work:
+            baked = rig_bake.lay(fitted)
             if settings.rig.reduces:
                 baked.told.append(reduced(target, table, settings.rig))
-            lines += [f"{source.name} on {target.name}: {len(baked.frames)} frames", *baked.told]
+            lines += [f"{fitted.name} on {target.name}: {len(baked.frames)} frames", *baked.told]
         settings.rig.told = "\n".join(lines)
         for line in lines[:1] if len(work) == 1 else lines:
             self.report({"INFO"}, line)
@@ -90,6 +89,8 @@ on the ground. What the rig played before is kept as an action"""
         for player in players:
             rig_bake.check(player.rig or settings.rig.target, player.body)
             rig_bake.source_of(player.body, context.scene)
+        for target in {player.rig or settings.rig.target for player in players} if lacking else ():
+            rig_bake.Driven(target, table_for(settings.rig, target), context.scene)  # before anything is copied
         free = settings.rig.target if all(player.rig != settings.rig.target for player in players) else None
         for player in lacking:
             player.rig = free or rig_copy.copied(settings.rig.target, f"{player.name} rig")

@@ -25,7 +25,6 @@ from .rig_controls import CHANNELS, Controls, overriding
 
 MARK = "beyond_mocap_rig"
 BEFORE = "beyond_mocap_before"
-ROOTS = ("KEEP", "SMOOTH", "STRAIGHT", "IN_PLACE")
 LEGS_ALIKE = (0.8, 1.25)
 _FLOOR = (-0.01, 0.05)  # heights of standing toe joints, metres, whose soles are on the scene's own ground
 _MOST_LEAN = np.radians(30.0)
@@ -41,7 +40,7 @@ _IK_FOLLOWERS = (
 
 @dataclass(frozen=True)
 class Wishes:
-    """How to bake. root: one of ROOTS. keeps_travel: footprints stay where they are (None: where the legs are alike).
+    """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are alike).
     bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again."""
 
     root: str = "KEEP"
@@ -215,23 +214,49 @@ def _nearest_axis(vector: np.ndarray) -> np.ndarray:
     return np.eye(3)[axis] * np.sign(vector[axis])
 
 
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A motion worked out for a rig, which is still as it was: frames (F,) of the scene; curves as `channels.animate`
+    takes them; heads (F, B, 3) of the driven bones, in the armature's space; told: lines for the user."""
+
+    name: str
+    driven: Driven
+    fit: "_Fit"
+    frames: np.ndarray
+    curves: dict
+    heads: np.ndarray
+    told: list[str]
+
+
 def bake(rig: bpy.types.Object, table: dict[str, str], source: Source, scene: bpy.types.Scene, wishes: Wishes) -> Baked:
     """Lay `source` onto the rig as a new action, which the rig plays from then on."""
+    return lay(fitted(rig, table, source, scene, wishes))
+
+
+def fitted(
+    rig: bpy.types.Object, table: dict[str, str], source: Source, scene: bpy.types.Scene, wishes: Wishes
+) -> Fitted:
+    """`source` on the rig's bones. InputError where the map or the rig does not serve."""
     driven = Driven(rig, table, scene, wishes.bakes_ik)
     fit = _Fit(driven, source, wishes)
     frames = source.start + np.arange(len(source.motion))
     turns, places, told = _wanted(driven, fit.motion, frames, wishes.root)
     basis, heads = driven.controls.basis(turns, places)
-    curves = _curves(rig, basis)
-    curves |= _settings(driven, wishes)
+    curves = _curves(rig, basis) | _settings(driven, wishes)
+    return Fitted(source.name, driven, fit, frames, curves, heads, [*_told(driven, wishes), *told, *fit.told])
+
+
+def lay(one: Fitted) -> Baked:
+    """Let the rig play what was worked out for it, as a new action."""
+    rig, driven = one.driven.rig, one.driven
     before = _remembered(rig, driven)
     channels.discard(rig, MARK)
-    made = channels.animate(rig, f"{source.name} on {rig.name}", frames, curves)
+    made = channels.animate(rig, f"{one.name} on {rig.name}", one.frames, one.curves)
     made[MARK], made[BEFORE] = True, json.dumps(before)
     for switch in driven.controls.switches:
         rig.pose.bones[switch.bone][switch.name] = switch.value
-    told = [*_told(driven, wishes), *told, *fit.told, *_off(driven, frames, heads, scene)]
-    return Baked(made, frames, fit.scale, fit.slides, told)
+    told = [*one.told, *_off(driven, one.frames, one.heads, driven.scene)]
+    return Baked(made, one.frames, one.fit.scale, one.fit.slides, told)
 
 
 class _Fit:
@@ -335,9 +360,8 @@ def _wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
     heads, world = forward_kinematics(motion)
     hips = heads[:, driven.parts.index("hips")]
     told = []
-    line = _root_line(driven, motion, heads) if root == "KEEP" else _root_line(
-        driven, motion, heads, "straight" if root == "STRAIGHT" else "smooth")
-    root_turn, root_place = line
+    if root != "KEEP":
+        root_turn, root_place = _root_line(driven, motion, heads, "straight" if root == "STRAIGHT" else "smooth")
     if root == "IN_PLACE":  # what the line does is taken off everything: what is left begins where it began
         back = quaternion.multiply(root_turn[:1], quaternion.inverse(root_turn))
         world = quaternion.multiply(back[:, None], world)
@@ -369,7 +393,7 @@ def _wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
     return turns, places, told
 
 
-def _root_line(driven: Driven, motion: Motion, heads: np.ndarray, way: str = "smooth"):
+def _root_line(driven: Driven, motion: Motion, heads: np.ndarray, way: str):
     """The root's turn (F, 4) and place (F, 3) in the world: on the ground under the pelvis, as it rests below it."""
     from ..beyond_mocap.motion.humanoid import heading_from_positions
     from ..beyond_mocap.motion.root_path import ground_path

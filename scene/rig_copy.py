@@ -7,20 +7,30 @@ import bpy
 
 def copied(rig: bpy.types.Object, name: str) -> bpy.types.Object:
     """A copy of an armature object and of its children, which share their data with the original; beside it in its
-    collections. What pointed to the original within them points to the copy; the copy plays nothing."""
+    collections, or in the scene's own where these are another file's. What pointed to the original within them points to
+    the copy; the copy plays nothing."""
     family = [rig, *rig.children_recursive]
     twins = {one: one.copy() for one in family}
     for one, twin in twins.items():
         twin.name = name if one == rig else f"{name} {one.name}"
-        for collection in one.users_collection:
+        for collection in _open_to(one):
             collection.objects.link(twin)
         if one.parent in twins:
             inverse = one.matrix_parent_inverse.copy()
             twin.parent, twin.matrix_parent_inverse = twins[one.parent], inverse
         _repoint(twin, twins)
-    if twins[rig].animation_data is not None:
-        twins[rig].animation_data.action = None
+    data = twins[rig].animation_data
+    if data is not None:
+        data.action = None
+        for track in list(data.nla_tracks):
+            data.nla_tracks.remove(track)
     return twins[rig]
+
+
+def _open_to(thing: bpy.types.Object) -> list[bpy.types.Collection]:
+    """The collections of an object that take another one: not linked ones, nor those of a library override."""
+    found = [one for one in thing.users_collection if one.library is None and one.override_library is None]
+    return found or [bpy.context.scene.collection]
 
 
 def _repoint(thing: bpy.types.Object, twins: dict) -> None:

@@ -26,7 +26,8 @@ FAMILIES = {"mixamo": rigs.mixamo, "unreal": rigs.unreal, "metahuman": rigs.meta
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rig_controls", "key_reduction", "rig")}
+            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rig_controls", "key_reduction", "rig",
+                         "rig_copy")}
 
 
 @pytest.fixture(scope="session")
@@ -345,6 +346,34 @@ def test_all_players_get_a_rig_each(rooms, body, clip):
     assert rooms["channels"].playing(second)[0] and rooms["channels"].playing(first)[0]
 
 
+def test_a_copy_plays_nothing_and_a_bad_map_copies_nothing(rooms, body):
+    settings = bpy.context.scene.beyond_mocap
+    rig = rigs.mixamo()
+    bone = rig.pose.bones[0]
+    bone.keyframe_insert("location", frame=1)
+    data = rig.animation_data
+    data.nla_tracks.new().strips.new("own", 1, data.action)
+    data.action = None
+    assert len(rooms["rig_copy"].copied(rig, "twin").animation_data.nla_tracks) == 0 and len(data.nla_tracks) == 1
+    settings.rig.target = rig
+    for number in range(2):
+        player = settings.players.add()
+        player.name, player.body = f"P{number}", body
+    settings.rig.bones["hips"].bone = "no such bone"
+    before = len(bpy.data.objects)
+    assert "no bone no such bone" in complaint(bpy.ops.beyond_mocap.bake_to_rig, targets="PLAYERS")
+    assert len(bpy.data.objects) == before and not any(player.rig for player in settings.players)
+
+
+def test_players_with_rigs_of_their_own_need_no_chosen_one(rooms, body):
+    player = bpy.context.scene.beyond_mocap.players.add()
+    player.name, player.body, player.rig = "P", body, rigs.unreal()
+    for one in bpy.context.selected_objects:
+        one.select_set(False)
+    assert press(bpy.ops.beyond_mocap.bake_to_rig, targets="PLAYERS") == {"FINISHED"}
+    assert rooms["channels"].playing(player.rig)[0]
+
+
 def test_maps_are_kept_by_skeleton_and_written_to_files(rooms, tmp_path):
     rig = rigs.mixamo()
     settings = choose(rig, None)
@@ -431,3 +460,22 @@ def test_linked_rigs_are_told_and_overrides_work(rooms, body, tmp_path):
     settings.target = override
     assert press(bpy.ops.beyond_mocap.bake_to_rig) == {"FINISHED"}
     assert rooms["channels"].playing(override)[0] is not None
+
+
+def test_a_rig_in_an_overridden_collection_is_copied_beside_it(rooms, tmp_path):
+    room = bpy.data.collections.new("Character")
+    bpy.context.scene.collection.children.link(room)
+    rig = rigs.unreal()
+    room.objects.link(rig)
+    bpy.context.scene.collection.objects.unlink(rig)
+    file = str(tmp_path / "character.blend")
+    bpy.data.libraries.write(file, {room})
+    bpy.data.batch_remove([rig, room])
+    with bpy.data.libraries.load(file, link=True) as (theirs, mine):
+        mine.collections = list(theirs.collections)
+    bpy.context.scene.collection.children.link(mine.collections[0])
+    over = mine.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
+    rig = next(one for one in over.all_objects if one.type == "ARMATURE")
+    twin = rooms["rig_copy"].copied(rig, "twin")
+    bpy.context.view_layer.update()
+    assert twin.name in bpy.context.view_layer.objects
