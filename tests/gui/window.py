@@ -143,7 +143,7 @@ class Window:
         more = True
         while more:
             for y in range(region.y + region.height - 8, region.y + 4, -step):
-                for share in (0.3, 0.6, 0.8):
+                for share in (0.3, 0.6, 0.83):
                     yield from self.move(region.x + region.width * share, y)
                     if wanted(what(area, region)):
                         return region.x + int(region.width * share), y - 3
