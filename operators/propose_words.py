@@ -36,7 +36,8 @@ headers, turns, getting up. Look through them; what only a ball shows (dribbling
     def do(self, context):
         """Look at the recording itself, then lay the strips."""
         from ..beyond_mocap.annotation import Timeline
-        from ..beyond_mocap.library.proposals import GAITS, as_timeline, gaits_of, propose
+        from ..beyond_mocap.library.keep_words import as_timeline
+        from ..beyond_mocap.library.proposals import GAITS, gaits_of, propose
 
         settings, rig = context.scene.beyond_mocap, context.object
         motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
@@ -47,7 +48,7 @@ headers, turns, getting up. Look through them; what only a ball shows (dribbling
             gaits = GAITS
         found = [one for one in propose(motion, gaits) if one.confidence >= self.least]
         before = None if self.replace else lanes.read(rig)
-        told = as_timeline(found, motion.fps)
+        told = as_timeline([one.annotation for one in found], motion.fps)
         if before is not None:
             told = Timeline((*before.spans, *told.spans), (*before.keys, *told.keys))
         clip_annotation.lay(rig, context.scene, motion, told)

@@ -39,7 +39,7 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
         """Set the folder."""
         settings = context.scene.beyond_mocap
         chosen = bpy.path.abspath(self.directory) if self.directory else ""
-        if chosen and not watch.look(chosen):
+        if chosen and not watch.holds_recordings(chosen):
             raise InputError(chosen, "no recordings below it", "the library's folder", "choose another")
         if chosen:
             settings.library_folder = as_setting(chosen)

@@ -39,12 +39,12 @@ def write(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bpy.types.Action
     made, body = session.made(player.take), player.body
     if made is None or body is None:
         return None
+    values = _values(scene, made)
     remove(body)
     take, fps = made.take, frames_per_second(scene)
     start = bake.frame_at(scene, take.start_time)
     frames = whole_frames(start, (len(take.motion) - 1) / take.motion.fps, fps)
     at = np.clip(np.rint((frames - start) * (take.motion.fps / fps)), 0, len(take.motion) - 1).astype(int)
-    values = _values(scene, made)
     for (name, told), row in zip(CURVES, values):
         body.data[name] = float(row[at[0]])
         body.data.id_properties_ui(name).update(description=told)

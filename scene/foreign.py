@@ -71,11 +71,11 @@ class Queue:
         """Looks which recordings below `folder` wait; InputError where there is no folder."""
         from ..beyond_mocap.library import cache
         from ..beyond_mocap.library.converted import Conversions
-        from ..beyond_mocap.library.scan import find_recordings
+        from ..beyond_mocap.library.scan import own_recordings
 
         folder = Path(folder)
         self.conversions = Conversions(folder, cache.place(folder, cache_dir)[0])
-        self.todo = self.conversions.waiting(find_recordings(folder))
+        self.todo = self.conversions.waiting(own_recordings(folder))
         self.total, self.notes = len(self.todo), []
 
     def step(self) -> None:

@@ -26,12 +26,33 @@ def look(folder: str) -> dict[str, tuple[int, int]] | None:
 
     Plain strings and as few calls as can be, since it shares the interpreter with the window.
     """
+    if not os.path.isdir(folder):
+        return None
+    found = {}
+    for path in _below(folder):
+        try:
+            status = os.stat(path)
+        except OSError:
+            continue
+        found[os.path.relpath(path, folder)] = (status.st_size, status.st_mtime_ns)
+    return found
+
+
+def holds_recordings(folder: str) -> bool:
+    """Whether there is any recording below a folder; looks no farther than the first."""
+    return any(not _is_words(path) for path in _below(folder))
+
+
+def _is_words(name: str) -> bool:
+    return name.lower().endswith((".txt", ".csv"))
+
+
+def _below(folder: str):
+    """The paths of all recordings and words below a folder; links are followed, each folder is looked into once."""
     from ..beyond_mocap.library.converted import FOREIGN
     from ..beyond_mocap.library.scan import CACHE_FOLDER, TABLE_NAME
 
-    if not os.path.isdir(folder):
-        return None
-    wanted, found, seen = (".bvh", ".txt", TABLE_NAME, *FOREIGN), {}, set()
+    wanted, seen = (".bvh", ".txt", TABLE_NAME, *FOREIGN), set()
     for here, folders, files in os.walk(folder, followlinks=True):
         try:
             status = os.stat(here)
@@ -42,21 +63,12 @@ def look(folder: str) -> dict[str, tuple[int, int]] | None:
             continue
         seen.add((status.st_dev, status.st_ino))
         folders[:] = [name for name in folders if name != CACHE_FOLDER]
-        for name in files:
-            if name.lower().endswith(wanted):
-                path = os.path.join(here, name)
-                try:
-                    status = os.stat(path)
-                except OSError:
-                    continue
-                found[os.path.relpath(path, folder)] = (status.st_size, status.st_mtime_ns)
-    return found
+        yield from (os.path.join(here, name) for name in files if name.lower().endswith(wanted))
 
 
 def news(before: dict, now: dict) -> str:
     """What is new, changed or gone between two looks, in a line; empty where all is as it was."""
-    kinds = {"clip": lambda name: not name.lower().endswith((".txt", ".csv")),
-             "words file": lambda name: name.lower().endswith((".txt", ".csv"))}
+    kinds = {"clip": lambda name: not _is_words(name), "words file": _is_words}
     told = []
     for kind, is_kind in kinds.items():
         new = [name for name in now if name not in before and is_kind(name)]
@@ -75,7 +87,7 @@ def found_again(folder: str, blend: str) -> str:
     for count in range(len(parts), 0, -1):
         for place in list(Path(blend).parents)[:4]:
             tried = place.joinpath(*parts[-count:])
-            if tried.is_dir() and look(str(tried)):
+            if tried.is_dir() and holds_recordings(str(tried)):
                 return str(tried)
     return ""
 
@@ -103,7 +115,7 @@ def relink(scene: bpy.types.Scene) -> str:
 def _after_load(*_):
     manager = bpy.context.window_manager
     clips.clear(manager)
-    for scene in bpy.data.scenes:
+    for scene in [scene for scene in bpy.data.scenes if scene.library is None]:
         found = relink(scene)
         if found:
             print(f"Beyond Mocap: the library of {scene.name} was moved and found again in {found}")
@@ -138,9 +150,10 @@ def _begin(folder: str) -> None:
 
 def _take_in(manager: bpy.types.WindowManager, setting: str) -> None:
     """Writes what was seen, where it is news, and has it drawn."""
-    listing, saw = manager.beyond_mocap_clips, _look["saw"].get("files")
-    if _look["folder"] != absolute(setting):
+    listing = manager.beyond_mocap_clips
+    if _look["folder"] != absolute(setting) or "files" not in _look["saw"]:  # moved on, or the look failed
         return
+    saw = _look["saw"]["files"]
     missing = saw is None
     told = news(clips.files(), saw) if not missing and listing.folder == setting else ""
     if (listing.missing, listing.news) != (missing, told):

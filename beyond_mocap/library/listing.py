@@ -18,7 +18,7 @@ from ..errors import InputError
 from . import cache
 from .converted import Conversions, is_foreign
 from .library import Clip, Library
-from .scan import Annotations, find_recordings
+from .scan import Annotations, own_recordings
 
 GOOD, FAIR, POOR, UNKNOWN = range(4)
 # m/s by which standing heels and toes slide, fair and poor from sqrt(a^2 + (b v)^2) on at the speed v: feet roll
@@ -31,10 +31,9 @@ _HEAD = 1 << 16  # bytes of a file's head in which its number of frames stands
 
 @dataclass(frozen=True)
 class Listed:
-    """One clip. path: below the library's folder. words: all that it carries, key moments'
-    first. moments: number of
-    key moments. seconds: its length. speed, fastest: m/s, mean and highest, NaN where nobody has measured. mark: GOOD,
-    FAIR, POOR or UNKNOWN; told: lines 'name: value' behind the mark."""
+    """One clip. path: below the library's folder. words: all that it carries, key moments' first. moments: number of key
+    moments. seconds: its length. speed, fastest: m/s, mean and highest, NaN where nobody has measured. mark: GOOD, FAIR,
+    POOR or UNKNOWN; told: lines 'name: value' behind the mark."""
 
     path: str
     words: tuple[str, ...]
@@ -67,7 +66,7 @@ def scanned(folder: str | Path, cache_dir: str | Path | None = None) -> tuple[Li
     """All recordings below a folder, without reading their motion: for a library that is not built, or cannot be for
     lack of words. InputError for a missing folder or a broken table; a broken text beside a clip counts as no words."""
     folder = Path(folder)
-    paths = find_recordings(folder)
+    paths = own_recordings(folder)
     conversions = Conversions(folder, cache.place(folder, cache_dir)[0])
     annotations = Annotations(folder, paths)
     out = []

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
-from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, automatic_gaits
+from ..annotation import ClipAnnotation, automatic_gaits
 from ..annotation.gaits import without_short_runs
 from ..motion import contacts, quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
@@ -67,13 +67,6 @@ def propose(motion: Motion, gaits: Sequence[tuple[str, float]] = GAITS) -> tuple
 def gaits_of(library: Library) -> tuple[tuple[str, float], ...]:
     """The gaits of a library with the speeds at which its own annotations change; InputError where it has none."""
     return tuple(zip([gait.word for gait in library.gaits], [0.0, *library.gait_thresholds.tolist()]))
-
-
-def as_timeline(proposals: Sequence[Proposal], fps: float) -> Timeline:
-    """The proposals in the form in which words are edited: seconds from the recording's first frame."""
-    rows = [one.annotation for one in proposals]
-    spans = [Span(row.start / fps, max(row.end, row.start + 1) / fps, row.words) for row in rows]
-    return Timeline(tuple(spans), tuple(KeyMoment(row.key / fps, row.words) for row in rows if row.key is not None))
 
 
 @dataclass(frozen=True, eq=False)

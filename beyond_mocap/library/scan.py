@@ -47,18 +47,23 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 
+def own_recordings(folder: str | Path) -> list[Path]:
+    """The recordings that are a library's clips, as `find_recordings`: of two of one name (`kick.bvh` beside `kick.fbx`)
+    the BVH file."""
+    found = find_recordings(folder)
+    plain = {path.with_suffix("") for path in found if not is_foreign(path)}
+    return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
+
+
 def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
     """The recordings of a library that can be read now, their conversions, and a line about those that wait for theirs.
 
-    place: the library's cache. Two recordings of one name (`kick.bvh` beside `kick.fbx`) are one clip: the BVH file.
-    InputError where there is none that can be read.
+    place: the library's cache. InputError where there is none that can be read.
     """
-    found = find_recordings(folder)
-    plain = {path.with_suffix("") for path in found if not is_foreign(path)}
-    found = [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
-    conversions = Conversions(folder, place)
+    found, conversions = own_recordings(folder), Conversions(folder, place)
     waiting = conversions.waiting(found)
-    ready = [path for path in found if path not in set(waiting)]
+    late = set(waiting)
+    ready = [path for path in found if path not in late]
     if not ready and waiting:
         what = f"no BVH file below it, but {len(waiting)} that only Blender reads ({waiting[0].name})"
         raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender, which converts them")

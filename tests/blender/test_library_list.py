@@ -179,6 +179,7 @@ def test_a_library_that_is_nowhere_near_is_chosen_anew(listed, folder, tmp_path)
     with pytest.raises(RuntimeError, match="no such folder, nor one like it"):
         bpy.ops.beyond_mocap.relink_library()
     (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / "notes.txt").write_text("no clip")
     with pytest.raises(RuntimeError, match="no recordings below it"):
         bpy.ops.beyond_mocap.relink_library(directory=str(tmp_path / "empty"))
     assert settings.library_folder == str(folder)

@@ -9,6 +9,8 @@ from beyond_mocap.errors import InputError
 from beyond_mocap.library.cache import place
 from beyond_mocap.library.converted import Conversions, stamp_of
 from beyond_mocap.library.library import build
+from beyond_mocap.library.listing import scanned
+from beyond_mocap.library.scan import own_recordings
 
 
 @pytest.fixture
@@ -60,6 +62,8 @@ def test_a_bvh_of_the_same_name_goes_first(foreign):
     fbx.with_suffix(".bvh").write_bytes(bvh)
     convert(folder, fbx, bvh)
     assert all(not clip.path.endswith(".fbx") for clip in build(folder).clips)
+    for found in (own_recordings(folder), [folder / clip.path for clip in scanned(folder)]):
+        assert fbx.with_suffix(".bvh") in found and fbx not in found
 
 
 def test_only_foreign_clips_and_none_converted(tmp_path):

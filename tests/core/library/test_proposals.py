@@ -8,7 +8,8 @@ import pytest
 from beyond_mocap.annotation import clip_annotations, parse_timeline, read_clip_annotations
 from beyond_mocap.annotation.text import format_timeline
 from beyond_mocap.files import bvh
-from beyond_mocap.library.proposals import GAITS, as_timeline, propose
+from beyond_mocap.library.keep_words import as_timeline
+from beyond_mocap.library.proposals import GAITS, propose
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import place, resample
 
@@ -96,7 +97,7 @@ def test_a_library_says_what_its_gaits_are_called():
 def test_they_can_be_edited_as_text():
     motion = clip("kick_low_top")
     found = propose(motion)
-    timeline = as_timeline(found, motion.fps)
+    timeline = as_timeline([one.annotation for one in found], motion.fps)
     rows = clip_annotations(parse_timeline(format_timeline(timeline)), motion.fps)
     assert sorted((row.start, row.key) for row in rows if row.key) == sorted(
         (one.annotation.start, one.annotation.key) for one in found if one.annotation.key)
