@@ -31,6 +31,7 @@ def write(
     armature needs a bone for every joint. generated: as for `channels.animate`. Returns the action.
     """
     linked.refuse(body)
+    channels.check_free(body)
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:
         raise InputError(f"armature {body.name}", f"no bone {', '.join(missing[:3])}", "a bone for every joint")

@@ -9,6 +9,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..beyond_mocap.errors import InputError
+
 LINEAR = 1  # Keyframe.interpolation as foreach_set takes it
 GENERATED = 5  # Keyframe.type likewise: drawn dim in the editors
 
@@ -27,8 +29,9 @@ def animate(
 
     frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for one
     key on the first frame). generated: whether the keys are to be told from hand-made ones by their type. The action that
-    was there before is kept in the file.
+    was there before is kept in the file. InputError as `check_free`.
     """
+    check_free(target)
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type=target.id_type, name=target.name)
     bag = _channelbag(action, slot)
@@ -50,8 +53,18 @@ def animate(
     return action
 
 
+def check_free(target: bpy.types.ID) -> None:
+    """InputError where an NLA strip is being tweaked: Blender lets nobody change the action then."""
+    data = target.animation_data
+    if data is not None and data.use_tweak_mode:
+        raise InputError(target.name, "one of its NLA strips is in tweak mode", "an object whose action may change",
+                         "leave tweak mode with Tab in the NLA editor")
+
+
 def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> None:
-    """Play `action` on `target`, by `slot` or the first that fits; the action before is kept, even if unused."""
+    """Play `action` on `target`, by `slot` or the first that fits; the action before is kept, even if unused. InputError
+    as `check_free`."""
+    check_free(target)
     bpy.context.view_layer.update()  # a slot given to an object that the depsgraph has not met yet crashes Blender
     data = target.animation_data_create()
     if data.action is not None and data.action.users == 1:

@@ -32,6 +32,7 @@ def reduce(
     playing, slot = channels.playing(rig)
     if playing is None:
         raise InputError(f"rig {rig.name}", "it plays no action", "a baked rig", "Bake to Rig first")
+    channels.check_free(rig)
     curves = channels.curves(playing, slot)
     ends = channels.keyed_range(curves)
     driven = Driven(rig, table, scene)

@@ -99,6 +99,7 @@ def check(rig: bpy.types.Object | None, source: bpy.types.Object | None = None) 
                          "show it in the outliner")
     if rig.mode == "EDIT":
         raise InputError(where, "its bones are being edited", "object or pose mode", "leave edit mode with Tab")
+    channels.check_free(rig)
 
 
 class Driven:
@@ -557,6 +558,7 @@ def remove(rig: bpy.types.Object) -> None:
     if playing is None or not playing.get(MARK):
         raise InputError(f"rig {rig.name if rig else ''}", "it plays no action that was baked here", "a baked rig",
                          "Bake to Rig first")
+    channels.check_free(rig)
     before = json.loads(playing.get(BEFORE, "{}"))
     rig.animation_data.action = None
     if playing.users - playing.use_fake_user == 0:

@@ -346,6 +346,27 @@ def test_all_players_get_a_rig_each(rooms, body, clip):
     assert rooms["channels"].playing(second)[0] and rooms["channels"].playing(first)[0]
 
 
+def test_a_strip_in_tweak_mode_is_told(rooms, body):
+    rig = rigs.mixamo()
+    choose(rig, body)
+    press(bpy.ops.beyond_mocap.bake_to_rig)
+    data = rig.animation_data
+    own = data.action
+    data.nla_tracks.new().strips.new("own", 1, own)
+    data.action = None
+    data.use_tweak_mode = True
+    for verb in (bpy.ops.beyond_mocap.bake_to_rig, bpy.ops.beyond_mocap.unbake, bpy.ops.beyond_mocap.reduce_keys):
+        assert "leave tweak mode" in complaint(verb)
+    assert data.use_tweak_mode and data.action == own
+    motion, data = rooms["action"].read(body, bpy.context.scene), body.animation_data
+    data.nla_tracks.new().strips.new("own", 1, data.action)
+    data.action, before = None, len(bpy.data.actions)
+    data.use_tweak_mode = True
+    with pytest.raises(Exception, match="leave tweak mode"):
+        rooms["action"].write(body, motion, bpy.context.scene)
+    assert len(bpy.data.actions) == before
+
+
 def test_a_copy_plays_nothing_and_a_bad_map_copies_nothing(rooms, body):
     settings = bpy.context.scene.beyond_mocap
     rig = rigs.mixamo()
