@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 from ..beyond_mocap.annotation import annotating
 from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import popup
+from ..scene import areas, popup
 from ..scene.annotating import do, held, name_of, now, type_keys
 from .verb import Verb
 
@@ -171,8 +171,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
     def cancel(self, context):
         """Blender takes the operator away (a file is loaded, the window closes), or it has ended."""
         unwatch()
-        for workspace in bpy.data.workspaces:  # the user may have gone to another one
-            workspace.status_text_set(None)
+        areas.clear_status()
         _redraw(context)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import IntProperty, StringProperty
 
+from ..beyond_mocap.errors import InputError
 from ..scene import lanes, lay_strips
-from ..scene.subject import subject
+from ..scene.subject import name_of, subject
 from .timeline_verb import TimelineVerb
 
 
@@ -23,5 +24,9 @@ class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
         """Pick it, and go there."""
         target = subject(context)
         strip = lanes.strip_named(target, self.strip or lanes.MOMENTS)
+        markers = strip.action.pose_markers
+        if not 0 <= self.index < len(markers):
+            raise InputError(name_of(target), f"key moment {self.index} of strip {strip.name!r}", "one that is there",
+                             f"it has {len(markers)}")
         lay_strips.pick(target, strip.name, self.index)
-        context.scene.frame_set(lanes.marker_frame(strip, strip.action.pose_markers[self.index]))
+        context.scene.frame_set(lanes.marker_frame(strip, markers[self.index]))

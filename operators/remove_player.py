@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene import dots, pins
+from ..scene import dots, pins, preview
 from ..scene.settings import active_player
 from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_remove_player(Verb, bpy.types.Operator):
     """Take the active player off the list, with his dot, his pins and the strips of his words; armature, action and
-what his track is drawn by stay in the scene"""
+what his track is drawn by stay in the scene, and a preview that he shows is kept"""
 
     bl_idname = "beyond_mocap.remove_player"
     bl_label = "Remove Player"
@@ -25,7 +25,12 @@ what his track is drawn by stay in the scene"""
     def do(self, context):
         """Remove it and choose its neighbour."""
         settings = context.scene.beyond_mocap
-        pins.remove_all(settings.players[settings.active_player])
-        dots.remove(context.scene, settings.players[settings.active_player])
+        player = settings.players[settings.active_player]
+        if player.result.state == "PREVIEW" and preview.shown(context.scene, player):
+            preview.keep(context, player, "ACTION")  # else nobody would know any more what has been set aside
+        elif player.result.state == "PREVIEW":
+            preview.forget(player)
+        pins.remove_all(player)
+        dots.remove(context.scene, player)
         settings.players.remove(settings.active_player)
         settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))

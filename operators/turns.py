@@ -13,7 +13,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import background, orders, plans, queue, session
+from ..scene import areas, background, orders, plans, queue, session
 from .verb import Verb
 from .written import written
 
@@ -103,6 +103,14 @@ class TurnsVerb(Verb):
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
+        """Poll; whatever goes wrong, the queue is free again for the next verb."""
+        try:
+            return self.turn(context, event)
+        except Exception:
+            self.cancel(context)
+            raise
+
+    def turn(self, context, event):
         """Poll, pass on all other events, write what has arrived and begin the next."""
         if event.type == "ESC" and event.value == "PRESS":
             queue.clear()
@@ -148,7 +156,6 @@ class TurnsVerb(Verb):
             return True
         if job.error is not None:
             if not isinstance(job.error, (BeyondMocapError, OSError)):
-                self.close(context)
                 raise job.error
             self.tell(str(job.error), "ERROR")
             return True
@@ -233,8 +240,7 @@ class TurnsVerb(Verb):
         windows.beyond_mocap_work.kind = windows.beyond_mocap_work.waiting = ""
         windows.event_timer_remove(self.timer)
         windows.progress_end()
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
+        areas.clear_status()
         _redraw(context)
 
 
@@ -264,7 +270,7 @@ def _asking(scene, entry: queue.Entry):
     named = players.get(entry.player)
     for player in [named] if named is not None else [player for player in players if player.name not in busy]:
         try:
-            if orders.order_of(scene.beyond_mocap, player, entry.how).fingerprint == entry.fingerprint:
+            if orders.order_of(scene.beyond_mocap, player, entry.how, still=True).fingerprint == entry.fingerprint:
                 return player
         except (BeyondMocapError, OSError):
             continue

@@ -9,7 +9,7 @@ from bpy.props import CollectionProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ..beyond_mocap.errors import BeyondMocapError
-from ..scene import background
+from ..scene import areas, background
 
 
 class Verb:
@@ -150,7 +150,7 @@ class BackgroundVerb(Verb):
         windows.beyond_mocap_work.kind = ""
         windows.event_timer_remove(self.timer)
         windows.progress_end()
-        context.workspace.status_text_set(None)
+        areas.clear_status()
         self.redraw(context)
 
     def redraw(self, context):

@@ -16,6 +16,7 @@ from ..beyond_mocap.errors import Cancelled
 Work = Callable[[Callable[[float, str], None], Callable[[], bool], Callable[[], bool]], Any]
 
 _newest: dict[str, "Job"] = {}
+_working, _counting = [0], threading.Lock()
 _usual = sys.getswitchinterval()  # seconds for which a thread keeps the interpreter to itself
 POLITE = 0.0005  # the same while work runs: Blender's own thread, which draws, asks for it a dozen times a picture
 
@@ -81,7 +82,7 @@ class Job:
         self._news.put(("progress", (fraction, text)))
 
     def _run(self, work: Work) -> None:
-        sys.setswitchinterval(POLITE)
+        _work(1)
         try:
             result = work(self._tell, self._stop.is_set, self._soon.is_set)
         except BaseException as error:  # carried to the main thread, which reports or raises it
@@ -89,8 +90,14 @@ class Job:
         else:
             self._news.put(("result", result))
         finally:
-            if all(job is self or job.ended for job in _newest.values()):
-                sys.setswitchinterval(_usual)
+            _work(-1)
+
+
+def _work(step: int) -> None:
+    """Count one more thread at work, or one less; threads are polite as long as there is one."""
+    with _counting:
+        _working[0] += step
+        sys.setswitchinterval(POLITE if _working[0] else _usual)
 
 
 def stop(kind: str | None = None) -> None:

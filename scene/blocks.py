@@ -104,7 +104,8 @@ def as_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Actio
     if track is None:
         return whole
     if whole is None:
-        parts = [(strip.action, strip.action_slot, *noted(strip.action)[0:1]) for strip in track.strips]
+        alone = {strip.action: strip.action_slot for strip in track.strips}  # one that was split shows its action twice
+        parts = [(action, slot, *noted(action)[0:1]) for action, slot in alone.items()]
         pieces = [(action, slot, block.start, block.end) for action, slot, block in parts]
         whole, slot = channels.joined(pieces, f"{body.name} take", body.name)
         channels.assign(body, whole, slot)

@@ -26,8 +26,8 @@ def labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float, float], str
     if drawn is not None and drawn.type == "CURVE" and drawn.visible_get():
         try:
             line = drawn_track.line_of(scene, drawn)
-        except InputError:
-            return []
+        except InputError:  # told when it is used
+            line = drawn_track.NO_LINE
         for at, speed, wait in zip(line.at, line.speeds, line.waits):
             text = f"{speed:.1f} m/s" if speed > 0.0 else f"stop {wait:.1f} s"
             found.append((tuple(np.array(line.line[at]) * units), text, RGBA))

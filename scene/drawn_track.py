@@ -33,9 +33,18 @@ class Line:
     waits: np.ndarray
 
 
-def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0) -> Track:
+NO_LINE = Line(np.empty((0, 3)), np.empty(0, int), np.empty(0), np.empty(0))
+MOST_PLAYED = 32
+_played: dict[tuple[int, int], tuple] = {}  # (scene, object) by session_uid: stamp, frames, places
+
+
+def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, still: bool = False) -> Track:
     """The track that a curve or a moving object is; start: seconds on the track's clock at which a curve begins.
-    InputError where it is none."""
+    InputError where it is none.
+
+    still: leave the scene on its frame. What moves by more than its own keys has to be played frame by frame, which
+    takes time and undoes a pose that has no key yet; then what was read last counts, InputError where there is none.
+    """
     if drawn.type == "CURVE":
         found = line_of(scene, drawn)
         level = found.line[:, :2]
@@ -43,7 +52,7 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0) ->
         return along(level, way[found.at], found.speeds, found.waits, start, f"curve {drawn.name}")
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
-    frames, places = _animated(scene, drawn)
+    frames, places = _animated(scene, drawn, still)
     clock = of_scene(scene)
     seconds = clock.start_time + (frames - clock.start_frame) / clock.fps
     return moved(seconds, places[:, :2] / units_per_metre(scene), f"object {drawn.name}")
@@ -114,12 +123,35 @@ def _bezier(points) -> tuple[np.ndarray, np.ndarray]:
     return line, FINE * np.arange(len(co))
 
 
-def _animated(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+def _animated(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> tuple[np.ndarray, np.ndarray]:
     """Frames (F,) and places (F, 3), in Blender's units, of a moving object: of an armature its hips, or else its first
     bone."""
     own = _own_keys(moving)
     if own is not None:
         return own
+    key, stamp = (scene.session_uid, moving.session_uid), _stamp(scene, moving)
+    if still:
+        if key not in _played or _played[key][0] != stamp:
+            raise InputError(f"object {moving.name}", "not played since it was opened or changed", "its motion",
+                             "press Update, which plays it")
+        return _played[key][1:]
+    frames, places = _play(scene, moving)
+    _played.pop(key, None)
+    _played[key] = stamp, frames, places
+    if len(_played) > MOST_PLAYED:
+        del _played[next(iter(_played))]
+    return frames, places
+
+
+def _stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
+    """What is another where an object's own keys or the frames in which it moves have changed."""
+    action, slot = channels.playing(moving)
+    keys = [channels.keys_of(curve)["co"].tobytes() for curve in channels.curves(action, slot).values()] if action else []
+    return *_range(scene, moving), hash(tuple(keys))
+
+
+def _play(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """The same, read by playing the scene."""
     first, last = _range(scene, moving)
     frames = np.arange(first, last + 1, dtype=float)
     bone = _hips(scene, moving) if moving.type == "ARMATURE" else None

@@ -133,7 +133,7 @@ def look(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> tuple[list[str], 
     if session.made(player.take) is None:
         lines.append("its take is not in this session: Update makes it again, hand-made keys are kept")
     try:
-        plan, _ = plans.plan_of(settings, player)
+        plan, _ = plans.plan_of(settings, player, still=True)
         folder = absolute(settings.library_folder)
         now = parts(plan, folder, _now["stamps"].get(folder) or library_stamp(folder))
         changed = stale(player.result.made_of, now)

@@ -22,37 +22,39 @@ WHOLE = 0.8  # seconds without a change after which a quick take is made as well
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Action, bpy.types.Scene)
 HOLDING = ("TRANSFORM_OT", "CURVE_OT", "VIEW3D_OT_cursor3d")
 
-_seen: dict = {"changed": 0.0, "dirty": False, "quick": {}}
+_seen: dict = {"changed": 0.0, "dirty": False, "quick": {}, "begun": {}}
 
 
-def edited(scene: bpy.types.Scene, player) -> bool:
-    """Whether the player asks for another track, other words or other choices than his newest take was made of; False
-    where he has none, or where what he asks for makes no sense just now."""
+def edited(scene: bpy.types.Scene, player) -> dict[str, str]:
+    """What the player asks for, where that is another track, other words or other choices than his newest take was made
+    of; empty where it is not, where he has none, or where what he asks for makes no sense just now."""
     made_of = json.loads(player.result.made_of or "{}")
     if not player.take or not made_of:
-        return False
+        return {}
     try:
-        plan = plans.plan_of(scene.beyond_mocap, player)[0]
+        asked = freshness.parts_of_plan(plans.plan_of(scene.beyond_mocap, player, still=True)[0])
     except (BeyondMocapError, OSError):
-        return False
-    return any(made_of.get(name) != value for name, value in freshness.parts_of_plan(plan).items())
+        return {}
+    return asked if any(made_of.get(name) != value for name, value in asked.items()) else {}
 
 
 def due(scene: bpy.types.Scene, now: float) -> tuple[str, str] | None:
-    """(player's name, "quick" or "whole") of whoever is to be updated at second `now`; None where nobody is."""
+    """(player's name, "quick" or "whole") of whoever is to be updated at second `now`; None where nobody is. The same
+    wish is begun once: what was cancelled, undone or cannot be made waits for the next edit."""
     if now - _seen["changed"] < SETTLED:
         return None
     players = {player.name: player for player in scene.beyond_mocap.players if player.use}
     if _seen["dirty"]:
-        name = next((name for name, player in players.items() if edited(scene, player)), None)
-        if name is not None:
-            _seen["quick"][name] = now
-            return name, "quick"
+        for name, player in players.items():
+            asked = edited(scene, player)
+            if asked and _seen["begun"].get(name) != asked:
+                _seen["quick"][name], _seen["begun"][name] = now, asked
+                return name, "quick"
         _seen["dirty"] = False
     for name, since in list(_seen["quick"].items()):
         if now - max(since, _seen["changed"]) > WHOLE:
             del _seen["quick"][name]
-            if name in players:
+            if name in players and not edited(scene, players[name]):
                 return name, "whole"
     return None
 
@@ -98,4 +100,4 @@ def unregister():
         bpy.app.handlers.depsgraph_update_post.remove(_after_change)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    _seen.update(changed=0.0, dirty=False, quick={})
+    _seen.update(changed=0.0, dirty=False, quick={}, begun={})

@@ -82,12 +82,12 @@ class Result:
     takes: tuple[One, ...]
 
 
-def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How) -> Order:
-    """The order of one player; InputError where something is missing."""
+def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How, still: bool = False) -> Order:
+    """The order of one player; InputError where something is missing. still: see `drawn_track.read`."""
     if not settings.library_folder:
         raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1")
     preview.check(player)
-    plan, warnings = plans.plan_of(settings, player)
+    plan, warnings = plans.plan_of(settings, player, still)
     made = session.made(player.take)
     if how.kind == "stretch" and made is None:
         found = f"no take of {player.name} in this session"

@@ -20,9 +20,11 @@ def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
     return players
 
 
-def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> tuple[Plan, tuple[str, ...]]:
-    """The plan of one player, and what in the track asks for attention."""
-    track, found = clean(read_track(settings, player))
+def plan_of(
+    settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: bool = False
+) -> tuple[Plan, tuple[str, ...]]:
+    """The plan of one player, and what in the track asks for attention; still: see `drawn_track.read`."""
+    track, found = clean(read_track(settings, player, still))
     plan = Plan(
         track=track,
         timeline=timeline_of(player, settings.rate, track),

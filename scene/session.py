@@ -20,7 +20,6 @@ if TYPE_CHECKING:  # the library's modules are slow to import, and switching the
 KEPT_TAKES = 200
 KEPT_LIBRARIES = 3
 
-_session = uuid.uuid4().hex[:8]  # names of takes are saved in files, and another session counts from 1 too
 _numbers = itertools.count(1)
 _session = uuid.uuid4().hex[:8]  # part of every name, so that no take of another session is taken for one of this
 _libraries: dict[tuple[str, float | None], "Library"] = {}

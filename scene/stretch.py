@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..beyond_mocap.errors import InputError
-from . import blocks, strips
+from . import blocks, lanes, strips
 from .clock import of_scene
 from .settings import BeyondMocapPlayer, active_player
 
@@ -42,10 +42,9 @@ def _of_result(player: BeyondMocapPlayer) -> tuple[float, float] | None:
 def _of_words(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> tuple[float, float] | None:
     """The frames of the selected spans of words on a player's selected dot."""
     dot = strips.dot_of(player, scene)
-    if dot is None or not player.take or not dot.select_get() or dot.animation_data is None:
+    if dot is None or not player.take or not dot.select_get():
         return None
-    chosen = [strip for track in dot.animation_data.nla_tracks for strip in track.strips
-              if strip.select and not track.name.startswith("Moments")]
+    chosen = [strip for _, strip in lanes.strips(dot) if strip.select and strip.action.beyond_mocap.kind != "moments"]
     if not chosen:
         return None
     return min(strip.frame_start for strip in chosen), max(strip.frame_end for strip in chosen)

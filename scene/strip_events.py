@@ -29,12 +29,19 @@ def put_in_order(scene: bpy.types.Scene, only: set[str] | None = None) -> bool:
     clock, changed = of_scene(scene), False
     for player in scene.beyond_mocap.players:
         if player.dot is not None and _ours_to_change(player.dot):
-            changed |= dots.relay(player.dot, clock)
-            changed |= has(player.dot) and relay(player.dot, clock)
+            changed |= dots.relay(player.dot, clock) | _onto_clock(player.dot, clock)
     for target in scene.objects:
         if (only is None or target.name in only) and has(target) and _ours_to_change(target):
             changed |= tidy(target)
     return changed
+
+
+def _onto_clock(target: bpy.types.Object, clock: Clock) -> bool:
+    """Lay strips anew for a clock; where one of them cannot be read they wait, as they are, until it is renamed."""
+    try:
+        return has(target) and relay(target, clock)
+    except InputError:
+        return False
 
 
 def tidy(target: bpy.types.Object) -> bool:

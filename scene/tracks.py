@@ -37,10 +37,11 @@ def players_in(path: str, metadata: str = "", provider: str = "") -> tuple[list[
     return found, match.notes
 
 
-def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer) -> "Track":
-    """The samples of one player, within the section that the settings name where the file is a whole match."""
+def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: bool = False) -> "Track":
+    """The samples of one player, within the section that the settings name where the file is a whole match; still: see
+    `drawn_track.read`."""
     if player.drawn_track is not None:
-        return drawn_track.read(player.id_data, player.drawn_track, player.drawn_start)
+        return drawn_track.read(player.id_data, player.drawn_track, player.drawn_start, still)
     path = absolute(player.tracking_file)
     if not path:
         step = "choose one in step 2, or draw a track"

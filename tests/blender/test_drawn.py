@@ -1,6 +1,7 @@
 """Drawn tracks and pins: read as they lie in the world, made and taken away in one step, and told what is wrong."""
 
 import importlib
+import json
 import pathlib
 
 import bpy
@@ -135,6 +136,49 @@ def test_what_moves_is_a_track_in_its_own_frames(scene, drawn, kind):
     assert scene.frame_current == 20
     assert track.times[0] == pytest.approx(5.0) and track.times[-1] == pytest.approx(7.0)
     np.testing.assert_allclose(track.positions, np.column_stack([1 + 3 * (track.times - 5), 0 * track.times + 2]), atol=1e-4)
+
+
+def test_what_has_to_be_played_is_left_alone_where_the_scene_must_stand_still(scene, drawn, core):
+    chosen = moving("armature")
+    scene.frame_start, scene.frame_end = 10, 30
+    scene.frame_set(20)
+    seen = []
+    bpy.app.handlers.frame_change_post.append(lambda *_: seen.append(1))
+    try:
+        with pytest.raises(core("errors").InputError, match="press Update, which plays it"):
+            drawn.read(scene, chosen, still=True)
+        assert not seen
+        played = drawn.read(scene, chosen)
+        assert seen
+        seen.clear()
+        np.testing.assert_array_equal(drawn.read(scene, chosen, still=True).positions, played.positions)
+        scene.frame_end = 40
+        with pytest.raises(core("errors").InputError, match="press Update"):
+            drawn.read(scene, chosen, still=True)
+        assert not seen
+    finally:
+        bpy.app.handlers.frame_change_post.pop()
+
+
+def test_live_begins_the_same_wish_once(extension, scene):
+    live = importlib.import_module(f"{extension.__name__}.scene.live")
+    plans = importlib.import_module(f"{extension.__name__}.scene.plans")
+    freshness = importlib.import_module(f"{extension.__name__}.scene.freshness")
+    bpy.ops.beyond_mocap.draw_track()
+    player = scene.beyond_mocap.players[0]
+    parts = freshness.parts_of_plan(plans.plan_of(scene.beyond_mocap, player)[0])
+    player.take, player.result.made_of = "take", json.dumps(parts)
+    player.height = 1.9
+    live.mark()
+    now = live._seen["changed"]
+    try:
+        assert live.due(scene, now + 0.2) == ("Drawn", "quick")
+        assert [live.due(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4  # it failed, or was cancelled
+        player.height = 1.8
+        live.mark()
+        assert live.due(scene, live._seen["changed"] + 0.2) == ("Drawn", "quick")
+    finally:
+        live._seen.update(changed=0.0, dirty=False, quick={}, begun={})
 
 
 def test_a_drawn_player_has_a_dot_and_is_one_step(scene):

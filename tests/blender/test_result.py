@@ -104,6 +104,40 @@ def test_strips_play_what_the_action_plays(one, session):  # noqa: F811
     np.testing.assert_allclose(poses(body, frames), whole, atol=1e-6)
 
 
+def test_a_strip_that_was_split_becomes_part_of_the_action_once(one, extension):
+    hand_keys = importlib.import_module(f"{extension.__name__}.scene.hand_keys")
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept(form="STRIPS")
+    frames = np.arange(1, 360, 7.7)
+    whole, track = poses(one.body, frames), one.body.animation_data.nla_tracks["Beyond Mocap"]
+    first = max(track.strips, key=lambda strip: strip.frame_end - strip.frame_start)
+    middle, end, slot = round((first.frame_start + first.frame_end) / 2), first.frame_end, first.action_slot
+    first.frame_end = first.action_frame_end = middle  # what Split (Y) does
+    first.action.use_frame_range, first.action.frame_start, first.action.frame_end = True, middle, end
+    second = track.strips.new("second half", middle, first.action)
+    first.action.use_frame_range = False
+    second.action_slot, second.action_frame_start, second.action_frame_end = slot, middle, end
+    second.frame_start, second.frame_end = middle, end
+    assert bpy.ops.beyond_mocap.accept(form="ACTION") == {"FINISHED"}
+    np.testing.assert_allclose(poses(one.body, frames), whole, atol=1e-6)
+    assert len(hand_keys.of_body(one.body)[0]) == 0
+
+
+def test_a_player_is_removed_under_his_preview(one):
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept()
+    body = one.body
+    mine = bpy.data.actions.new("Mine")
+    body.animation_data.action = mine
+    bpy.ops.beyond_mocap.synthesize()
+    settings = bpy.context.scene.beyond_mocap
+    settings.active_player = settings.players.find(one.name)
+    assert bpy.ops.beyond_mocap.remove_player() == {"FINISHED"}
+    shared = settings.shared
+    assert mine.use_fake_user and not (shared.ball.kept or shared.camera.kept or shared.end_set)
+    assert body.animation_data.action.get("beyond_mocap_take") and body.name in bpy.context.scene.objects
+
+
 def test_a_preview_over_strips_and_back(one):
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.accept(form="STRIPS")

@@ -198,5 +198,15 @@ def test_another_frame_rate_of_the_scene(room, tmp_path, core):
     assert room("strip_events").put_in_order(scene)
     assert room("strips").read(player, scene) == before
     assert room("strips").moments(player, scene)[0].frame == round(101 + 6.022 * 24 / 1.001)
+    scene.render.fps = 30
+    strip = next(strip for track, strip in room("lanes").strips(player.dot) if strip.name == "running")
+    strip.name = "take 5 #"  # which nobody can read: all of it waits, and says so
+    stands = strip.frame_start, player.dot.beyond_mocap_lanes.clock
+    room("strip_events").put_in_order(scene)
+    assert (strip.frame_start, player.dot.beyond_mocap_lanes.clock) == stands
+    strip.name = "running"
+    assert room("strip_events").put_in_order(scene) and room("strips").read(player, scene) == before
+    scene.render.fps = 24
+    room("strip_events").put_in_order(scene)
     scene.frame_set(101 + 120)
     assert player.dot.matrix_world.translation.x == pytest.approx(2 * 120 / (24 / 1.001), abs=1e-3)

@@ -109,6 +109,7 @@ def test_moments(player, asked):
     assert "receive" not in asked()
     assert_one_step(ops.go_to_moment, strip="Moments", index=0)
     assert bpy.context.scene.frame_current == 145
+    refused("one that is there", ops.go_to_moment, strip="Moments", index=7)
     assert_one_step(ops.edit_words, words="kick left top")
     assert "6.02 kick left top\n" in asked()
 
