@@ -83,10 +83,10 @@ def resynthesize(
     """The take `before` after its plan has become `plan`: searched and built anew only where the change touches it.
 
     Pins are laid on anew. A whole synthesis where the change is not one of words, track, ball or pins (another method,
-    rate, length or choice), where `before` was made from another library or by another method than "path", or where all of it is touched. The
-    same library, plan and take give the same bits. anew: a stretch of which another solution is wanted, whether or not
-    its plan has changed; InputError where it lies outside the take, or for another method than "path". progress,
-    cancelled, hurry and what is raised: as for `synthesize`.
+    rate, length or choice), where `before` was made from another library or by another method than "path", or where all
+    of it is touched. The same library, plan and take give the same bits. anew: a stretch of which another solution is
+    wanted, whether or not its plan has changed; InputError where it lies outside the take, or for another method than
+    "path". progress, cancelled, hurry and what is raised: as for `synthesize`.
     """
     from threadpoolctl import threadpool_limits
 

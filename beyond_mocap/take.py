@@ -59,8 +59,8 @@ class Take:
     correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it.
     ik_miss: (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right,
     extra steps of feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
-    at the library's rate, for `resynthesize`. cut_short: whether part of it was searched in a hurry. pins: how they were met; unpinned: motion and contacts without them, None
-    where there are none.
+    at the library's rate, for `resynthesize`. cut_short: whether part of it was searched in a hurry. pins: how they were
+    met; unpinned: motion and contacts without them, None where there are none.
     """
 
     motion: Motion

@@ -7,7 +7,7 @@ are no constraints, drivers or NLA strips left that an exporter could read other
 from __future__ import annotations
 
 import os
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.whole import beside
 from ..beyond_mocap.motion import quaternion
 from . import bone_maps, channels
+from .aside import scene_aside
 from .measure import frames_per_second, units_per_metre
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
@@ -129,32 +130,18 @@ def _look(scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarra
 
 @contextmanager
 def _stage(context: bpy.types.Context, rate: float, frames: int):
-    """A scene of its own that is taken away, with all that came in; the window shows the user's scene again."""
-    kinds = ("objects", "armatures", "actions", "meshes", "collections")
-    before = {kind: {item.session_uid for item in getattr(bpy.data, kind)} for kind in kinds}
-    scene, window, chosen = context.scene, context.window, list(context.selected_objects)
+    """A scene of its own at this rate; afterwards selection and mode are the user's again."""
+    units, chosen = context.scene.unit_settings, list(context.selected_objects)
     active = context.view_layer.objects.active
-    stage = bpy.data.scenes.new("Beyond Mocap export")
-    stage.unit_settings.system = scene.unit_settings.system
-    stage.unit_settings.scale_length = scene.unit_settings.scale_length
-    stage.render.fps = max(1, round(rate))
-    stage.render.fps_base = stage.render.fps / rate
-    stage.frame_start, stage.frame_end = 0, max(frames - 1, 0)
     mode = active.mode if active is not None else "OBJECT"
     try:
-        if window is not None:
-            window.scene = stage
-        with nullcontext() if window is not None else context.temp_override(
-                scene=stage, view_layer=stage.view_layers[0]):
+        with scene_aside("Beyond Mocap export") as stage:
+            stage.unit_settings.system, stage.unit_settings.scale_length = units.system, units.scale_length
+            stage.render.fps = max(1, round(rate))
+            stage.render.fps_base = stage.render.fps / rate
+            stage.frame_start, stage.frame_end = 0, max(frames - 1, 0)
             yield stage
     finally:
-        if window is not None:
-            window.scene = scene
-        for kind in kinds:
-            room = getattr(bpy.data, kind)
-            for item in [item for item in room if item.session_uid not in before[kind]]:
-                room.remove(item)
-        bpy.data.scenes.remove(stage)
         for one in context.view_layer.objects:
             if one.select_get() != (one in chosen):
                 one.select_set(one in chosen)

@@ -8,7 +8,6 @@ units, rest pose and bone directions are.
 from __future__ import annotations
 
 import tempfile
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +19,7 @@ from ..beyond_mocap.motion import quaternion
 from ..beyond_mocap.motion.motion import Motion
 from ..beyond_mocap.motion.skeleton import Skeleton
 from . import channels
+from .aside import scene_aside
 
 if TYPE_CHECKING:
     from ..beyond_mocap.files.bvh import BvhClip
@@ -40,7 +40,8 @@ def read(path: str | Path) -> list[Take]:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such file", "a file with an animated armature", "check the path")
-    with _aside() as scene:
+    with scene_aside("Import") as scene:
+        scene.render.fps_base = 1.0
         scene.render.fps = 30 if path.suffix.lower() not in _USD else _usd_rate(path)
         _bring_in(path)
         rig = _largest_rig(path, scene)
@@ -142,35 +143,6 @@ def _exists(operator) -> bool:
     except (KeyError, AttributeError):
         return False
     return True
-
-
-@contextmanager
-def _aside():
-    """A scene of its own, in metres, in the window; all data that comes in meanwhile is removed at the end."""
-    before = _all_data()
-    window = bpy.context.window
-    home, layer = window.scene, window.view_layer.name
-    scene = bpy.data.scenes.new("Import")
-    scene.render.fps_base = 1.0
-    window.scene = scene
-    try:
-        yield scene
-    finally:
-        window.scene = home
-        window.view_layer = home.view_layers[layer]
-        came = [item for key, item in _all_data().items() if key not in before]
-        bpy.data.batch_remove([item for item in came if not isinstance(item, bpy.types.Scene)])
-        bpy.data.scenes.remove(scene)
-
-
-def _all_data() -> dict:
-    """All that the file holds, by kind and identity."""
-    found = {}
-    for name in dir(bpy.data):
-        kind = getattr(bpy.data, name)
-        if isinstance(kind, bpy.types.bpy_prop_collection) and name not in {"window_managers", "screens", "workspaces"}:
-            found.update({(name, item.session_uid): item for item in kind if hasattr(item, "session_uid")})
-    return found
 
 
 def _largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:

@@ -31,8 +31,8 @@ FORMATS = (
 ENGINES = (
     ("BLENDER", "Blender", "Axes as Blender's exporters have them: Y up, -Z forward"),
     ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
-    ("UNITY", "Unity", "For Unity: FBX in metres with axes applied, Y up, -Z forward"),
-    ("GODOT", "Godot", "For Godot: Y up, +Z forward"),
+    ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),
+    ("GODOT", "Godot", "For Godot: Y up, -Z forward, in USD too"),
 )
 WHO = (
     ("ACTIVE", "Active", "The active player's rig, else body; without players the active armature"),

@@ -76,9 +76,9 @@ class States:
 class PathSearch:
     """One search; `run()` gives the edit list.
 
-    between: search this stretch only and keep the rest. used: footage to do without where that can be. hurry: when it says so the rest is searched by a narrow beam,
-    and `hurried` is the frame from which on, else None; before the first slot is filled it ends the search as
-    `cancelled` does.
+    between: search this stretch only and keep the rest. used: footage to do without where that can be. hurry: when it
+    says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None; before the first
+    slot is filled it ends the search as `cancelled` does.
     """
 
     def __init__(

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import (
-    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill, gait_thresholds, spoken,
-    words_per_frame,
+    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill, gait_thresholds,
+    spoken, words_per_frame,
 )
 from ..errors import NotInLibrary, TimedLine
 from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
-from .style import off_style_cost
 from ..motion.track import SampledTrack, sample
 from ..plan import Plan
+from .style import off_style_cost
 
 PAPERS_OMEGA = 4.0
 
@@ -42,8 +42,8 @@ class Wanted:
     """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
     avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style: (N,)
     float32 cost per slot of library frames without the style that is asked, None where none is. weak_foot: side of the
-    foot that key moments without a side rather leave, or "". gait: per frame index into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use.
-    warnings: what the library lacks of what is asked."""
+    foot that key moments without a side rather leave, or "". gait: per frame index into the library's gaits. timeline:
+    filled. keys: in time order. allowed: (C,) clips to use. warnings: what the library lacks of what is asked."""
 
     track: SampledTrack
     asked: tuple[Words, ...]
@@ -133,7 +133,8 @@ def _without(moment: KeyMoment, usable: tuple[Key, ...], made: tuple[Key, ...], 
     kept = tuple(tuple(key for key in keys if not key.words.intersection(moment.avoid)) for keys in (usable, made))
     if serving(usable, moment.words) and not serving(kept[0], moment.words):
         avoided = " ".join(MUST_NOT + word for word in moment.avoid)
-        warnings.append(f"{moment.time:g} s: no clip for '{' '.join(moment.words)}' is {avoided}: one is shown all the same")
+        text = f"{moment.time:g} s: no clip for '{' '.join(moment.words)}' is {avoided}: one is shown all the same"
+        warnings.append(TimedLine(text, (moment.time, moment.time)))
         return usable, made
     return kept
 

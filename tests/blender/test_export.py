@@ -2,6 +2,7 @@
 
 import importlib
 import pathlib
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -212,6 +213,14 @@ def test_several_at_once(rooms, body, tmp_path):
     bpy.ops.wm.read_homefile(use_empty=True)
     READERS[".fbx"](str(tmp_path / "out.fbx"))
     assert sorted(o.name for o in bpy.data.objects if o.type == "ARMATURE") == ["Body", "Mixamo"]
+
+
+def test_the_file_browser_shows_the_name_that_is_written(rooms, extension):
+    operator = importlib.import_module(f"{extension.__name__}.operators.export_motion").BEYOND_MOCAP_OT_export_motion
+    for name, format, written in (("walk", "FBX", "walk.fbx"), ("walk.glb", "FBX", "walk.fbx"), ("a.v2", "GLB", "a.v2.glb")):
+        asked = SimpleNamespace(filepath=f"/here/{name}", format=format)
+        assert operator.check(asked, None) and asked.filepath == f"/here/{written}"
+        assert not operator.check(asked, None)
 
 
 def test_bad_places_and_choices_are_told(rooms, body, tmp_path, core, monkeypatch):
