@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import NotInLibrary
+from beyond_mocap.errors import NotInLibrary, spans_of
 from beyond_mocap.synthesis.wanted import needed, pool_frame
 
 
@@ -36,6 +36,7 @@ def test_a_key_moment_takes_no_clip_with_a_word_that_must_not_be(order, library)
     assert [library.clips[key.clip].mirrored for key in found.keys[0].choices] == [False] and not found.warnings
     only = order((4.0, "kick left -inside"))
     assert only.keys[0].choices and "no clip for 'kick left' is -inside" in only.warnings[0]
+    assert spans_of(only.warnings[0]) == ((only.keys[0].asked.time,) * 2,)
 
 
 def test_a_transition_asks_for_nothing(order):
