@@ -8,6 +8,7 @@ W_j the core's world rotation of a joint and R_j its bone's rotation at rest, th
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from dataclasses import dataclass, field
@@ -25,6 +26,7 @@ from .rig_controls import CHANNELS, Controls, overriding
 
 MARK = "beyond_mocap_rig"
 BEFORE = "beyond_mocap_before"
+KEYS = "beyond_mocap_keys"  # digest of the keys that were baked: with others somebody has worked on them
 LEGS_ALIKE = (0.8, 1.25)
 _FLOOR = (-0.01, 0.05)  # heights of standing toe joints, metres, whose soles are on the scene's own ground
 _MOST_LEAN = np.radians(30.0)
@@ -250,13 +252,14 @@ def fitted(
 def lay(one: Fitted) -> Baked:
     """Let the rig play what was worked out for it, as a new action."""
     rig, driven = one.driven.rig, one.driven
-    before = _remembered(rig, driven)
+    before, kept = _remembered(rig, driven), _keep_own(rig)
     channels.discard(rig, MARK)
     made = channels.animate(rig, f"{one.name} on {rig.name}", one.frames, one.curves)
     made[MARK], made[BEFORE] = True, json.dumps(before)
+    note(rig)
     for switch in driven.controls.switches:
         rig.pose.bones[switch.bone][switch.name] = switch.value
-    told = [*one.told, *_off(driven, one.frames, one.heads, driven.scene)]
+    told = [*one.told, *kept, *_off(driven, one.frames, one.heads, driven.scene)]
     return Baked(made, one.frames, one.fit.scale, one.fit.slides, told)
 
 
@@ -550,6 +553,36 @@ def _remembered(rig: bpy.types.Object, driven: Driven) -> dict:
         "constraints": [[o.bone, o.constraint, bones[o.bone].constraints[o.constraint].influence]
                         for o in driven.overrides],
     }
+
+
+def note(rig: bpy.types.Object) -> None:
+    """Remember the keys of the action that the rig plays as those that were baked."""
+    channels.playing(rig)[0][KEYS] = _digest(rig)
+
+
+def is_as_baked(rig: bpy.types.Object) -> bool:
+    """Whether nobody has changed the keys of the baked action that the rig plays."""
+    return channels.playing(rig)[0].get(KEYS) == _digest(rig)
+
+
+def _digest(rig: bpy.types.Object) -> str:
+    digest = hashlib.sha256()
+    for place, curve in sorted(channels.curves(*channels.playing(rig)).items()):
+        points = np.empty(2 * len(curve.keyframe_points), np.float32)
+        curve.keyframe_points.foreach_get("co", points)
+        digest.update(repr(place).encode() + points.tobytes())
+    return digest.hexdigest()
+
+
+def _keep_own(rig: bpy.types.Object) -> list[str]:
+    """A baked action on which somebody has worked is the user's own from now on; a line about it."""
+    playing, _ = channels.playing(rig)
+    if playing is None or not playing.get(MARK) or is_as_baked(rig):
+        return []
+    for name in (MARK, BEFORE, KEYS):
+        if name in playing:
+            del playing[name]
+    return [f"keys of the bake before were changed by hand: it is kept as the action {playing.name}"]
 
 
 def remove(rig: bpy.types.Object) -> None:

@@ -320,6 +320,25 @@ def test_a_removed_bake_leaves_nothing_behind(rooms, body):
     assert {b.name: [tuple(getattr(b, c)) for c in rooms["rig_controls"].CHANNELS] for b in rig.pose.bones} == before
 
 
+def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):
+    rig = rigs.mixamo()
+    settings = choose(rig, body)
+    press(bpy.ops.beyond_mocap.bake_to_rig)
+    press(bpy.ops.beyond_mocap.reduce_keys)
+    actions = len(bpy.data.actions)
+    press(bpy.ops.beyond_mocap.bake_to_rig)
+    assert len(bpy.data.actions) == actions and "by hand" not in settings.told
+    own = rig.animation_data.action
+    curve = next(iter(rooms["channels"].curves(own, rig.animation_data.action_slot).values()))
+    curve.keyframe_points[7].co.y += 0.1
+    value = curve.keyframe_points[7].co.y
+    press(bpy.ops.beyond_mocap.bake_to_rig)
+    assert own.name in settings.told and rig.animation_data.action != own
+    assert own.use_fake_user and curve.keyframe_points[7].co.y == value
+    press(bpy.ops.beyond_mocap.unbake)
+    assert rig.animation_data.action is None and own.name in bpy.data.actions
+
+
 def test_all_selected_rigs_at_once(rooms, body):
     several = [rigs.mixamo(), rigs.unreal(), rigs.metahuman()]
     choose(several[0], body)
