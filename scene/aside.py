@@ -31,10 +31,10 @@ def scene_aside(name: str):
 
 
 def _all_data() -> dict:
-    """All that the file holds, by kind and identity."""
+    """All that the file holds, by identity: newer Blenders list the same things under several names."""
     found = {}
     for name in dir(bpy.data):
         kind = getattr(bpy.data, name)
         if isinstance(kind, bpy.types.bpy_prop_collection) and name not in {"window_managers", "screens", "workspaces"}:
-            found.update({(name, item.session_uid): item for item in kind if hasattr(item, "session_uid")})
+            found.update({item.session_uid: item for item in kind if hasattr(item, "session_uid")})
     return found

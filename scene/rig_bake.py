@@ -42,8 +42,8 @@ _IK_FOLLOWERS = (
 
 @dataclass(frozen=True)
 class Wishes:
-    """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are alike).
-    bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again."""
+    """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are
+    alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again."""
 
     root: str = "KEEP"
     keeps_travel: bool | None = None

@@ -20,7 +20,6 @@ RAIL, SOLE, SOLE_EDGE, SEAM = 0.020, 0.024, 0.027, 0.030  # metres above the gro
 RAILS, HALF_SEAM = (0.13, 0.17), 0.35
 SPEED_FOOT, PER_SPEED = 0.05, 0.2  # metres of the speed curtain's foot, and of its height for each m/s
 BALL_SECONDS = 1.0
-BALL_RADIUS = 0.11
 MOST_PARTS = 4
 
 
@@ -160,6 +159,8 @@ def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
 
 def _moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
     """Strike points, the ball then and its way about them, and the gap between the two."""
+    from ...beyond_mocap.motion.track import BALL_RADIUS
+
     lines: list[tuple[np.ndarray, tuple]] = []
     for strike in found:
         lines.append((shapes.cross(strike.part, 0.06), colours.STRIKE))
