@@ -70,12 +70,22 @@ def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bp
         blocks.as_action(body, context.scene)
     _settle(player)
     result.state = "ACCEPTED"
-    shared = context.scene.beyond_mocap.shared
-    drop(shared.ball, MARK)
-    drop(shared.camera, stage.MARK)
-    shared.end_set = 0
+    _keep_shared(context)
     _name(context, player)
     return body
+
+
+def _keep_shared(context: bpy.types.Context) -> None:
+    """Ball and camera stay with what has been accepted: that is what comes back when previews of others are discarded."""
+    shared, players = context.scene.beyond_mocap.shared, context.scene.beyond_mocap.players
+    others, takes = any(player.result.state == "PREVIEW" for player in players), _takes(players, "ACCEPTED")
+    if not others or bake.ball_of(takes, context.scene.beyond_mocap) is not None:
+        drop(shared.ball, MARK)
+    drop(shared.camera, stage.MARK)
+    shared.end_set = 0
+    if others:
+        _follow(context, takes)
+        share(context)
 
 
 def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
@@ -132,8 +142,7 @@ def share(context: bpy.types.Context) -> None:
     comes back."""
     scene, settings = context.scene, context.scene.beyond_mocap
     shared = settings.shared
-    shown = [session.made(player.take) for player in settings.players if player.result.state != "NONE"]
-    takes = [made.take for made in shown if made is not None]
+    takes = _takes(settings.players, "ACCEPTED", "PREVIEW")
     previews = any(player.result.state == "PREVIEW" for player in settings.players)
     room = scene.collection.children.get(bake.COLLECTION)
     ball = room.objects.get(bake.BALL) if room is not None else None
@@ -141,18 +150,29 @@ def share(context: bpy.types.Context) -> None:
     if not previews:
         _as_before(scene, shared, ball, focus)
         return
-    path = bake.ball_of(takes, settings)
+    made_now, wanted = ball is None, bake.ball_of(takes, settings) is not None
+    if wanted and not made_now and not shared.ball.kept:
+        put_aside(shared.ball, ball)
+    if takes and focus is not None and not shared.camera.kept:
+        put_aside(shared.camera, focus)
+    _follow(context, takes)
+    if wanted and made_now:
+        shared.ball.kept = shared.ball.made = True
+
+
+def _takes(players, *states: str) -> list:
+    """The takes of players whose result is in one of these states, as far as this session has them."""
+    found = [session.made(player.take) for player in players if player.result.state in states]
+    return [made.take for made in found if made is not None]
+
+
+def _follow(context: bpy.types.Context, takes: list) -> None:
+    """Let ball and camera follow these takes."""
+    path = bake.ball_of(takes, context.scene.beyond_mocap)
     if path is not None:
-        if not shared.ball.kept and ball is not None:
-            put_aside(shared.ball, ball)
-        made_now = ball is None
         bake.the_ball(context, path)
-        if made_now:
-            shared.ball.kept = shared.ball.made = True
-    if takes and focus is not None:
-        if not shared.camera.kept:
-            put_aside(shared.camera, focus)
-        bake.camera(scene, takes)
+    if takes and stage.focus(context.scene) is not None:
+        bake.camera(context.scene, takes)
 
 
 def _as_before(scene: bpy.types.Scene, shared, ball, focus) -> None:

@@ -191,6 +191,29 @@ def test_two_players_share_the_ball(ready, session):  # noqa: F811
         bpy.ops.beyond_mocap.accept(player="nobody")
 
 
+def test_the_ball_stays_with_what_is_accepted_and_goes_with_what_is_discarded(ready, session):  # noqa: F811
+    first, second = ready.players  # only the first has a ball
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept(player=second.name)
+    assert "Ball" in bpy.data.objects and first.result.state == "PREVIEW"
+    bpy.ops.beyond_mocap.discard(player=first.name)
+    assert "Ball" not in bpy.data.objects
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept(player=first.name)
+    path = path_of_the_ball()
+    bpy.ops.beyond_mocap.discard(player=second.name)
+    np.testing.assert_array_equal(path_of_the_ball(), path)
+    assert not ready.shared.ball.kept and sum(action.name.startswith("Ball path") for action in bpy.data.actions) == 1
+
+
+def path_of_the_ball():
+    found = []
+    for frame in (30, 150, 200):
+        bpy.context.scene.frame_set(frame)
+        found.append(np.array(bpy.data.objects["Ball"].matrix_world.translation))
+    return np.array(found)
+
+
 def test_a_linked_body_is_refused(one, tmp_path):
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.accept()
