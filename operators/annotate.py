@@ -159,7 +159,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             area, region = _largest(context)
         at = (self.pointer[0] - region.x, self.pointer[1] - region.y) if self.state.trail and self.pointer else None
         content = popup.content(self.state, self.who, self.told, self.folded)
-        box = popup.laid_out(content, at, popup.free_part(area, region), popup.letters(), popup.width_of)
+        box = popup.laid_out(content, at, areas.free_part(area, region), popup.letters(), popup.width_of)
         _menu.update(box=box, region=region.as_pointer(), under=under.as_pointer(), hovered=None)
         _redraw(context)
 

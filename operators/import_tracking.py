@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.tracking import PROVIDERS
-from ..scene import bake, dots, plans, strips, tracks
+from ..scene import bake, dots, plans, strips, tracks, word_checks
 from ..scene.settings import as_setting
 from .verb import ImportVerb
 
@@ -78,9 +78,20 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
             dots.ensure(context, player)
             if player.annotation_file:
                 track = tracks.read_track(context.scene.beyond_mocap, player)
-                strips.write(context, player, plans.written_words(player, context.scene.beyond_mocap.rate, track))
+                words = plans.written_words(player, context.scene.beyond_mocap.rate, track)
+                strips.write(context, player, words)
+                self.tell_words(context.scene, player, words)
+            elif not player.feed_id:
+                self.report({"INFO"}, f"{player.name}: no words beside the track, so gaits by speed until you add some")
         except InputError as error:
             self.report({"WARNING"}, str(error))
+
+    def tell_words(self, scene, player, words):
+        """What came to the timeline, and what is wrong with it."""
+        found = f"{len(words.keys)} key moments, {len(words.spans)} stretches"
+        self.report({"INFO"}, f"{player.name}: words from {Path(player.annotation_file).name}: {found}")
+        for frame, line in word_checks.lines_of(scene, player.dot):
+            self.report({"WARNING"}, f"{player.name}, frame {frame}: {line}")
 
     def lengthen(self, scene, players):
         """Let the scene reach to the end of what has been imported, so that all of it plays while it is annotated."""

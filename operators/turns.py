@@ -200,14 +200,15 @@ class TurnsVerb(Verb):
     def over(self, context):
         """Nothing waits any more."""
         self.close(context)
-        for kind, text in self.told[-1:]:
-            self.report({kind}, text if len(self.told) == 1 else f"{text} ({self.wrote} written)")
+        for kind, text in self.told:
+            self.report({kind}, text)
+        if self.wrote > 1:
+            self.report({"INFO"}, f"players made: {self.wrote}; Accept keeps them, Discard undoes them")
         return {"FINISHED"} if self.last else {"CANCELLED"}
 
     def tell(self, text, kind="INFO"):
-        """Report a line now, and keep it for the end."""
+        """Keep a line for the end: Blender shows what a modal operator reports only then."""
         self.told.append((kind, text))
-        self.report({kind}, text)
 
     def cancel(self, context):
         """Blender takes the operator away (a file is loaded, the window closes): let the thread end unheard."""

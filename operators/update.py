@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene import freshness
 from .turns import TurnsVerb
 
 
@@ -23,3 +24,9 @@ After the file was opened again the take is made again as it was"""
             return False
         cls.poll_message_set("Synthesize first")
         return any(player.use and player.take for player in context.scene.beyond_mocap.players)
+
+    def wanted(self, context):
+        """Where something is out of date about some of the players, only those; the others stay untouched."""
+        found = super().wanted(context)
+        changed = [(player, how) for player, how in found if freshness.look(context.scene, player)[0]]
+        return changed or found

@@ -34,7 +34,7 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         layout.operator("beyond_mocap.import_tracking", icon="IMPORT")
         row = layout.row(align=True)
         row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
-        row.operator("beyond_mocap.track_object", icon="EMPTY_AXIS")
+        row.operator("beyond_mocap.track_object", text="From Object", icon="EMPTY_AXIS")
         row = layout.row()
         row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, "active_player", rows=3)
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")

@@ -24,6 +24,27 @@ def clear_status() -> None:
         workspace.status_text_set(None)
 
 
+def free_part(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
+    """The part of a region that no toolbar, sidebar, header or box of the last operator lies over, less a small margin:
+    left, bottom, right, top in its pixels."""
+    left, bottom, right, top = 0.0, 0.0, float(region.width), float(region.height)
+    for other in area.regions:
+        x, y = other.x - region.x, other.y - region.y
+        over = x < region.width and y < region.height and x + other.width > 0 and y + other.height > 0
+        if other.type == region.type or min(other.width, other.height) <= 1 or not over:
+            continue
+        if other.type == "HUD":  # stands free in the lower left corner: above it, or right of it where it is tall
+            if y + other.height < 0.5 * region.height:
+                bottom = max(bottom, y + other.height)
+            else:
+                left = max(left, x + other.width)
+        elif other.height > other.width:
+            left, right = (max(left, x + other.width), right) if x <= 0 else (left, min(right, x))
+        else:
+            bottom, top = (max(bottom, y + other.height), top) if y <= 0 else (bottom, min(top, y))
+    return (left + 4, bottom + 4, max(right - 4, left + 40), max(top - 4, bottom + 20))
+
+
 def _split(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
     view = _largest(window.screen, "VIEW_3D")
     if view is None:

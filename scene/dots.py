@@ -17,7 +17,7 @@ from .tracks import read_track
 
 BALL = "Ball dot"
 MARK = "beyond_mocap_dot"  # on actions that move a dot and may be made anew
-SIZE, BALL_SIZE = 0.25, 0.11  # metres
+SIZE, BALL_SIZE = 0.4, 0.11  # metres
 BALL_RGB = (0.9, 0.9, 0.9)
 FILES = ("tracking_file", "metadata_file")  # kept whole: a dot may be appended to a file in another folder
 ORIGIN = (*FILES, "feed_id", "provider", "shirt")
@@ -150,6 +150,7 @@ def _ball(scene: bpy.types.Scene, track: Track, room: bpy.types.Collection, cloc
 def _empty(scene: bpy.types.Scene, name: str, size: float, room: bpy.types.Collection) -> bpy.types.Object:
     dot = bpy.data.objects.new(name, None)
     dot.empty_display_type, dot.empty_display_size = "SPHERE", size * units_per_metre(scene)
+    dot.show_name = True
     room.objects.link(dot)
     return dot
 

@@ -116,21 +116,6 @@ def laid_out(
     return Box(content, box, tuple(rects), (left + edge, first), tuple(feet), (key, key + text), size)
 
 
-def free_part(area: bpy.types.Area, region: bpy.types.Region) -> Rect:
-    """The part of a region that no toolbar, sidebar or header lies over, less a small margin."""
-    left, bottom, right, top = 0.0, 0.0, float(region.width), float(region.height)
-    for other in area.regions:
-        x, y = other.x - region.x, other.y - region.y
-        over = x < region.width and y < region.height and x + other.width > 0 and y + other.height > 0
-        if other.type == region.type or min(other.width, other.height) <= 1 or not over:
-            continue
-        if other.height > other.width:
-            left, right = (max(left, x + other.width), right) if x <= 0 else (left, min(right, x))
-        else:
-            bottom, top = (max(bottom, y + other.height), top) if y <= 0 else (bottom, min(top, y))
-    return (left + 4, bottom + 4, max(right - 4, left + 40), max(top - 4, bottom + 20))
-
-
 def letters() -> float:
     """Pixels of the interface's letters."""
     preferences = bpy.context.preferences

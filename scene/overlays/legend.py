@@ -6,6 +6,7 @@ import blf
 import gpu
 from gpu_extras.batch import batch_for_shader
 
+from .. import areas
 from . import colours
 
 SIZE, MARGIN, LINE = 11, 5, 1.4  # points, points, sizes
@@ -54,9 +55,8 @@ def draw(context, on: list[str]) -> None:
     if not rows:
         return
     scale = context.preferences.system.ui_scale
-    tools = next((r.width for r in context.area.regions if r.type == "TOOLS"), 0)
-    overlap = context.preferences.system.use_region_overlap
-    x, y = (tools if overlap else 0) + 12 * scale, 12 * scale
+    left, bottom, _, _ = areas.free_part(context.area, context.region)
+    x, y = left + 8 * scale, bottom + 8 * scale
     for row in reversed(rows):
         y += row(x, y, scale) + 4 * scale
 

@@ -272,8 +272,10 @@ def test_the_part_of_an_editor_that_nothing_lies_over(room):
     others = [region("TOOLS", 100, 200, 60, 300), region("UI", 680, 50, 220, 560), region("HEADER", 100, 624, 800, 26),
               region("FOOTER", 100, 50, 800, 1), region("CHANNELS", 0, 50, 100, 600)]
     area = SimpleNamespace(regions=[main, *others])
-    assert room("popup").free_part(area, main) == (64, 4, 576, 570)
-    assert room("popup").free_part(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
+    assert room("areas").free_part(area, main) == (64, 4, 576, 570)
+    assert room("areas").free_part(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
+    assert room("areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 120)]), main) == (4, 134, 796, 596)
+    assert room("areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 400)]), main) == (314, 4, 796, 596)
 
 
 def test_the_list_in_the_corner_can_be_folded(room):
