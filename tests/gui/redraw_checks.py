@@ -45,11 +45,11 @@ class Stopwatch:
         self.rounds, self.undo = {}, []
         for cls in [*ours(bpy.types.Panel), *ours(bpy.types.UIList)]:
             for name in DRAWN:
-                if name in vars(cls):
+                if any(name in vars(one) for one in cls.__mro__ if one.__module__.startswith(EXTENSION)):
                     self.wrap(cls, name)
 
     def wrap(self, cls, name):
-        plain = vars(cls)[name]
+        plain, own = getattr(cls, name), name in vars(cls)  # a mixin's draw is measured in each class that has it
 
         def timed(*arguments):
             start = time.perf_counter()
@@ -59,7 +59,7 @@ class Stopwatch:
                 self.rounds.setdefault(f"{cls.__name__}.{name}", [0.0])[-1] += time.perf_counter() - start
 
         setattr(cls, name, with_arguments(plain.__code__.co_argcount, timed))
-        self.undo.append(lambda: setattr(cls, name, plain))
+        self.undo.append(lambda: setattr(cls, name, plain) if own else delattr(cls, name))
 
     def next_round(self):
         for seconds in self.rounds.values():
@@ -77,7 +77,8 @@ class Stopwatch:
 
 def redraw(kind, rounds=25):
     """Draw the tab of this kind of editor anew again and again; return the milliseconds of each draw function."""
-    area = window.area(kind)
+    areas = [area for area in window.window.screen.areas if area.type == kind]
+    area = max(areas, key=lambda area: area.width * area.height)  # the timeline is a dope sheet too, with no room for tabs
     yield from window.open_tab(area, TAB)
     watch = Stopwatch()
     for _ in range(rounds):
@@ -123,6 +124,7 @@ def check_the_tabs_of_the_timelines_draw_within_five_milliseconds():
     for kind in [kind for kind in EDITORS[1:] if kind in kinds]:
         area.type = kind
         yield 0.5
-        assert told(kind, (yield from redraw(kind))) <= LIMIT_MS
+        spent = told(kind, (yield from redraw(kind)))
+        assert 0.0 < spent <= LIMIT_MS, spent
         area.type = "VIEW_3D"
         yield 0.5

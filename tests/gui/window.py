@@ -108,7 +108,14 @@ class Window:
         """Show the editor's sidebar with this tab in front."""
         area.spaces.active.show_region_ui = True
         yield 0.5
-        self.sidebar(area).active_panel_category = category
+        for _ in range(20):  # a sidebar has no tabs to choose from before it has been drawn
+            try:
+                self.sidebar(area).active_panel_category = category
+                break
+            except AttributeError:
+                area.tag_redraw()
+                yield 0.25
+        assert self.sidebar(area).active_panel_category == category, f"no tab {category} in the {area.type}"
         area.tag_redraw()
         yield 0.5
 
