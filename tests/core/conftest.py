@@ -19,6 +19,9 @@ from beyond_mocap.motion.moves import getting_up
 from beyond_mocap.motion.neutral import neutral_stance
 from beyond_mocap.motion.resting import on_the_side
 from beyond_mocap.motion.track import Track
+from beyond_mocap.plan import Plan
+from beyond_mocap.synthesize import synthesize
+from beyond_mocap.take import Take
 
 # clip -> metres per second, words
 
@@ -151,3 +154,22 @@ def timeline_of():
         return parse_timeline("".join(" ".join(map(str, line)) + "\n" for line in lines))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def track(track_of) -> Track:
+    """Twenty seconds: a walk that becomes a jog, in a wide bow, with the ball ahead."""
+    speed, way = (lambda t: 1.4 + 0.7 * (1 + np.tanh(t - 6.0))), (lambda t: 0.6 * np.sin(0.3 * t))
+    return track_of(speed, seconds=20.0, turn=way, ball=True)
+
+
+@pytest.fixture(scope="session")
+def asked(timeline_of) -> Timeline:
+    """Two kicks and a stretch of walking, for `track`."""
+    return timeline_of((5.0, "kick right"), (12.0, 14.0, "walking left"), (17.0, "kick"))
+
+
+@pytest.fixture(scope="session")
+def take(library, track, asked) -> Take:
+    """What comes of `track` and `asked`."""
+    return synthesize(library, Plan(track=track, timeline=asked))

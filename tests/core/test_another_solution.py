@@ -10,23 +10,6 @@ from beyond_mocap.synthesis.used import AGAIN, SAME_CLIP, Used, price
 from beyond_mocap.synthesize import synthesize
 
 
-@pytest.fixture(scope="module")
-def track(track_of):
-    """Twenty seconds: a walk that becomes a jog, in a wide bow, with the ball ahead."""
-    speed, way = (lambda t: 1.4 + 0.7 * (1 + np.tanh(t - 6.0))), (lambda t: 0.6 * np.sin(0.3 * t))
-    return track_of(speed, seconds=20.0, turn=way, ball=True)
-
-
-@pytest.fixture(scope="module")
-def asked(timeline_of):
-    return timeline_of((5.0, "kick right"), (12.0, 14.0, "walking left"), (17.0, "kick"))
-
-
-@pytest.fixture(scope="module")
-def take(library, track, asked):
-    return synthesize(library, Plan(track=track, timeline=asked))
-
-
 def changed(before, after):
     """(T,) bool: frames of which any bit is another."""
     a, b = before.motion, after.motion

@@ -1,36 +1,16 @@
 """A track drawn in the window: its points dragged, the preview follows by itself; pins and the player's own choices."""
 
-import importlib
 import time
 
 import bpy
-from tab import EXTENSION, PICTURES, TAB, assert_no_trouble_since, output, sample, window
+from tab import PICTURES, TAB, assert_no_trouble_since, output, room, run, sample, settings, window
 
 LIMIT = 300
-
-
-def room(name):
-    """One of the extension's modules."""
-    return importlib.import_module(f"{EXTENSION}.{name}")
-
-
-def settings():
-    """The settings of the window's scene; looked up each time, since undo replaces them."""
-    return window.window.scene.beyond_mocap
 
 
 def player():
     """The drawn player."""
     return settings().players["Drawn"]
-
-
-def run(name, how="INVOKE_DEFAULT", **arguments):
-    """An operator as its button in the 3D view runs it."""
-    area = window.area("VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window.window, area=area, region=region):
-        group, verb = name.split(".")
-        return getattr(getattr(bpy.ops, group), verb)(how, True, **arguments)
 
 
 def until(true, limit=60.0):

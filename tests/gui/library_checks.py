@@ -1,38 +1,18 @@
 """The library panel in a real window: the list, the watched folder, other file forms, dropped files, words, assets."""
 
-import importlib
 import shutil
 import time
 
 import bpy
-from tab import EXTENSION, PICTURES, TAB, moves, output, sample, window
+from tab import PICTURES, TAB, moves, output, room, run, sample, settings, window
 from window import unfold
 
 LIMIT = 900
 
 
-def room(name):
-    """One of the extension's modules."""
-    return importlib.import_module(f"{EXTENSION}.{name}")
-
-
-def settings():
-    """The settings of the window's scene."""
-    return window.window.scene.beyond_mocap
-
-
 def listing():
     """The list of clips."""
     return bpy.context.window_manager.beyond_mocap_clips
-
-
-def run(name, how="INVOKE_DEFAULT", **arguments):
-    """An operator as its button in the 3D view runs it."""
-    area = window.area("VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window.window, area=area, region=region):
-        group, verb = name.split(".")
-        return getattr(getattr(bpy.ops, group), verb)(how, True, **arguments)
 
 
 def until(true, limit=180.0, what=""):

@@ -1,36 +1,16 @@
 """Making takes with the window alive: players queue, each arrives as it is made, and nothing stale is ever written."""
 
-import importlib
 import time
 
 import bpy
-from tab import EXTENSION, PICTURES, TAB, output, sample, window
+from tab import PICTURES, TAB, output, room, run, sample, settings, window
 
 LIMIT = 600
-
-
-def room(name):
-    """One of the extension's modules."""
-    return importlib.import_module(f"{EXTENSION}.{name}")
-
-
-def settings():
-    """The settings of the window's scene; looked up each time, since undo replaces them."""
-    return window.window.scene.beyond_mocap
 
 
 def work():
     """What runs just now."""
     return bpy.context.window_manager.beyond_mocap_work
-
-
-def run(name, how="INVOKE_DEFAULT", **arguments):
-    """An operator as its button in the 3D view runs it."""
-    area = window.area("VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window.window, area=area, region=region):
-        group, verb = name.split(".")
-        return getattr(getattr(bpy.ops, group), verb)(how, True, **arguments)
 
 
 def states():

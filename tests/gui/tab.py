@@ -4,6 +4,7 @@
 file of checks, so that these need not import anything from here.
 """
 
+import importlib
 import pathlib
 import re
 import shutil
@@ -19,6 +20,25 @@ SAMPLE = PICTURES / "sample"  # a copy of sample_blend, since a library's cache 
 
 output = Output()
 window = Window()
+
+
+def room(name):
+    """One of the extension's modules, by its dotted name below the extension."""
+    return importlib.import_module(f"{EXTENSION}.{name}")
+
+
+def settings():
+    """The settings of the window's scene; looked up each time, since undo replaces them."""
+    return window.window.scene.beyond_mocap
+
+
+def run(name, how="INVOKE_DEFAULT", **arguments):
+    """An operator as its button in the 3D view runs it."""
+    area = window.area("VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window.window, area=area, region=region):
+        group, verb = name.split(".")
+        return getattr(getattr(bpy.ops, group), verb)(how, True, **arguments)
 
 
 def sample():

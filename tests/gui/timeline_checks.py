@@ -1,16 +1,10 @@
 """The timeline in the NLA editor, as an animator uses it: Blender's own keys on strips, names of key moments, undo."""
 
-import importlib
 
 import bpy
-from tab import EXTENSION, PICTURES, TAB, operator_of, sample, window
+from tab import PICTURES, TAB, operator_of, room, sample, window
 
 LIMIT = 300
-
-
-def room(name):
-    """A module of the extension by its dotted name."""
-    return importlib.import_module(f"{EXTENSION}.{name}")
 
 
 def nla():

@@ -7,17 +7,12 @@ import time
 
 import addon_utils
 import bpy
-from tab import PICTURES, choose_file, fill_in, moves, output, press_button, sample, window
+from tab import PICTURES, choose_file, fill_in, moves, output, press_button, sample, settings, window
 
 sys.path.insert(0, str(pathlib.Path("tests/blender").resolve()))
 from undo import state  # noqa: E402
 
 LIMIT = 540
-
-
-def settings():
-    """Looked up each time, since undo replaces them."""
-    return window.window.scene.beyond_mocap
 
 
 def the_file():

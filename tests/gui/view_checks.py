@@ -1,25 +1,14 @@
 """What is drawn over the 3D view: every overlay, cheap to draw, and nothing left behind or broken by undo, delete, load."""
 
-import importlib
 import time
 
 import bpy
 from mathutils import Euler, Quaternion
-from tab import EXTENSION, PICTURES, TAB, output, sample, window
+from tab import PICTURES, TAB, output, room, sample, settings, window
 from window import Stand
 
 LIMIT = 600
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
-
-
-def room(name):
-    """One of the extension's modules."""
-    return importlib.import_module(f"{EXTENSION}.{name}")
-
-
-def settings():
-    """The settings of the window's scene; looked up each time, since undo replaces them."""
-    return window.window.scene.beyond_mocap
 
 
 def switch(*names):
