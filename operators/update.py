@@ -26,7 +26,11 @@ After the file was opened again the take is made again as it was"""
         return any(player.use and player.take for player in context.scene.beyond_mocap.players)
 
     def wanted(self, context):
-        """Where something is out of date about some of the players, only those; the others stay untouched."""
+        """Where something is out of date about some of the players, only those; the others stay untouched. Drawn tracks
+        are read anew in any case, since `look` does not play what has to be played."""
         found = super().wanted(context)
-        changed = [(player, how) for player, how in found if freshness.look(context.scene, player)[0]]
+        if len(found) == 1:
+            return found
+        changed = [(player, how) for player, how in found
+                   if player.drawn_track is not None or freshness.look(context.scene, player)[0]]
         return changed or found
