@@ -1,0 +1,107 @@
+"""The path that a motion has gone: its places on the ground, and smooth curves through them (Path editing §3.1.1).
+
+A polynomial, as the paper has it, and a smoothing spline, which does not care how long the motion is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion.contacts import ground_height
+from ..motion.humanoid import identify
+from ..motion.motion import Motion, forward_kinematics
+from ..motion.path import Path, PolynomialPath, SplinePath
+from ..motion.smooth_spline import smoothing_spline
+
+KINDS = ("spline", "polynomial")
+SECONDS = 0.4
+_PIECE = 0.25  # width of a spline's pieces, as a share of its stiffness: finer ones change nothing
+_FLAT = 0.10  # metres between the lowest and highest ground that a flat recording seems to have
+
+
+def fit(motion: Motion, standing: np.ndarray, kind: str = "spline", degree: int = 13) -> Path:
+    """The path of a motion, on the ground; its parameter is seconds from the first frame.
+
+    standing: (T, 2, 2) bool, `contacts.points` of the motion. kind: one of KINDS. degree: of the polynomial. InputError
+    for another kind, a degree too high, fewer than two frames.
+    """
+    if kind not in KINDS:
+        raise InputError("path fit", kind, " or ".join(KINDS))
+    places, times = places_on_ground(motion, standing), np.arange(len(motion)) / motion.fps
+    return fit_spline(places, times) if kind == "spline" else fit_polynomial(places, times, degree)
+
+
+def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> PolynomialPath:
+    """The polynomial of a degree that is nearest to places (T, 3) in metres at times (T,) in seconds, by least squares.
+
+    Legendre polynomials of time scaled to -1 .. 1 are nearly orthogonal over even frames, so that degree 45 is as exact as
+    degree 2. InputError where the degree is below 1 or there are too few frames for it.
+    """
+    places, times = _checked(places, times)
+    if not 1 <= degree <= len(times) - 1:
+        raise InputError("path fit", f"degree {degree}", f"1 to {len(times) - 1}, one less than the frames")
+    scaled = (2.0 * times - times[0] - times[-1]) / (times[-1] - times[0])
+    basis = np.polynomial.legendre.legvander(scaled, degree)
+    orthogonal, triangle = np.linalg.qr(basis)
+    origin = places.mean(axis=0)
+    coefficients = np.linalg.solve(triangle, orthogonal.T @ (places - origin))
+    coefficients[0] += origin
+    return PolynomialPath(coefficients, (float(times[0]), float(times[-1])))
+
+
+def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) -> SplinePath:
+    """The smooth curve near places (T, 3) in metres at times (T,) in seconds: least squares, and a price on acceleration.
+
+    seconds: sway slower than about six times this is a way taken, faster is sway, as in `motion.root_path`.
+    """
+    places, times = _checked(places, times)
+    pieces = max(int(np.ceil((times[-1] - times[0]) / (_PIECE * seconds))), 4)
+    return SplinePath(*smoothing_spline(places, times, pieces, seconds))
+
+
+def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
+    """Where the body is on the ground: (T, 3) metres, the pelvis's x and y and the height of the ground under it.
+
+    standing: (T, 2, 2) bool, left and right, heel and toe. Where the soles that stand lie within a hand's breadth of
+    height, the ground is flat; else its height is that of the feet that stand, smoothed, and between stances a straight
+    line over time.
+    """
+    body = identify(motion.skeleton)
+    positions, _ = forward_kinematics(motion)
+    places = positions[:, body.hips].copy()
+    places[:, 2] = ground_height(motion)
+    feet = [(body.left.foot, body.left.toe_or_foot), (body.right.foot, body.right.toe_or_foot)]
+    heights = _soles(positions[..., 2][:, feet], standing, places[0, 2])
+    known = np.flatnonzero(np.isfinite(heights))
+    if len(known) < 2 or np.ptp(np.percentile(heights[known], [5, 95])) <= _FLAT:
+        return places
+    places[:, 2] = np.interp(np.arange(len(motion)), known, heights[known])
+    return places
+
+
+def _soles(heights: np.ndarray, standing: np.ndarray, floor: float) -> np.ndarray:
+    """The ground's height (T,) under the feet that stand, NaN where none does, from joints' heights (T, 2, 2).
+
+    An ankle is above the ground as much as it is usually above the toe where both stand; without toes, above the floor.
+    """
+    flat = standing.all(axis=2)
+    above = np.median((heights[..., 0] - heights[..., 1])[flat]) if flat.any() else 0.0
+    toes = np.where(standing[..., 1], heights[..., 1], np.nan)
+    soles = np.where(standing[..., 1], toes, np.where(standing[..., 0], heights[..., 0] - above, np.nan))
+    if flat.any() and above == 0.0:  # no toe joints
+        soles = soles - (np.nanpercentile(soles, 2) - floor)
+    count = np.isfinite(soles).sum(axis=1)
+    return np.where(count > 0, np.nansum(soles, axis=1) / np.maximum(count, 1), np.nan)
+
+
+def _checked(places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both as arrays of floats, or InputError."""
+    places, times = np.asarray(places, dtype=float), np.asarray(times, dtype=float)
+    if places.ndim != 2 or places.shape[1] != 3 or times.shape != (len(places),):
+        raise InputError("path fit", f"places {places.shape}, times {times.shape}", "(T, 3) and (T,)")
+    if len(times) < 2 or not np.all(np.diff(times) > 0.0):
+        raise InputError("path fit", f"{len(times)} frames", "two or more, one after the other")
+    if not np.isfinite(places).all():
+        raise InputError("path fit", f"frame {np.flatnonzero(~np.isfinite(places).all(axis=1))[0]} is not finite", "metres")
+    return places, times

@@ -1,0 +1,78 @@
+"""Arc length against lengths known in closed form, and back, also where the speed vanishes."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.motion.arc_length import ArcLength
+from beyond_mocap.motion.path import PolynomialPath, SplinePath
+
+LEGENDRE = np.polynomial.legendre
+
+
+def polynomial(*rows, domain=(0.0, 1.0)):
+    """A path whose x, y, z are polynomials 1, u, u^2 ... of the parameter."""
+    size = max(len(row) for row in rows)
+    low, high = domain
+    scaled = np.polynomial.Polynomial([(low + high) / 2, (high - low) / 2])
+    columns = []
+    for row in rows:
+        series = np.polynomial.Polynomial(row)(scaled).coef
+        columns.append(np.pad(LEGENDRE.poly2leg(series), (0, size))[:size])
+    return PolynomialPath(np.stack(columns, axis=1), domain)
+
+
+def bezier(*points):
+    """One cubic piece from its four control points."""
+    return SplinePath(np.repeat([0.0, 1.0], 4), np.array(points, dtype=float))
+
+
+def back_and_forth(arc, count=101):
+    """The largest error in metres of parameter and length one after the other."""
+    s = np.linspace(0.0, arc.length, count)
+    return np.abs(arc.at(arc.parameter(s)) - s).max()
+
+
+def test_a_parabola_has_its_length():
+    arc = ArcLength(polynomial([0, 1], [0, 0, 1], [0], domain=(0.0, 2.0)))
+    assert arc.length == pytest.approx(np.sqrt(17) + np.arcsinh(4) / 4, abs=1e-9)
+    assert arc.at(np.array([1.0]))[0] == pytest.approx(np.sqrt(5) / 2 + np.arcsinh(2) / 4, abs=1e-9)
+    assert back_and_forth(arc) < 1e-9
+
+
+def test_who_slows_to_a_stop_and_goes_on_has_run_both_halves():
+    """x = (u - 0.3)^3: the speed touches zero within the only piece; x = (u - 0.3)^2 turns round there."""
+    cubic, square = np.poly([0.3] * 3)[::-1], np.poly([0.3] * 2)[::-1]
+    assert ArcLength(polynomial(cubic, [0], [0])).length == pytest.approx(0.7**3 + 0.3**3, abs=1e-7)
+    arc = ArcLength(polynomial(square, [0], [0]))
+    assert arc.length == pytest.approx(0.7**2 + 0.3**2, abs=1e-7)
+    assert back_and_forth(arc) < 1e-7
+
+
+def test_a_cusp():
+    """x = v^2, y = v^3 about v = u - 0.4: the speed is |v| sqrt(4 + 9 v^2)."""
+    arc = ArcLength(polynomial(np.poly([0.4] * 2)[::-1], np.poly([0.4] * 3)[::-1], [0]))
+
+    def whole(v):
+        return ((4 + 9 * v * v) ** 1.5 - 8) / 27
+
+    assert arc.length == pytest.approx(whole(0.4) + whole(0.6), abs=1e-7)
+
+
+def test_a_bezier_curve_against_adaptive_quadrature():
+    from scipy.integrate import quad
+
+    path = bezier((0, 0, 0), (3, 4, 1), (-2, 4, 2), (1, 0, 0.5))
+    truth, _ = quad(lambda u: np.linalg.norm(path.at(np.array([u]), 1)), 0, 1, epsabs=1e-12, limit=500)
+    assert ArcLength(path).length == pytest.approx(truth, abs=1e-8)
+
+
+def test_a_path_of_one_place_has_no_length():
+    arc = ArcLength(bezier(*[(1, 2, 3)] * 4))
+    assert arc.length < 1e-12 and np.abs(arc.at(np.array([0.0, 0.5, 2.0]))).max() < 1e-12
+    assert np.isfinite(arc.parameter(np.array([-1.0, 0.0, 5.0]))).all()
+
+
+def test_beyond_its_ends_it_is_at_its_ends():
+    arc = ArcLength(bezier((0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)))
+    assert arc.at(np.array([-1.0, 2.0])) == pytest.approx([0.0, 3.0])
+    assert arc.parameter(np.array([-1.0, 9.0])) == pytest.approx([0.0, 1.0])

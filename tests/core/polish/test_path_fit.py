@@ -1,0 +1,56 @@
+"""Fitted paths: planted ways come back, the sway of steps stays out of them."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.motion import contacts
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.polish.path_fit import fit, fit_polynomial, fit_spline, places_on_ground
+
+TIMES = np.arange(600) / 60.0
+WAY = np.stack([1.4 * TIMES, 2.0 * np.sin(0.4 * TIMES), 0.1 * TIMES], axis=1)
+SWAY = np.stack([0.02 * np.sin(2 * np.pi * 1.9 * TIMES), 0.03 * np.sin(2 * np.pi * 0.95 * TIMES), 0 * TIMES], axis=1)
+
+
+@pytest.mark.parametrize("degree", (1, 2, 13, 45))
+def test_a_planted_polynomial_comes_back_at_any_degree(degree):
+    random = np.random.default_rng(degree)
+    times = np.arange(30_000) / 60.0
+    scaled = 2.0 * times / times[-1] - 1.0
+    planted = np.polynomial.legendre.legval(scaled, random.normal(size=(degree + 1, 3))).T
+    path = fit_polynomial(planted, times, degree)
+    assert np.abs(path.at(times) - planted).max() < 1e-11
+
+
+def test_a_degree_too_high_is_refused():
+    for degree in (0, 5, -1):
+        with pytest.raises(InputError, match="degree"):
+            fit_polynomial(WAY[:5], TIMES[:5], degree)
+
+
+def test_the_spline_keeps_the_way_and_leaves_the_sway():
+    path = fit_spline(WAY + SWAY, TIMES)
+    inner = slice(60, -60)  # the ends are known from one side only
+    assert np.abs(path.at(TIMES) - WAY)[inner].max() < 0.01
+
+
+def test_a_line_is_its_own_fit():
+    line = TIMES[:, None] * [1.0, -0.5, 0.2] + 1e5
+    assert np.abs(fit_spline(line, TIMES).at(TIMES) - line).max() < 1e-8
+
+
+def test_the_path_of_a_flat_walk_lies_on_its_ground():
+    motion = gait(1.4, 4.0, 30.0)
+    standing = contacts.points(motion)
+    places = places_on_ground(motion, standing)
+    assert np.ptp(places[:, 2]) == 0.0 and abs(places[0, 2] - contacts.ground_height(motion)) < 1e-9
+    for path in (fit(motion, standing), fit(motion, standing, "polynomial", 5)):
+        assert path.domain == pytest.approx((0.0, motion.duration))
+        assert np.linalg.norm(path.at(np.arange(len(motion)) / 30.0) - places, axis=1).max() < 0.1
+
+
+@pytest.mark.parametrize("places, times", [(WAY[:1], TIMES[:1]), (WAY[:3], TIMES[[0, 0, 1]]), (WAY[:3] * np.nan, TIMES[:3])])
+def test_what_cannot_be_fitted_is_refused(places, times):
+    with pytest.raises(InputError):
+        fit_spline(places, times)
