@@ -22,11 +22,22 @@ class Timing:
     at: np.ndarray
     arc: np.ndarray
 
+    def first(self, count: int) -> Timing:
+        """Its first `count` frames."""
+        return Timing(self.at[:count], self.arc[:count])
+
 
 def by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
     """The motion `speed` times as fast as it was recorded, `delay` seconds later; it waits in its first frame."""
     at = _played(len(residuals), speed, delay, residuals.fps)
     return Timing(at, np.interp(at, np.arange(len(residuals)), np.cumsum(residuals.step)))
+
+
+def by_time(residuals: Residuals, length: float, speed: float, delay: float) -> Timing:
+    """The same, on a path of `length` metres that is passed within the time of the motion: the parameter of the path
+    runs with time, and the arc given here is only about where that is."""
+    at = _played(len(residuals), speed, delay, residuals.fps)
+    return Timing(at, length * at / max(len(residuals) - 1, 1))
 
 
 def shown(residuals: Residuals, at: np.ndarray) -> Residuals:

@@ -1,0 +1,229 @@
+"""Path editing: one good clip rides another path (Gleicher 2001, told by Path editing §3), and its feet stay planted.
+
+`prepare` finds a motion's own path and what the motion is relative to it, once; `ride` lays that on a new path, quickly,
+as often as the path is dragged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .errors import InputError, TimedLine
+from .motion import contacts, quaternion
+from .motion.arc_length import ArcLength
+from .motion.humanoid import heading as facing
+from .motion.humanoid import identify
+from .motion.motion import Motion, forward_kinematics
+from .motion.path import Path
+from .polish.banking import banked
+from .polish.foot_plant import plant
+from .polish.path_fit import fit, fit_polynomial, fit_spline
+from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
+from .polish.path_time import Timing, by_arc_length, by_time, shown
+
+ENDS = ("stop", "repeat")
+FITS = ("spline", "polynomial")
+SPEEDS = (0.05, 20.0)
+STILL = 0.05
+"""Metres of path below which a motion stands still."""
+
+
+@dataclass(frozen=True)
+class RideSettings:
+    """What a user chooses. fit: kind of the motion's own path, one of FITS, a polynomial of `degree`. by_arc_length: as
+    fast as the motion was, else in as much time. speed: times as fast. end: what happens where the path ends before the
+    motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant, lean, slopes: feet are
+    held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends slow the motion (the
+    two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that it begins later.
+    detours: (arc m, width m, offset m to the left) each."""
+
+    fit: str = "spline"
+    degree: int = 13
+    by_arc_length: bool = True
+    speed: float = 1.0
+    end: str = "stop"
+    cycle: bool = False
+    frame: str = "path"
+    plant: bool = True
+    lean: bool = True
+    bends: bool = False
+    slopes: bool = True
+    climbs: bool = False
+    delay: float = 0.0
+    detours: tuple[tuple[float, float, float], ...] = ()
+
+    def __post_init__(self):
+        check_frame(self.frame)
+        if self.end not in ENDS:
+            raise InputError("end of path", str(self.end), " or ".join(ENDS))
+        if self.fit not in FITS:
+            raise InputError("path fit", str(self.fit), " or ".join(FITS))
+        if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
+            raise InputError("speed", f"{self.speed:g} times", f"{SPEEDS[0]:g} to {SPEEDS[1]:g}")
+        if not 0.0 <= self.delay < 86400.0:
+            raise InputError("delay", f"{self.delay:g} s", "0 or more seconds")
+
+
+@dataclass(frozen=True, eq=False)
+class RideSource:
+    """A motion relative to its own path: all that does not depend on the new one.
+
+    motion; standing (T, 2, 2) bool, left and right, heel and toe; path with seconds as its parameter; arc: its length;
+    moving: its frame at every frame; residuals; frame: the one of FRAMES they are relative to; humanoid: whether it has
+    feet that can be planted; still: whether it goes nowhere; warnings.
+    """
+
+    motion: Motion
+    standing: np.ndarray
+    path: Path
+    arc: ArcLength
+    moving: MovingFrame
+    residuals: Residuals
+    frame: str
+    humanoid: bool
+    still: bool
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Ridden:
+    """A motion on its new path, N frames. frames (N,): of the source, in general fractional; standing (N, 2, 2) bool,
+    carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,): frames
+    at which the motion begins again; correction (N, 2) m by which each foot was moved, miss (N, 2) m that it is short of
+    where it should be; rigid: the motion before leaning and planting."""
+
+    motion: Motion
+    frames: np.ndarray
+    standing: np.ndarray
+    arc: np.ndarray
+    origin: np.ndarray
+    heading: np.ndarray
+    seams: np.ndarray
+    correction: np.ndarray
+    miss: np.ndarray
+    rigid: Motion
+    source: RideSource
+    warnings: tuple[str, ...] = field(default=())
+
+
+def prepare(
+    motion: Motion, settings: RideSettings, standing: np.ndarray | None = None, path: Path | None = None
+) -> RideSource:
+    """The motion relative to its own path.
+
+    standing: (T, 2, 2) bool, by default told from the motion (`contacts.points`). path: its own path, its parameter
+    seconds from the first frame, by default fitted as `settings` say. InputError for less than two frames.
+    """
+    if len(motion) < 2:
+        raise InputError("motion", f"{len(motion)} frame", "two or more frames")
+    humanoid, told = _humanoid(motion)
+    if standing is None:
+        standing = contacts.points(motion) if humanoid else np.zeros((len(motion), 2, 2), dtype=bool)
+    path = path or (_fitted if humanoid else _fitted_any)(motion, standing, settings)
+    times = np.arange(len(motion)) / motion.fps
+    arc = ArcLength(path)
+    metres = arc.at(times)
+    still = bool(metres[-1] - metres[0] < STILL)
+    moving = moving_frame(path.at(times), path.at(times, 1), metres, motion.fps, _faces(motion, humanoid))
+    place, turned = relative(settings.frame, moving, motion.root_positions, motion.rotations[:, 0])
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = turned
+    residuals = Residuals(
+        place=place, rotations=rotations, step=np.diff(metres, prepend=metres[:1]), standing=np.asarray(standing, bool),
+        frames=np.arange(len(motion), dtype=float), turn=np.diff(moving.heading, prepend=moving.heading[:1]),
+        under=np.zeros((len(motion), 2)), fps=motion.fps, skeleton=motion.skeleton,
+    )  # fmt: skip
+    return RideSource(motion, residuals.standing, path, arc, moving, residuals, settings.frame, humanoid, still, told)
+
+
+def ride(source: RideSource, path: Path, settings: RideSettings, ground=None) -> Ridden:
+    """The motion of `source` on `path`.
+
+    ground: a `motion.terrain.Terrain` that the feet are to follow; without it the path's own height, level across it.
+    The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the path
+    has no length.
+    """
+    arc = source.arc if path is source.path else ArcLength(path)
+    residuals, seams, timing, told = _timed(source, path, arc, settings)
+    rows = shown(residuals, timing.at)
+    at = _parameters(source, path, arc, timing, rows, settings)
+    origin, tangent = path.at(at), path.at(at, 1)
+    own = _faces(source.motion, source.humanoid) if source.still and path is source.path else None
+    moving = moving_frame(origin, tangent, timing.arc, residuals.fps, own)
+    root, rotations = placed(source.frame, moving, rows.place, rows.rotations)
+    rigid = Motion(residuals.skeleton, root, rotations, residuals.fps)
+    correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
+    if settings.plant and source.humanoid:
+        ground = moving.origin[:, 2:]
+        held = plant(
+            residuals.skeleton, root - ground * [0.0, 0.0, 1.0], rigid.rotations, rows.standing, residuals.fps, levels=False
+        )
+        root, rotations, correction, miss = held.root + ground * [0.0, 0.0, 1.0], held.rotations, held.correction, held.miss
+    motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
+    return Ridden(
+        motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, rigid, source,
+        (*source.warnings, *told),
+    )  # fmt: skip
+
+
+def _timed(
+    source: RideSource, path: Path, arc: ArcLength, settings: RideSettings
+) -> tuple[Residuals, np.ndarray, Timing, tuple[str, ...]]:
+    """The residuals as they are shown, cut or repeated; the frames at which they begin again; when each is shown where;
+    and what is to be told."""
+    residuals, none = source.residuals, np.zeros(0, dtype=int)
+    if source.still:
+        told = "the motion stands still: it is placed at the path's beginning"
+        return residuals, none, by_arc_length(residuals, settings.speed, settings.delay), (told,)
+    if not settings.by_arc_length:
+        return residuals, none, by_time(residuals, arc.length, settings.speed, settings.delay), ()
+    timing = by_arc_length(residuals, settings.speed, settings.delay)
+    if path.closed or timing.arc[-1] <= arc.length + 1e-6:
+        return residuals, none, timing, ()
+    count = int(np.searchsorted(timing.arc, arc.length + 1e-6, side="right"))
+    when = count / residuals.fps
+    told = TimedLine(f"the path ends after {when:.1f} s, {len(timing.arc) / residuals.fps - when:.1f} s before the motion", (when, when))
+    return residuals, none, timing.first(max(count, 1)), (told,)
+
+
+def _parameters(
+    source: RideSource, path: Path, arc: ArcLength, timing: Timing, rows: Residuals, settings: RideSettings
+) -> np.ndarray:
+    """(N,) parameters of the path; the motion's own path keeps its time, so that nothing is lost there."""
+    if path is source.path:
+        return rows.frames / rows.fps
+    if not settings.by_arc_length:
+        low, high = path.domain
+        return low + (high - low) * timing.at / max(len(source.residuals) - 1, 1)
+    return arc.parameter(timing.arc % arc.length if path.closed and arc.length > 0.0 else timing.arc)
+
+
+def _humanoid(motion: Motion) -> tuple[bool, tuple[str, ...]]:
+    try:
+        identify(motion.skeleton)
+    except InputError:
+        return False, ("no legs were found in this skeleton: its feet are not planted and it does not lean",)
+    return True, ()
+
+
+def _faces(motion: Motion, humanoid: bool) -> float:
+    """Radians: which way the body faces in the mean; for a path that leads nowhere."""
+    if not humanoid:
+        return 0.0
+    turned = facing(motion)
+    return float(np.arctan2(np.sin(turned).mean(), np.cos(turned).mean()))
+
+
+def _fitted(motion: Motion, standing: np.ndarray, settings: RideSettings) -> Path:
+    return fit(motion, standing, settings.fit, settings.degree)
+
+
+def _fitted_any(motion: Motion, standing: np.ndarray, settings: RideSettings) -> Path:
+    """The path of a body without legs: its root's, as high as its lowest joint is in general."""
+    places, _ = forward_kinematics(motion)
+    line = motion.root_positions.copy()
+    line[:, 2] = np.percentile(places[..., 2].min(axis=1), 2)
+    times = np.arange(len(line)) / motion.fps
+    return fit_spline(line, times) if settings.fit == "spline" else fit_polynomial(line, times, settings.degree)
