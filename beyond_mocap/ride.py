@@ -21,7 +21,7 @@ from .polish.banking import banked
 from .polish.foot_plant import plant
 from .polish.path_fit import fit, fit_polynomial, fit_spline
 from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
-from .polish.path_time import Timing, by_arc_length, by_time, shown
+from .polish.path_time import Timing, by_arc_length, by_time, parameter_at, shown
 
 ENDS = ("stop", "repeat")
 FITS = ("spline", "polynomial")
@@ -156,11 +156,9 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground=None) ->
     rigid = Motion(residuals.skeleton, root, rotations, residuals.fps)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     if settings.plant and source.humanoid:
-        ground = moving.origin[:, 2:]
-        held = plant(
-            residuals.skeleton, root - ground * [0.0, 0.0, 1.0], rigid.rotations, rows.standing, residuals.fps, levels=False
-        )
-        root, rotations, correction, miss = held.root + ground * [0.0, 0.0, 1.0], held.rotations, held.correction, held.miss
+        up = moving.origin * [0.0, 0.0, 1.0]
+        held = plant(residuals.skeleton, root - up, rotations, rows.standing, residuals.fps, levels=False)
+        root, rotations, correction, miss = held.root + up, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
     return Ridden(
         motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, rigid, source,
@@ -178,13 +176,14 @@ def _timed(
         told = "the motion stands still: it is placed at the path's beginning"
         return residuals, none, by_arc_length(residuals, settings.speed, settings.delay), (told,)
     if not settings.by_arc_length:
-        return residuals, none, by_time(residuals, arc.length, settings.speed, settings.delay), ()
+        return residuals, none, by_time(residuals, path, arc, settings.speed, settings.delay), ()
     timing = by_arc_length(residuals, settings.speed, settings.delay)
     if path.closed or timing.arc[-1] <= arc.length + 1e-6:
         return residuals, none, timing, ()
     count = int(np.searchsorted(timing.arc, arc.length + 1e-6, side="right"))
     when = count / residuals.fps
-    told = TimedLine(f"the path ends after {when:.1f} s, {len(timing.arc) / residuals.fps - when:.1f} s before the motion", (when, when))
+    left = len(timing.arc) / residuals.fps - when
+    told = TimedLine(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
     return residuals, none, timing.first(max(count, 1)), (told,)
 
 
@@ -195,8 +194,7 @@ def _parameters(
     if path is source.path:
         return rows.frames / rows.fps
     if not settings.by_arc_length:
-        low, high = path.domain
-        return low + (high - low) * timing.at / max(len(source.residuals) - 1, 1)
+        return parameter_at(path, timing.at / max(len(source.residuals) - 1, 1))
     return arc.parameter(timing.arc % arc.length if path.closed and arc.length > 0.0 else timing.arc)
 
 

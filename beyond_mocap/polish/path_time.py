@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arc_length import ArcLength
+from ..motion.path import Path
 from .path_frame import Residuals
 
 
@@ -33,11 +35,16 @@ def by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
     return Timing(at, np.interp(at, np.arange(len(residuals)), np.cumsum(residuals.step)))
 
 
-def by_time(residuals: Residuals, length: float, speed: float, delay: float) -> Timing:
-    """The same, on a path of `length` metres that is passed within the time of the motion: the parameter of the path
-    runs with time, and the arc given here is only about where that is."""
+def by_time(residuals: Residuals, path: Path, arc: ArcLength, speed: float, delay: float) -> Timing:
+    """The same on a path whose parameter runs with time, from end to end within the motion."""
     at = _played(len(residuals), speed, delay, residuals.fps)
-    return Timing(at, length * at / max(len(residuals) - 1, 1))
+    return Timing(at, arc.at(parameter_at(path, at / max(len(residuals) - 1, 1))))
+
+
+def parameter_at(path: Path, share: np.ndarray) -> np.ndarray:
+    """The path's parameters (N,) when a share (N,) of the time is over."""
+    low, high = path.domain
+    return low + (high - low) * share
 
 
 def shown(residuals: Residuals, at: np.ndarray) -> Residuals:
