@@ -1,4 +1,5 @@
-"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along.
+"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along; and B-splines by
+their control points (Path editing §4.6.6).
 """
 
 from __future__ import annotations
@@ -6,7 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..motion.path import SplinePath
+from ..motion.arc_length import ArcLength
+from ..motion.path import Path, SplinePath
 from ..motion.smooth_spline import smoothing_spline
 
 ROUNDING = 0.15
@@ -42,6 +44,70 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
         weights = np.ones(len(along))
         spline = smoothing_spline(sampled, along, pieces, rounding, _ORDER, weights, ends_met=True)
     return SplinePath(*spline, closed=closed)
+
+
+def b_spline(points: np.ndarray, degree: int) -> SplinePath:
+    """The B-spline of control points (P, 3) in metres that begins at the first and ends at the last; its parameter is 0 to 1.
+
+    Knots: each end's repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one, which does
+    not add up). InputError where the degree is below 1 or not below P, and where `through` refuses the control points.
+    """
+    points = np.asarray(points, dtype=float)
+    _checked(points, "control points", closed=False)
+    _check_degree(len(points), degree)
+    return SplinePath(_even_knots(len(points), degree), points, degree)
+
+
+def control_points(path: Path, count: int, degree: int) -> np.ndarray:
+    """The control points (count, 3) in metres of the B-spline nearest to a path, whose ends it meets; see `b_spline`.
+
+    Least squares over even steps of arc length, so that control points lie even too. InputError as there for the degree.
+    """
+    from scipy.interpolate import BSpline
+
+    _check_degree(count, degree)
+    places, share = _even_places(path, max(8 * count, 200))
+    origin = places.mean(axis=0)
+    places = places - origin
+    design = BSpline.design_matrix(share, _even_knots(count, degree), degree).toarray()
+    ends = places[[0, -1]]
+    inner = np.linalg.lstsq(design[:, 1:-1], places - design[:, [0, -1]] @ ends, rcond=None)[0]
+    return np.concatenate([ends[:1], inner, ends[1:]]) + origin
+
+
+def straight(path: Path, count: int) -> np.ndarray:
+    """Even control points (count, 3) in metres from where a path begins to where it ends: a neutral start (§4.6.6).
+
+    Where it ends where it begins, to its farthest place. InputError for fewer than two.
+    """
+    _check_degree(count, 1)
+    places, _ = _even_places(path, 200)
+    first, last = places[0], places[-1]
+    if np.linalg.norm(last - first) < SHORTEST:
+        last = places[np.argmax(np.linalg.norm(places - first, axis=1))]
+    return first + np.linspace(0.0, 1.0, count)[:, None] * (last - first)
+
+
+def _check_degree(count: int, degree: int) -> None:
+    """InputError where a B-spline of `count` control points cannot have this degree."""
+    if not 1 <= degree < count:
+        raise InputError(
+            "control points", f"{count} of them for degree {degree}", f"{max(degree, 1) + 1} at least",
+            "take more points or a lower degree",
+        )
+
+
+def _even_knots(count: int, degree: int) -> np.ndarray:
+    """(count + degree + 1,) knots from 0 to 1."""
+    return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, count - degree + 1), np.ones(degree)])
+
+
+def _even_places(path: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places (count, 3) at even steps of arc length, and the share (count,) of the way."""
+    share, arc = np.linspace(0.0, 1.0, count), ArcLength(path)
+    u = arc.parameter(share * arc.length)
+    u[-1] = path.domain[1] - (1e-12 * (path.domain[1] - path.domain[0]) if path.closed else 0.0)
+    return path.at(u), share
 
 
 def _checked(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
