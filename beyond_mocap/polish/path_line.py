@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path, SplinePath
+from ..motion.runs import runs
 from ..motion.smooth_spline import smoothing_spline
 
 ROUNDING = 0.15
@@ -20,6 +21,8 @@ SHORTEST = 0.2
 _SAMPLE = 1 / 6  # of the rounding, between samples of the line
 _PIECE = 1 / 3  # of the rounding, a piece of the spline
 _MOST_PIECES = 4000
+_HAIRPIN = 5.0  # roundings from where a line turns back to where it begins to swing out
+_LARGEST = (6 / 7) ** 3 / np.sqrt(7)  # value of x (1 - x^2)^3
 _ORDER = 3  # the change of the bend is what costs, so that a bend that stays is kept to the line's very ends
 
 
@@ -35,6 +38,7 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     length = _along(line)[-1]
     rounding = min(rounding, length / 12)
     sampled, along = _resampled(_thinned(line, rounding * _SAMPLE), rounding * _SAMPLE)
+    sampled = _with_hairpins(sampled, along, rounding, closed)
     pieces = int(np.clip(np.ceil(along[-1] / (rounding * _PIECE)), 8, _MOST_PIECES))
     if closed:
         spline = smoothing_spline(
@@ -145,6 +149,60 @@ def _thinned(line: np.ndarray, step: float) -> np.ndarray:
     means = np.add.reduceat(line, first, axis=0) / count[:, None]
     means[0], means[-1] = line[0], line[-1]
     return means
+
+
+def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed: bool) -> np.ndarray:
+    """Samples (M, 3) with room to turn round where the line, `along` (M,) metres, turns by more than a right angle.
+
+    On the way in they swing out to the outer side, on the way back to the inner one, by up to `rounding` metres: a line
+    that goes back where it came from would have to stop and turn on the spot.
+    """
+    step, count = along[1], len(line) - closed
+    reach = max(int(round(rounding / step)), 1)
+    inner = np.arange(count) if closed else np.arange(reach, count - reach)
+    came, goes = _directions(line, inner, reach, count)
+    excess = np.zeros(count)
+    excess[inner] = np.arccos(np.clip(np.einsum("mi,mi->m", came, goes), -1.0, 1.0)) / (np.pi / 2) - 1.0
+    first = int(np.argmin(excess)) if closed else 0  # no turn there
+    turns = [np.arange(*turn) + first for turn in runs(np.roll(excess, -first) > 0.0)]
+    if not turns:
+        return line
+    places = step * np.array([np.average(turn, weights=excess[turn % count]) for turn in turns])
+    out = line.copy()
+    for turn, place, room in zip(turns, places, _room(places, along[-1], closed)):
+        peak, wide = turn[np.argmax(excess[turn % count])] % count, min(_HAIRPIN * rounding, room)
+        off = along - place
+        if closed:
+            off = (off + along[-1] / 2) % along[-1] - along[-1] / 2
+        off = np.clip(off / wide, -1.0, 1.0)
+        swing = excess[peak] * wide / _HAIRPIN * off * (1.0 - off**2) ** 3 / _LARGEST
+        out += swing[:, None] * _aside(came[peak - inner[0]], goes[peak - inner[0]])
+    return out
+
+
+def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, np.ndarray]:
+    """Unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
+
+    period: samples in a round, for closed lines.
+    """
+    before, after = (at - reach) % period, (at + reach) % period
+    chords = line[at] - line[before], line[after] - line[at]
+    return tuple(chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-12)[:, None] for chord in chords)
+
+
+def _room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:
+    """Metres (P,) from each turn to the nearest other or to the line's end; places (P,) metres along it, rising."""
+    before = places[-1] - length if closed else 0.0
+    after = places[0] + length if closed else length
+    return np.minimum(np.diff(places, prepend=before), np.diff(places, append=after))
+
+
+def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
+    """The horizontal unit vector (3,) to the side to which a line turns that came and goes in directions (3,)."""
+    side = np.array([goes[1] - came[1], came[0] - goes[0], 0.0])  # left of the turn's tip
+    size = np.linalg.norm(side)
+    side = side / size if size > 1e-6 else np.array([1.0, 0.0, 0.0])
+    return -side if came[0] * goes[1] - came[1] * goes[0] < -1e-9 else side
 
 
 def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

@@ -92,3 +92,76 @@ def test_straight_goes_from_the_first_place_to_the_last():
     assert np.linalg.norm(closed[-1] - closed[0]) == pytest.approx(4.0, abs=0.05)
     with pytest.raises(InputError):
         straight(path, 1)
+
+BAD_TURNS = {
+    "back": [[0, 0, 0], [3, 0, 0], [0, 0, 0]], "a third time": [[0, 0, 0], [3, 0, 0], [0, 0, 0], [3, 0, 0]],
+    "nearly back": [[0, 0, 0], [3, 0, 0], [0, 0.3, 0]], "up and down": [[0, 0, 0], [0, 0, 3], [0, 0, 0]],
+    "far off": [[1e5, 1e5, 0], [1e5 + 3, 1e5, 0], [1e5, 1e5, 0]],
+    "repeated": [[0, 0, 0], [0, 0, 0], [3, 0, 0], [3, 0, 0], [3, 0, 0], [0, 0, 0], [0, 0, 0]],
+    "cusp": np.stack([np.linspace(-1, 1, 201) ** 2, np.linspace(-1, 1, 201) ** 3, np.zeros(201)], axis=1),
+}
+
+
+@pytest.mark.parametrize("line", BAD_TURNS.values(), ids=BAD_TURNS)
+@pytest.mark.parametrize("closed", (False, True))
+def test_who_is_sent_back_where_he_came_from_gets_room_to_turn_round(line, closed):
+    """The path nowhere stops, has a radius everywhere, and is not far from what was drawn."""
+    line = np.asarray(line, dtype=float)
+    path = through(line, "line", closed=closed)
+    assert sharpest(path) > 0.03
+    dense = np.concatenate([np.linspace(a, b, 500) for a, b in zip(line, [*line[1:], line[0]] if closed else line[1:])])
+    off = np.linalg.norm(path.at(np.linspace(*path.domain, 200))[:, None] - dense, axis=2).min(axis=1)
+    assert off.max() < 0.15
+    if not closed:
+        assert np.abs(path.at(np.array(path.domain)) - line[[0, -1]]).max() < 1e-9
+
+
+def sharpest(path):
+    """The smallest radius of a path in metres."""
+    u = np.linspace(*path.domain, 20_000)
+    speed, bend = path.at(u, 1), path.at(u, 2)
+    size = np.linalg.norm(speed, axis=1)
+    return 1.0 / (np.linalg.norm(np.cross(speed, bend), axis=1) / size**3).max()
+
+
+def test_the_seam_of_a_closed_line_may_be_a_turn():
+    """Beginning elsewhere on the same closed line does not change the curve."""
+    line = np.array([[0, 0, 0], [3, 0, 0], [3, 0.1, 0]], dtype=float)
+    one, other = (through(np.roll(line, shift, axis=0), "line", closed=True) for shift in (0, 1))
+    places, others = (path.at(np.linspace(*path.domain, 5000)) for path in (one, other))
+    assert np.linalg.norm(places[::50, None] - others, axis=2).min(axis=1).max() < 0.005
+
+
+def test_noise_on_a_dense_line_is_no_way():
+    x = np.linspace(0.0, 10.0, 10_000)
+    line = np.stack([x, 2 * np.sin(0.7 * x), 0 * x], axis=1)
+    noisy = line + np.random.default_rng(1).normal(size=line.shape) * 1e-3
+    noisy[[0, -1]] = line[[0, -1]]
+    path = through(noisy, "noisy")
+    assert ArcLength(path).length == pytest.approx(ArcLength(through(line, "line")).length, rel=1e-3)
+    places = path.at(np.linspace(*path.domain, 300))
+    assert np.linalg.norm(places[:, None] - line, axis=2).min(axis=1).max() < 1e-3
+
+
+def test_a_loop_tighter_than_a_stride_and_a_vertical_line_are_paths():
+    loop = 0.1 * np.stack([np.sin(ROUND), 1 - np.cos(ROUND), 0 * ROUND], axis=1)
+    line = np.concatenate([[[-3, 0, 0]], loop, [[3, 0, 0]]])
+    path = through(line, "loop")
+    assert np.isfinite(path.at(np.linspace(*path.domain, 999), 2)).all() and 6.0 < ArcLength(path).length < 6.7
+    path = through(np.array([[1, 1, 0], [1, 1, 2.5]]), "pole")
+    assert path.at(np.linspace(*path.domain, 99))[:, :2] == pytest.approx(np.ones((99, 2)))
+
+
+def test_a_figure_of_eight_crosses_itself():
+    eight = np.stack([4 * np.sin(ROUND), 2 * np.sin(2 * ROUND), 0 * ROUND], axis=1)
+    path = through(eight, "eight", closed=True)
+    places = path.at(np.linspace(*path.domain, 400))
+    assert np.linalg.norm(places[:, None] - eight, axis=2).min(axis=1).max() < 0.05
+    assert np.linalg.norm(path.at(np.linspace(*path.domain, 4001)), axis=1).min() < 0.01
+
+
+def test_it_changes_little_where_the_line_changes_little():
+    """Who drags a point back over the line must not see the path leap."""
+    paths = [through(np.array([[0, 0, 0], [3, 0, 0], [0.5, y, 0]]), "line") for y in np.arange(0.3, 3.0, 0.01)]
+    places = np.array([path.at(path.domain[0] + np.linspace(0, 1, 300) * np.ptp(path.domain)) for path in paths])
+    assert np.linalg.norm(np.diff(places, axis=0), axis=2).max() < 0.05
