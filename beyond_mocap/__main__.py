@@ -8,22 +8,21 @@ What is wrong is told in one line on stderr. See the project's README for exampl
 from __future__ import annotations
 
 import argparse
-import contextlib
-import json
-import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
 from . import __version__
+from .commands import ride_path
+from .commands.numbers import between, positive, rate
+from .commands.outputs import Writer, check_outputs, writer_of
+from .commands.told import Told
 from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
 from .plan import HEIGHTS, LIMITS, METHODS, Plan, gait_choices
-
-Writer = Callable[[object, Path], None]
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -39,7 +38,7 @@ def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
     top = OneLineParser(prog=prog, description="From tracks, a few words and motion capture to moving bodies.")
     top.add_argument("--version", action="version", version=f"beyond-mocap {__version__}")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
-    for add in (_add_library, _add_synthesize, _add_mirror, _add_retarget, _add_evaluate):
+    for add in (_add_library, _add_synthesize, ride_path.add, _add_mirror, _add_retarget, _add_evaluate):
         verb = add(verbs)
         verb.add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
     return top
@@ -58,7 +57,7 @@ def _add_library(verbs) -> argparse.ArgumentParser:
 def _add_library_options(verb) -> None:
     verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
     verb.add_argument("--skeleton", type=Path, metavar="CLIP.bvh", help="whose skeleton the library has")
-    verb.add_argument("--unit", type=_positive, metavar="METRES", help="metres per unit of the BVH files")
+    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of the BVH files")
 
 
 def _add_take_files(verb) -> None:
@@ -76,7 +75,7 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--method", choices=METHODS, default="path")
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
-    verb.add_argument("--fps", type=_rate, default=30.0)
+    verb.add_argument("--fps", type=rate, default=30.0)
     verb.add_argument("--seed", type=int, default=0, help="of the clustering that blocks and distance search in")
     _add_settings(verb)
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
@@ -104,7 +103,7 @@ def _add_settings(verb) -> None:
     ):
         field = name.replace("-", "_")
         low, high = LIMITS[field]
-        of = partial(_between, low=low, high=high, expected=f"between {low:g} and {high:g}")
+        of = partial(between, low=low, high=high, expected=f"between {low:g} and {high:g}")
         default = getattr(Plan, field)
         verb.add_argument(f"--{name}", type=of, default=default, metavar=unit, help=f"{meaning}; default {default:g}")
     verb.add_argument(
@@ -116,7 +115,7 @@ def _add_settings(verb) -> None:
 def _add_player(verb) -> None:
     """What is one player's own."""
     verb.add_argument("--pins", type=Path, metavar="P.csv", help="where hands, feet and gaze have to be, and when")
-    tall = partial(_between, low=HEIGHTS[0], high=HEIGHTS[1], expected=f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} metres")
+    tall = partial(between, low=HEIGHTS[0], high=HEIGHTS[1], expected=f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} metres")
     verb.add_argument("--height", type=tall, default=0.0, metavar="METRES", help="of the player; else the library's")
     verb.add_argument("--strong-foot", choices=("left", "right", "any"), default="any")
     verb.add_argument(
@@ -124,7 +123,7 @@ def _add_player(verb) -> None:
         help="a word, or a folder or clip (with * and ?), whose clips are taken rather than others; may be repeated",
     )
     low, high = LIMITS["style_weight"]
-    worth = partial(_between, low=low, high=high, expected=f"between {low:g} and {high:g}")
+    worth = partial(between, low=low, high=high, expected=f"between {low:g} and {high:g}")
     default = Plan.style_weight
     verb.add_argument(
         "--style-weight", type=worth, default=default, metavar="NUMBER",
@@ -136,7 +135,7 @@ def _add_mirror(verbs) -> argparse.ArgumentParser:
     verb = verbs.add_parser("mirror", help="left becomes right")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
     verb.add_argument("output", type=Path, metavar="OUT.bvh")
-    verb.add_argument("--unit", type=_positive, metavar="METRES")
+    verb.add_argument("--unit", type=positive, metavar="METRES")
     verb.set_defaults(run=run_mirror)
     return verb
 
@@ -147,8 +146,8 @@ def _add_retarget(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a recording or a pose of it")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     verb.add_argument("--map", type=Path, metavar="M.json", help="a JSON object, joint of IN -> joint of SKELETON")
-    verb.add_argument("--unit", type=_positive, metavar="METRES", help="metres per unit of IN.bvh")
-    verb.add_argument("--to-unit", type=_positive, metavar="METRES", help="metres per unit of SKELETON.bvh")
+    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of IN.bvh")
+    verb.add_argument("--to-unit", type=positive, metavar="METRES", help="metres per unit of SKELETON.bvh")
     verb.set_defaults(run=run_retarget)
     return verb
 
@@ -167,26 +166,9 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
     return verb
 
 
-def _positive(text: str) -> float:
-    return _between(text, 1e-9, 1e6, "a positive number")
-
-
-def _rate(text: str) -> float:
-    return _between(text, 1.0, 480.0, "1 to 480 frames per second")
-
-
-def _between(text: str, low: float, high: float, expected: str) -> float:
-    """The number that an option's text says, where it lies from `low` to `high`."""
-    with contextlib.suppress(ValueError):
-        value = float(text)
-        if low <= value <= high:
-            return value
-    raise argparse.ArgumentTypeError(f"{text!r} is not {expected}")
-
-
-def run_library(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`library`: builds it and prints what it holds."""
-    _check_outputs(options.report)
+    check_outputs(options.report)
     library = _library(options, told, rebuild=options.rebuild)
     summary = summarize(library)
     told.end()
@@ -221,7 +203,7 @@ def summarize(library) -> dict:
     }
 
 
-def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`synthesize`: one player, and what was asked to be written about it."""
     from .annotation import read_timeline, validate
     from .files.pins import read_pins
@@ -232,8 +214,8 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
 
     begun = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
-    _check_outputs(*outputs, never=(options.track, options.annotations, options.pins))
-    write = _writer(options.out, writers)
+    check_outputs(*outputs, never=(options.track, options.annotations, options.pins))
+    write = writer_of(options.out, writers)
     track, data = clean(read_track_csv(options.track))
     timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
     loaded = time.perf_counter()
@@ -278,12 +260,12 @@ def run_synthesize(options, told: "Told", writers: Mapping[str, Writer]) -> None
     print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
 
 
-def run_mirror(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`mirror`: the same file with left and right exchanged."""
     from .files import bvh
     from .motion.mirror import mirror
 
-    _check_outputs(options.output)
+    check_outputs(options.output)
     clip = bvh.read(options.input, options.unit)
     try:
         twin = mirror(clip.motion)
@@ -296,12 +278,12 @@ def run_mirror(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     print(f"{options.output}: {len(clip.motion)} frames")
 
 
-def run_retarget(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`retarget`: the motion on another skeleton, whose joint names and channels the output has; at its own rate."""
     from .files import bvh
     from .library.one_skeleton import bring_one
 
-    _check_outputs(options.out, never=(options.input, options.to, options.map))
+    check_outputs(options.out, never=(options.input, options.to, options.map))
     clip, target = bvh.read(options.input, options.unit), bvh.read(options.to, options.to_unit)
     try:
         motion = bring_one(clip.motion, target.motion, options.map)
@@ -317,7 +299,7 @@ def run_retarget(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     print(f"{options.out}: {len(motion)} frames")
 
 
-def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
+def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`evaluate`: the report of a motion that was written before. `--unit` is the library's where there is one."""
     from .annotation import read_timeline, validate
     from .evaluation.html import html_report
@@ -331,7 +313,7 @@ def run_evaluate(options, told: "Told", writers: Mapping[str, Writer]) -> None:
     from .motion.track import clean
 
     inputs = (options.motion, options.track, options.annotations, options.provenance, options.ball)
-    _check_outputs(options.report, options.html, never=inputs)
+    check_outputs(options.report, options.html, never=inputs)
     if options.html:
         require_matplotlib()
     motion = bvh.read(options.motion, None if options.library else options.unit).motion
@@ -367,89 +349,13 @@ def _strangers(clips: tuple[str, ...], library) -> list[str]:
     return [clip for clip in clips if clip and clip not in own and not clip.startswith(CACHE_FOLDER)]
 
 
-def _library(options, told: "Told", rebuild: bool = False, seed: int = 0):
+def _library(options, told: Told, rebuild: bool = False, seed: int = 0):
     from .library.library import build
 
     return build(
         options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
         seed=seed, progress=told.progress, cancelled=told.cancelled,
     )
-
-
-def _writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
-    known = {".bvh": write_bvh, **writers}
-    if out.suffix.lower() not in known:
-        raise InputError(
-            out, f"no file ending in {out.suffix} can be written here" if out.suffix else "no file ending",
-            f"one of {', '.join(sorted(known))}",
-            "choose another ending" if writers else "inside Blender .blend, .fbx, .glb and .usdc can be written too",
-        )
-    return known[out.suffix.lower()]
-
-
-def write_bvh(take, out: Path) -> None:
-    """The take's motion as BVH."""
-    from .files import bvh
-
-    bvh.write(out, take.motion)
-
-
-def _check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> None:
-    """Before work begins: every output's folder can be written to, and no output is another one or one of `never`."""
-    taken = {path.resolve() for path in never if path is not None}
-    for path in filter(None, paths):
-        folder = path.absolute().parent
-        if path.is_dir():
-            raise InputError(path, "is a folder", "a file name", "add a file name")
-        if not folder.is_dir():
-            raise InputError(path, "its folder does not exist", "an existing folder", "make the folder first")
-        if not os.access(folder, os.W_OK | os.X_OK):
-            raise InputError(path, "its folder cannot be written to", "a folder of yours", "choose another folder")
-        if path.resolve() in taken:
-            what = "named for an output and for something else"
-            raise InputError(path, what, "a file for each", "rename one of them")
-        taken.add(path.resolve())
-
-
-class Told:
-    """What the user sees of the progress, and whether Ctrl-C was pressed."""
-
-    def __init__(self, as_json: bool, stream=None):
-        """as_json: JSON lines; otherwise a bar where `stream` (default stderr) is a terminal."""
-        self._stream = stream or sys.stderr
-        self._json = as_json
-        self._bar = not as_json and self._stream.isatty()
-        self._stop = threading.Event()
-        self._last = ""
-
-    def progress(self, fraction: float, text: str) -> None:
-        """Shows how far the work is."""
-        if self._json:
-            print(json.dumps({"progress": round(fraction, 4), "text": text}), file=self._stream, flush=True)
-        elif self._bar:
-            done = int(round(30 * fraction))
-            line = f"\r[{'#' * done}{'.' * (30 - done)}] {fraction:4.0%} {text[:40]:40s}"
-            if line != self._last:
-                print(line, end="", file=self._stream, flush=True)
-                self._last = line
-
-    def note(self, text: str) -> None:
-        """Tells something that the user should know, on the stream of the progress."""
-        print(json.dumps({"note": text}) if self._json else f"note: {text}", file=self._stream, flush=True)
-
-    def end(self) -> None:
-        """Clears the bar."""
-        if self._last:
-            print("\r" + " " * 80 + "\r", end="", file=self._stream, flush=True)
-            self._last = ""
-
-    def cancel(self, *_) -> None:
-        """A signal handler: asks the work to stop."""
-        self._stop.set()
-
-    def cancelled(self) -> bool:
-        """Whether the user wants out."""
-        return self._stop.is_set()
 
 
 def main(argv: list[str] | None = None, writers: Mapping[str, Writer] | None = None, prog: str = "beyond-mocap") -> int:

@@ -1,4 +1,4 @@
-"""The tables that leave and come back: provenance, ball and path CSVs, and the JSON report.
+"""The tables that leave and come back: provenance and ball CSVs, and the JSON report.
 
 Every writer writes beside its target and renames, so that nobody ever sees half a file.
 """
@@ -107,19 +107,6 @@ def read_ball(path: str | os.PathLike) -> BallPath:
 def write_report(path: str | os.PathLike, report: dict) -> None:
     """Writes a report as JSON. Numbers that are not finite become null; numpy arrays become lists, tuples too."""
     atomic_write(path, json.dumps(plain(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def read_curve(path: str | os.PathLike) -> np.ndarray:
-    """(N, 3) metres: the points of a path, columns `x_m,y_m[,z_m]`, z 0 where the column is missing.
-
-    InputError where fewer than two points are given, or a cell is no number.
-    """
-    rows = list(read_rows(path, ("x_m", "y_m")))
-    columns = [_column(rows, "x_m"), _column(rows, "y_m")]
-    columns.append(_column(rows, "z_m") if rows and "z_m" in rows[0][1] else np.zeros(len(rows)))
-    if len(rows) < 2:
-        raise InputError(path, f"{len(rows)} points", "at least two rows under x_m,y_m[,z_m]")
-    return np.column_stack(columns)
 
 
 def plain(value):

@@ -13,7 +13,6 @@ from beyond_mocap.errors import InputError
 from beyond_mocap.files.tables import (
     Provenance,
     read_ball,
-    read_curve,
     read_provenance,
     write_ball,
     write_provenance,
@@ -24,11 +23,10 @@ from beyond_mocap.motion.motion import Motion
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.take import BallPath, Take
 
-READERS = (read_provenance, read_ball, read_curve)
+READERS = (read_provenance, read_ball)
 HEADERS = {
     read_provenance: "frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right\n",
     read_ball: "time_s,x_m,y_m,z_m,measured\n",
-    read_curve: "x_m,y_m,z_m\n",
 }
 
 
@@ -110,25 +108,9 @@ def test_a_report_is_json_without_nan(tmp_path):
     }
 
 
-def test_a_curve_with_and_without_height(tmp_path):
-    file = tmp_path / "c.csv"
-    file.write_text("x_m,y_m\n0,0\n\n1.5,-2\n", encoding="utf-8")
-    np.testing.assert_allclose(read_curve(file), [[0, 0, 0], [1.5, -2, 0]])
-    file.write_text("\ufeffname,y_m,x_m,z_m\r\na,1,2,3\r\nb,4,5,6\r\n", encoding="utf-8")
-    np.testing.assert_allclose(read_curve(file), [[2, 1, 3], [5, 4, 6]])
-
-
 @pytest.mark.parametrize(
     "reader, text, part",
     [
-        (read_curve, "", "an empty file"),
-        (read_curve, "x,y\n1,2\n", "no column x_m, y_m"),
-        (read_curve, "x_m,y_m\n1,2\n", "1 points"),
-        (read_curve, "x_m,y_m\n1,2\n1,abc\n", ":3: y_m 'abc'"),
-        (read_curve, "x_m,y_m\n1,2\n1\n", ":3: 1 cells"),
-        (read_curve, "x_m,y_m\n1,2\n1,inf\n", ":3: y_m 'inf'"),
-        (read_curve, "x_m,y_m\n1,2\n1,2e5\n", ":3: y_m 2e5"),
-        (read_curve, "x_m,y_m,x_m\n1,2,3\n1,2,3\n", "a column twice"),
         (read_ball, HEADERS[read_ball] + "0,1,2,3,yes\n", ":2: measured 'yes'"),
         (read_provenance, HEADERS[read_provenance] + "0,0,a,0,2,run,0,0\n", ":2: mirrored '2'"),
     ],

@@ -1,0 +1,177 @@
+"""The verb `path`: a recording rides another path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .numbers import between, positive, whole
+from .outputs import Writer, check_outputs, writer_of
+from .told import Told
+
+_FRAMES = ("path", "tangent", "absolute")
+_FRAME_HELP = "what the recording is taken relative to: the path (default); its full tangent or the world, to compare"
+
+
+def add(verbs):
+    """The verb's parser."""
+    verb = verbs.add_parser("path", help="a recording rides another path")
+    verb.add_argument("input", type=Path, metavar="IN.bvh")
+    verb.add_argument("--path", type=Path, required=True, metavar="CURVE.csv", help="x_m,y_m[,z_m]: the new path")
+    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
+    verb.add_argument(
+        "--degree", type=partial(whole, low=1, high=200, expected="a whole number from 1 to 200"), metavar="N",
+        help="of a polynomial fitted to the recording's own path; default: a smoothing spline",
+    )
+    verb.add_argument("--no-arc-length", action="store_true", help="by time: the path's ends at the recording's ends")
+    verb.add_argument("--cycle", action="store_true", help="repeat the best stretch until the path's end")
+    verb.add_argument("--end", choices=("stop", "repeat"), default="stop", help="where the path is shorter")
+    verb.add_argument("--no-plant", action="store_true", help="leave the feet as the path carries them")
+    faster = partial(between, low=0.1, high=10.0, expected="a number from 0.1 to 10")
+    verb.add_argument("--speed", type=faster, default=1.0, metavar="FACTOR", help="of playing; default 1")
+    verb.add_argument("--frame", choices=_FRAMES, default="path", help=_FRAME_HELP)
+    verb.add_argument("--no-lean", action="store_true", help="do not lean into bends")
+    verb.add_argument("--slow-in-bends", action="store_true", help="slow down in tight bends as people do")
+    verb.add_argument("--no-slopes", action="store_true", help="do not shorten steps on slopes")
+    _add_curve(verb)
+    verb.add_argument("--ground", type=Path, metavar="HILL.obj", help="a mesh for the feet to stand on: metres, Y up")
+    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.add_argument("--provenance", type=Path, metavar="P.csv")
+    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of IN.bvh")
+    verb.set_defaults(run=run)
+    return verb
+
+
+def _add_curve(verb) -> None:
+    """How the rows of CURVE.csv are meant."""
+    verb.add_argument("--closed", action="store_true", help="the last point joins the first: round and round")
+    verb.add_argument("--control-points", action="store_true", help="the points of CURVE.csv are a B-spline's controls")
+    verb.add_argument(
+        "--control-degree", type=partial(whole, low=1, high=20, expected="a whole number from 1 to 20"), metavar="K",
+        help="of that B-spline; default 3",
+    )
+
+
+def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`path`: rides it, and writes what was asked for about it."""
+    from ..files import bvh
+
+    inputs = (options.input, options.path, options.ground)
+    check_outputs(options.out, options.report, options.provenance, never=inputs)
+    write = writer_of(options.out, writers)
+    if options.control_degree and not options.control_points:
+        raise InputError("--control-degree", "without --control-points", "both", "add --control-points")
+    path, ground = _path(options), _ground(options)
+    clip = bvh.read(options.input, options.unit)
+    told.progress(0.2, "path")
+    source, settings, notes = _prepared(clip.motion, options)
+    told.progress(0.5, "ride")
+    ridden, take = _ridden(source, path, settings, ground, options)
+    report = _report(source, ridden, take, path, settings, ground) if options.report else None
+    if options.out.suffix.lower() == ".bvh":
+        bvh_notes = bvh.write(options.out, ridden.motion, clip.form)
+        notes = (*notes, *(f"{options.out}: {note}" for note in bvh_notes))
+    else:
+        write(take, options.out)
+    _write_tables(options, take, report)
+    told.end()
+    for note in (*(f"{options.input}: {note}" for note in clip.notes), *notes, *ridden.warnings):
+        told.note(note)
+    gone = float(ridden.arc[-1] - ridden.arc[0]) if len(ridden.arc) else 0.0
+    print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} m")
+
+
+def _write_tables(options, take, report: dict | None) -> None:
+    from ..files.tables import write_provenance, write_report
+
+    if options.provenance:
+        write_provenance(options.provenance, take)
+    if report is not None:
+        write_report(options.report, report)
+
+
+def _path(options):
+    """The new path."""
+    from ..files.path_csv import read_curve
+    from ..polish import path_line
+
+    points = read_curve(options.path)
+    try:
+        if options.control_points:
+            return path_line.b_spline(points, options.control_degree or 3)
+        return path_line.through(points, str(options.path), closed=options.closed)
+    except InputError as error:
+        if error.where.startswith(str(options.path)):
+            raise
+        raise InputError(options.path, str(error)) from None  # points do not know their file
+
+
+def _ground(options):
+    from ..files.obj import read_mesh
+    from ..motion.terrain import Terrain
+
+    return Terrain(*read_mesh(options.ground)) if options.ground else None
+
+
+def _prepared(motion, options):
+    """The recording taken off its own path, the settings, and what had to be left out, one line each."""
+    from ..motion.humanoid import identify
+    from ..ride import RideSettings, prepare
+
+    settings = RideSettings(
+        fit="polynomial" if options.degree else "spline", degree=options.degree or RideSettings.degree,
+        by_arc_length=not options.no_arc_length, speed=options.speed, end=options.end, cycle=options.cycle,
+        frame=options.frame, plant=not options.no_plant, lean=not options.no_lean, bends=options.slow_in_bends,
+        slopes=not options.no_slopes,
+    )
+    notes = ()
+    try:
+        identify(motion.skeleton)
+    except InputError as error:
+        settings = replace(settings, plant=False, lean=False)
+        notes = (f"{options.input}: no human body ({error}), so nothing is planted and nothing leans",)
+    try:
+        return prepare(motion, settings), settings, notes
+    except InputError as error:
+        raise InputError(options.input, str(error)) from None  # a motion does not know its file
+
+
+def _ridden(source, path, settings, ground, options):
+    """What was ridden, and the same as a take."""
+    from ..annotation import Timeline
+    from ..ride import ride
+    from ..take import Take
+
+    try:
+        ridden = ride(source, path, settings, ground)
+    except InputError as error:
+        raise InputError(f"{options.input} on {options.path}", str(error)) from None
+    count = len(ridden.motion)
+    take = Take(
+        motion=ridden.motion, start_time=0.0, clips=(options.input.name,), clip=np.zeros(count, int),
+        clip_frame=ridden.frames, mirrored=np.zeros(count, bool), words=((),) * count,
+        contacts=ridden.standing.all(axis=2), seams=np.asarray(ridden.seams, int), timeline=Timeline(), keys=(),
+        ball=None, method="ride", seed=0, warnings=tuple(ridden.warnings), correction=ridden.correction,
+        ik_miss=ridden.miss,
+    )  # fmt: skip
+    return ridden, take
+
+
+def _report(source, ridden, take, path, settings, ground) -> dict:
+    """The contract's report, and beside it how well the path was ridden."""
+    from ..evaluation.path_ride import figures
+    from ..evaluation.report import evaluate
+    from ..ride import ride
+
+    before = ride(source, path, replace(settings, plant=False), ground).motion if settings.plant else None
+    ridden_well = figures(source, ridden, path, before=before, ground=ground)
+    try:
+        report = evaluate(take, None, None)
+    except InputError:  # no human body
+        report = {"version": 1, "fps": take.motion.fps, "frames": len(take.motion), "duration_s": take.motion.duration}
+    return {**report, "root_error_m": ridden_well["root_error_m"], "path": ridden_well, "warnings": list(take.warnings)}

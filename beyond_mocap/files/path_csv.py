@@ -1,0 +1,34 @@
+"""A path as a table: `x_m,y_m[,z_m]`, its points from the first to the last."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from ..errors import InputError
+from .tables import number, read_rows
+
+COLUMNS = ("x_m", "y_m", "z_m")
+_SAME = 1e-6  # metres
+
+
+def read_curve(path: str | os.PathLike) -> np.ndarray:
+    """(N, 3) metres, N >= 2: the points of a CSV file in the order of its rows, in the pitch's frame, z 0 where the
+    column is missing; other columns are ignored.
+
+    InputError, with the line, where a cell is no number or lies beyond 10 km; where fewer than two different points are
+    given.
+    """
+    names, points = COLUMNS[:2], []
+    for place, row in read_rows(path, names):
+        if not points:
+            names = COLUMNS if "z_m" in row else names
+        points.append([number(row[name], name, place) for name in names])
+    line = np.zeros((len(points), 3))
+    if points:
+        line[:, : len(names)] = points
+    if not len(line) or np.ptp(line, axis=0).max() < _SAME:
+        what = f"{len(line)} points, all at one place" if len(line) > 1 else f"{len(line)} points"
+        raise InputError(path, what, "at least two rows under x_m,y_m[,z_m] that lie apart", "add points")
+    return line
