@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -37,7 +36,8 @@ def add(verbs):
     verb.add_argument("--frame", choices=_FRAMES, default="path", help=_FRAME_HELP)
     verb.add_argument("--no-lean", action="store_true", help="do not lean into bends")
     verb.add_argument("--slow-in-bends", action="store_true", help="slow down in tight bends as people do")
-    verb.add_argument("--no-slopes", action="store_true", help="do not shorten steps on slopes")
+    verb.add_argument("--slow-on-slopes", action="store_true", help="shorter steps up and down, as people make them")
+    verb.add_argument("--no-slopes", action="store_true", help="feet do not follow slopes; the body rides up as in a lift")
     _add_curve(verb)
     verb.add_argument("--ground", type=Path, metavar="HILL.obj", help="a mesh for the feet to stand on: metres, Y up")
     verb.add_argument("--report", type=Path, metavar="R.json")
@@ -69,18 +69,18 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     path, ground = _path(options), _ground(options)
     clip = bvh.read(options.input, options.unit)
     told.progress(0.2, "path")
-    source, settings, notes = _prepared(clip.motion, options)
+    source, settings = _prepared(clip.motion, options)
     told.progress(0.5, "ride")
     ridden, take = _ridden(source, path, settings, ground, options)
-    report = _report(source, ridden, take, path, settings, ground) if options.report else None
+    report = _report(source, ridden, take, path, ground) if options.report else None
+    notes = [f"{options.input}: {note}" for note in clip.notes]
     if options.out.suffix.lower() == ".bvh":
-        bvh_notes = bvh.write(options.out, ridden.motion, clip.form)
-        notes = (*notes, *(f"{options.out}: {note}" for note in bvh_notes))
+        notes += [f"{options.out}: {note}" for note in bvh.write(options.out, ridden.motion, clip.form)]
     else:
         write(take, options.out)
     _write_tables(options, take, report)
     told.end()
-    for note in (*(f"{options.input}: {note}" for note in clip.notes), *notes, *ridden.warnings):
+    for note in (*notes, *ridden.warnings):
         told.note(note)
     gone = float(ridden.arc[-1] - ridden.arc[0]) if len(ridden.arc) else 0.0
     print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} m")
@@ -119,24 +119,17 @@ def _ground(options):
 
 
 def _prepared(motion, options):
-    """The recording taken off its own path, the settings, and what had to be left out, one line each."""
-    from ..motion.humanoid import identify
+    """The recording taken off its own path, and the settings."""
     from ..ride import RideSettings, prepare
 
     settings = RideSettings(
         fit="polynomial" if options.degree else "spline", degree=options.degree or RideSettings.degree,
         by_arc_length=not options.no_arc_length, speed=options.speed, end=options.end, cycle=options.cycle,
         frame=options.frame, plant=not options.no_plant, lean=not options.no_lean, bends=options.slow_in_bends,
-        slopes=not options.no_slopes,
+        slopes=not options.no_slopes, climbs=options.slow_on_slopes,
     )
-    notes = ()
     try:
-        identify(motion.skeleton)
-    except InputError as error:
-        settings = replace(settings, plant=False, lean=False)
-        notes = (f"{options.input}: no human body ({error}), so nothing is planted and nothing leans",)
-    try:
-        return prepare(motion, settings), settings, notes
+        return prepare(motion, settings), settings
     except InputError as error:
         raise InputError(options.input, str(error)) from None  # a motion does not know its file
 
@@ -162,16 +155,15 @@ def _ridden(source, path, settings, ground, options):
     return ridden, take
 
 
-def _report(source, ridden, take, path, settings, ground) -> dict:
+def _report(source, ridden, take, path, ground) -> dict:
     """The contract's report, and beside it how well the path was ridden."""
     from ..evaluation.path_ride import figures
-    from ..evaluation.report import evaluate
-    from ..ride import ride
+    from ..evaluation.report import evaluate, rounded
 
-    before = ride(source, path, replace(settings, plant=False), ground).motion if settings.plant else None
-    ridden_well = figures(source, ridden, path, before=before, ground=ground)
-    try:
+    ridden_well = rounded(figures(source, ridden, path, ground))
+    if source.humanoid:
         report = evaluate(take, None, None)
-    except InputError:  # no human body
+    else:
         report = {"version": 1, "fps": take.motion.fps, "frames": len(take.motion), "duration_s": take.motion.duration}
+    report["skate"] = {**report.get("skate", {}), **(ridden_well["skate"] or {})}
     return {**report, "root_error_m": ridden_well["root_error_m"], "path": ridden_well, "warnings": list(take.warnings)}

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..errors import InputError
 from ..motion import contacts as foot_contacts
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
@@ -21,13 +20,12 @@ _DENSE = 0.01  # metres between the places of the path that a pelvis is compared
 _MOVING = 0.3  # m/s below which a body stands, and no speed is kept
 
 
-def figures(source, ridden, path, before: Motion | None = None, ground=None) -> dict:
-    """All figures, None where nothing is known, as where the skeleton is no human body's.
+def figures(source, ridden, path, ground=None) -> dict:
+    """All figures, None where nothing is known, as where the skeleton is no human body's. `before`: not yet planted.
 
-    path: the new path. before: the ride without planting; ground: the Terrain that it stood on, None for the path's own
-    height.
+    path: the new path. ground: the Terrain that it stood on, None for the path's own height.
     """
-    pelvis, own = _pelvis(ridden.motion), _pelvis(source.motion)
+    pelvis, own = (_pelvis(motion, source.humanoid) for motion in (ridden.motion, source.motion))
     frames = np.clip(np.rint(ridden.frames).astype(int), 0, len(source.motion) - 1)
     fps = ridden.motion.fps
     out = {
@@ -36,22 +34,17 @@ def figures(source, ridden, path, before: Motion | None = None, ground=None) -> 
         "root_error_own_m": _spread(_own_error(source, own)),
         "nearest_m": _spread(nearest(pelvis[:, :2], ridden.origin[:, :2], path, fps)),
         "kept_speed": kept_speed(source, ridden, own, pelvis, frames),
-        "seam_jerk": _seams(source, ridden, own),
+        "seam_jerk": _seams(source, ridden, own, pelvis),
         "ground_mm": None, "skate": None, "knee_jerk_ratio": None, "foot_correction_m": None, "ik_miss_share": None,
     }  # fmt: skip
-    try:
-        identify(ridden.motion.skeleton)
-    except InputError:
+    if not source.humanoid:
         return out
-    return {**out, **_feet(source, ridden, before, frames, ground), "knee_jerk_ratio": knee_jerk(source, ridden, frames)}
+    return {**out, **_feet(source, ridden, frames, ground), "knee_jerk_ratio": knee_jerk(source, ridden, frames)}
 
 
-def _pelvis(motion: Motion) -> np.ndarray:
+def _pelvis(motion: Motion, humanoid: bool) -> np.ndarray:
     """Places (T, 3) m of the hips, of the root where there are none."""
-    try:
-        hips = identify(motion.skeleton).hips
-    except InputError:
-        hips = 0
+    hips = identify(motion.skeleton).hips if humanoid else 0
     return motion.root_positions if hips == 0 else forward_kinematics(motion)[0][:, hips]
 
 
@@ -105,7 +98,7 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
     return {"path": _spread(path), "body": {**_spread(body), "total": total}}
 
 
-def _seams(source, ridden, own: np.ndarray) -> dict:
+def _seams(source, ridden, own: np.ndarray, pelvis: np.ndarray) -> dict:
     """Jerk at the seams of a ride that cycles, against what the recording itself has at that speed."""
     seams = np.asarray(ridden.seams, int)
     mine, his = (jerk.jerk(forward_kinematics(m)[0], m.fps) for m in (ridden.motion, source.motion))
@@ -114,19 +107,19 @@ def _seams(source, ridden, own: np.ndarray) -> dict:
     if not len(windows) or not len(seams):
         return {"seams": len(seams), "max": None, "median": None}
     real = jerk.real_p95(windows, at)
-    ratios = jerk.seam_ratios(mine, seams, root.travel_speed(_pelvis(ridden.motion)[:, :2], ridden.motion.fps), real)
+    ratios = jerk.seam_ratios(mine, seams, root.travel_speed(pelvis[:, :2], ridden.motion.fps), real)
     return {"seams": len(seams), "max": float(ratios.max()), "median": float(np.median(ratios))}
 
 
-def _feet(source, ridden, before: Motion | None, frames: np.ndarray, ground) -> dict:
+def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
     """Skate on carried contacts in the recording, before planting and after; stances, the ground, what planting did."""
-    points, own_points = ridden.standing, source.residuals.standing
+    points, own_points = ridden.standing, source.standing
     own, mine = _foot_places(source.motion), _foot_places(ridden.motion)
     used = np.unique(frames)
     skate = {
         **_skate("", mine, points, ridden.motion.fps),
         **_skate("source_", own, own_points, source.motion.fps, used),
-        **(_skate("before_", _foot_places(before), points, before.fps) if before is not None else {}),
+        **_skate("before_", _foot_places(ridden.rigid), points, ridden.motion.fps),
     }
     stood, own_stood = points.all(axis=2), own_points.all(axis=2)
     correction = None if ridden.correction is None else ridden.correction[points.any(axis=2)]

@@ -1,0 +1,235 @@
+"""Recordings of many kinds on many paths: `python -m benchmarks.path_editing`, and the rows of `make bench`.
+
+Each recording's first ten seconds ride every path of `path_shapes`. A figure stands beside the recording's own, and
+beside the same ride without planting where that says something. `--worst N` names the worst rides of each kind.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.evaluation.path_ride import figures
+from beyond_mocap.files import bvh
+from beyond_mocap.motion.motion import resample
+from beyond_mocap.polish.path_line import through
+from beyond_mocap.ride import RideSettings, prepare, ride
+
+from benchmarks import markdown, path_shapes
+from benchmarks.effort import on_one_core
+from benchmarks.places import CMU_UNIT, DATA
+
+SECONDS, BUDGET_FRAMES, BUDGET_MS = 10.0, 600, 35.0
+CLIPS = {
+    "cmu10": (
+        "10_04", "train_walking_1", "train_walking_2", "train_walking_3", "train_running_1", "test_running_1",
+    ),
+    "lafan1": (
+        "walk1_subject1_walk2_filtered", "walk3_subject4_walk2_filtered", "run2_subject4_run2_filtered",
+        "pushAndStumble1_subject2_jog_filtered", "multipleActions1_subject4_walk2_filtered",
+        "fightAndSports1_subject1_backward_filtered",
+    ),
+    "bandai": (
+        "dataset-1_walk_normal_001", "dataset-1_walk_proud_001", "dataset-1_run_normal_001",
+        "dataset-1_dash_normal_001", "dataset-1_walk-left_normal_001", "dataset-1_walk-back_normal_001",
+    ),
+    "runs15": ("sie_humanoid3d_run_forward04", "sie_humanoid3d_run_forward12", "sie_humanoid3d_run_left07"),
+    "lmd": ("Player1/P1_S21_dribble_long", "Player1/P1_S27_dribble_straight", "Player1/P1_S01_penalty_kick"),
+    "sprinter": ("run0350cms", "run0900cms"),
+}  # fmt: skip
+COLUMNS = {
+    "root error cm, mean / p95": ("root_error_m.mean", "root_error_m.p95"),
+    "kept speed off %, path / body": ("kept_speed.path.max", "kept_speed.body.total"),
+    "skate cm/s, before -> after (own)": ("skate.before_contact_cm_s", "skate.contact_cm_s", "skate.source_contact_cm_s"),
+    "all standing points": ("skate.before_point_cm_s", "skate.point_cm_s", "skate.source_point_cm_s"),
+    "stance mm (own)": ("skate.stance_mm_median", "skate.source_stance_mm_median"),
+    "over 21 mm % (own)": ("skate.stances_over_21mm", "skate.source_stances_over_21mm"),
+    "IK missed %": ("ik_miss_share",),
+    "foot moved cm, p95": ("foot_correction_m.p95",),
+    "knee jerk / own": ("knee_jerk_ratio.p99",),
+    "sole off mm, p95 (own)": ("ground_mm.standing_p95", "ground_mm.source_standing_p95"),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One ride: of which kind and recording, on which path, its figures by dotted name, ms of `ride`."""
+
+    kind: str
+    clip: str
+    path: str
+    values: dict[str, float]
+    ms: float
+
+
+def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(path_shapes.ALL), **settings) -> list[Row]:
+    """A row for each recording of `kinds` on each of `paths`. settings: of RideSettings."""
+    chosen, rows = RideSettings(**settings), []
+    for kind in kinds:
+        for name in CLIPS[kind]:
+            source = prepare(recording(kind, name), chosen)
+            rows += [_row(kind, name, path, source, chosen) for path in paths]
+    return rows
+
+
+def recording(kind: str, name: str):
+    """The first ten seconds of a recording."""
+    file = DATA / "mocap" / kind / f"{name}.bvh"
+    motion = bvh.read(file, CMU_UNIT if kind == "cmu10" else None).motion
+    return motion.frames(0, min(len(motion), int(SECONDS * motion.fps) + 1))
+
+
+def _row(kind: str, name: str, shape: str, source, settings: RideSettings) -> Row:
+    path = through(path_shapes.ALL[shape], shape)
+    begun = time.process_time()
+    ridden = ride(source, path, settings)
+    took = 1e3 * (time.process_time() - begun)
+    return Row(kind, name, shape, dotted(figures(source, ridden, path)), took)
+
+
+def dotted(value, name: str = "") -> dict[str, float]:
+    """Nested figures by dotted name; what is not known is NaN."""
+    if isinstance(value, dict):
+        return {k: v for key, entry in value.items() for k, v in dotted(entry, f"{name}.{key}" if name else key).items()}
+    return {name: np.nan if value is None else float(value)}
+
+
+def table(rows: list[Row], by: str) -> list[str]:
+    """Medians over the rides of each `by` (kind or path), a line each."""
+    names = list(dict.fromkeys(getattr(row, by) for row in rows))
+    lines = markdown.head([by, "rides", *COLUMNS])
+    for name in names:
+        group = [row for row in rows if getattr(row, by) == name]
+        lines.append(markdown.row([name, str(len(group)), *(_cell(group, of) for of in COLUMNS.values())]))
+    return lines
+
+
+def _cell(group: list[Row], names: tuple[str, ...]) -> str:
+    values = [_scale(name) * _median([row.values.get(name, np.nan) for row in group]) for name in names]
+    shown = ["-" if not np.isfinite(value) else f"{value:.3g}" for value in values]
+    if len(shown) == 3:
+        return f"{shown[0]} -> {shown[1]} ({shown[2]})"
+    own = len(shown) == 2 and "source" in names[1]
+    return f"{shown[0]} ({shown[1]})" if own else " / ".join(shown)
+
+
+def _scale(name: str) -> float:
+    if "_m." in name:
+        return 100.0
+    return 100.0 if name.startswith("kept_speed") or "share" in name or "over_21" in name else 1.0
+
+
+def _median(values: list[float]) -> float:
+    known = [value for value in values if np.isfinite(value)]
+    return float(np.median(known)) if known else np.nan
+
+
+WORST = {
+    "root error mean, cm": lambda v: 100.0 * v["root_error_m.mean"],
+    "kept speed off, %": lambda v: 100.0 * v["kept_speed.path.max"],
+    "skate over the recording's own, cm/s": lambda v: v["skate.contact_cm_s"] - v["skate.source_contact_cm_s"],
+    "standing points over the recording's own, cm/s": lambda v: v["skate.point_cm_s"] - v["skate.source_point_cm_s"],
+    "stance over the recording's own, mm": lambda v: v["skate.stance_mm_median"] - v["skate.source_stance_mm_median"],
+    "frames in which IK missed, %": lambda v: 100.0 * v["ik_miss_share"],
+    "foot moved, p95, cm": lambda v: 100.0 * v["foot_correction_m.p95"],
+    "knee jerk over the recording's own": lambda v: v["knee_jerk_ratio.p99"],
+    "standing sole off the surface over the recording's own, p95, mm": (
+        lambda v: v["ground_mm.standing_p95"] - v["ground_mm.source_standing_p95"]
+    ),
+}
+
+
+def worst(rows: list[Row], count: int) -> list[str]:
+    """The `count` worst rides of every kind of figure."""
+    lines = []
+    for title, of in WORST.items():
+        known = [(value, row) for row in rows if np.isfinite(value := _value(of, row))]
+        first = sorted(known, key=lambda pair: -pair[0])[:count]
+        told = "; ".join(f"{row.kind}/{row.clip} on {row.path} {value:.2g}" for value, row in first)
+        lines.append(f"- {title}: {told}")
+    return lines
+
+
+def _value(of, row: Row) -> float:
+    try:
+        return of(row.values)
+    except KeyError:
+        return np.nan
+
+
+def kept(rows: list[Row]) -> str:
+    """How many fair rides skate no more than their recording, and keep the speed."""
+    fair = [row for row in rows if row.path in path_shapes.FAIR]
+    if not fair:
+        return "no ride on a fair path"
+    pairs = [(row.values.get("skate.contact_cm_s"), row.values.get("skate.source_contact_cm_s")) for row in fair]
+    known = [(a, b) for a, b in pairs if a is not None and np.isfinite(a) and np.isfinite(b)]
+    still = np.mean([a <= b + 0.05 for a, b in known])
+    speed = np.mean([row.values["kept_speed.path.max"] <= 0.01 for row in fair])
+    error = np.mean([row.values["root_error_m.mean"] <= 0.005 for row in fair])
+    return (
+        f"Bends of radius 2 m or more, {len(fair)} rides: feet slide no more than in the recording in {still:.0%}, arc "
+        f"length per frame is kept within 1 % in {speed:.0%}, the root is within 5 mm of the path (mean) in {error:.0%}."
+    )
+
+
+def timing() -> str:
+    """ms of `prepare` and `ride` for 600 frames at 60 per second, the best of seven."""
+    motion = recording("lafan1", "walk1_subject1_walk2_filtered")
+    motion = resample(motion, 60.0).frames(0, BUDGET_FRAMES)
+    settings, path = RideSettings(), through(path_shapes.winding(), "winding")
+    took = {"prepare": np.inf, "ride": np.inf, "ride without planting": np.inf}
+    for _ in range(7):
+        begun = time.process_time()
+        source = prepare(motion, settings)
+        ready = time.process_time()
+        ride(source, path, settings)
+        done = time.process_time()
+        ride(source, path, replace(settings, plant=False))
+        for name, ms in zip(took, (ready - begun, done - ready, time.process_time() - done)):
+            took[name] = min(took[name], 1e3 * ms)
+    told = ", ".join(f"{name} {ms:.0f} ms" for name, ms in took.items())
+    return f"{len(motion)} frames, {len(motion.skeleton)} joints: {told} (target of ride: {BUDGET_MS:g} ms)."
+
+
+def section(rows: list[Row], count: int = 3) -> list[str]:
+    """The lines of a report: what is kept, by path, by recordings, the worst."""
+    return [
+        kept(rows), "", timing(), "", *table(rows, "path"), "", *table(rows, "kind"), "",
+        "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",
+    ]  # fmt: skip
+
+
+def main() -> int:
+    """Rides them and prints."""
+    options = argparse.ArgumentParser(prog="python -m benchmarks.path_editing", description=__doc__)
+    options.add_argument("--kind", nargs="+", choices=tuple(CLIPS), default=list(CLIPS))
+    options.add_argument("--path", nargs="+", choices=tuple(path_shapes.ALL), default=list(path_shapes.ALL))
+    options.add_argument("--worst", type=int, default=5)
+    options.add_argument("--all", action="store_true", help="a line for every ride")
+    chosen = options.parse_args()
+    if not Path(DATA / "mocap").is_dir():
+        print(f"bench: {DATA} is missing; this benchmark needs its recordings and was skipped")
+        return 0
+    on_one_core()
+    try:
+        rows = rides(chosen.kind, chosen.path)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    if chosen.all:
+        single = [replace(row, clip=f"{row.kind}/{row.clip} on {row.path}") for row in rows]
+        print("\n".join(table(single, "clip")), "\n")
+    print("\n".join(section(rows, chosen.worst)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
