@@ -112,10 +112,13 @@ def _path(options):
 
 
 def _ground(options):
+    """The mesh that the feet stand on, None for the path's own height."""
+    if options.ground is None:
+        return None
     from ..files.obj import read_mesh
     from ..motion.terrain import Terrain
 
-    return Terrain(*read_mesh(options.ground)) if options.ground else None
+    return Terrain(*read_mesh(options.ground))
 
 
 def _prepared(motion, options):
