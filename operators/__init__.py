@@ -43,6 +43,8 @@ from . import (
     mirror_side,
     move_moment,
     move_video,
+    nudge_points,
+    path_camera,
     pick_moment,
     place_players,
     player_from_dot,
@@ -137,6 +139,8 @@ CLASSES = (
     bake_to_rig.BEYOND_MOCAP_OT_unbake,
     bake_to_rig.BEYOND_MOCAP_OT_reduce_keys,
     export_motion.BEYOND_MOCAP_OT_export_motion,
+    path_camera.BEYOND_MOCAP_OT_path_camera,
+    nudge_points.BEYOND_MOCAP_OT_nudge_points,
 )
 
 

@@ -12,12 +12,16 @@ from typing import NamedTuple
 import bpy
 
 OURS = "beyond_mocap."
+NUDGES = {
+    "LEFT_ARROW": "LEFT", "RIGHT_ARROW": "RIGHT", "UP_ARROW": "FORTH", "DOWN_ARROW": "BACK", "PAGE_UP": "UP",
+    "PAGE_DOWN": "DOWN",
+}
 
 
 class Entry(NamedTuple):
     """One key. keymap, space: Blender's name of the keymap and its editor type ("EMPTY" where it belongs to no one
     editor). operator: its bl_idname. key: event type. modifiers: of "shift", "ctrl", "alt", "oskey". properties: of
-    the operator."""
+    the operator. repeat: whether the key acts again and again while it is held."""
 
     keymap: str
     space: str
@@ -25,6 +29,7 @@ class Entry(NamedTuple):
     key: str
     modifiers: tuple[str, ...] = ()
     properties: Mapping[str, object] = {}
+    repeat: bool = False
 
 
 ENTRIES: tuple[Entry, ...] = (
@@ -35,6 +40,12 @@ ENTRIES: tuple[Entry, ...] = (
     Entry("Clip Editor", "CLIP_EDITOR", "beyond_mocap.annotate", "J"),
     Entry("NLA Editor", "NLA_EDITOR", "beyond_mocap.pick_moment", "LEFTMOUSE"),
     Entry("Dopesheet", "DOPESHEET_EDITOR", "beyond_mocap.pick_moment", "LEFTMOUSE"),
+    Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "NUMPAD_0", ("shift",)),
+    Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "J", ("shift",)),
+    *(
+        Entry("Curve", "EMPTY", "beyond_mocap.nudge_points", key, ("alt",), {"direction": direction}, repeat=True)
+        for key, direction in NUDGES.items()
+    ),
 )
 
 
@@ -46,7 +57,7 @@ def register():
     for entry in ENTRIES:
         keymap = configuration.keymaps.new(name=entry.keymap, space_type=entry.space)
         held = {modifier: True for modifier in entry.modifiers}
-        item = keymap.keymap_items.new(entry.operator, entry.key, "PRESS", **held)
+        item = keymap.keymap_items.new(entry.operator, entry.key, "PRESS", repeat=entry.repeat, **held)
         for name, value in entry.properties.items():
             setattr(item.properties, name, value)
 

@@ -15,7 +15,7 @@ def editor(context: bpy.types.Context, kind: str, direction: str, factor: float)
     window = context.window
     if bpy.app.background or window is None:
         return None
-    return _largest(window.screen, kind) or _split(context, window, kind, direction, factor)
+    return largest(window.screen, kind) or _split(context, window, kind, direction, factor)
 
 
 def clear_status() -> None:
@@ -46,7 +46,7 @@ def free_part(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, fl
 
 
 def _split(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
-    view = _largest(window.screen, "VIEW_3D")
+    view = largest(window.screen, "VIEW_3D")
     if view is None:
         return None
     before = {area.as_pointer() for area in window.screen.areas}
@@ -58,5 +58,6 @@ def _split(context, window, kind: str, direction: str, factor: float) -> bpy.typ
     return new
 
 
-def _largest(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
+def largest(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
+    """The largest editor of a kind; None where there is none."""
     return max((area for area in screen.areas if area.type == kind), key=lambda a: a.width * a.height, default=None)

@@ -243,6 +243,10 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
     shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
     view: PointerProperty(type=BeyondMocapView, description="What is drawn over the 3D view")
+    nudge_step: FloatProperty(
+        name="Nudge Step", default=0.1, min=0.001, max=10.0, precision=3, step=1,
+        description="Metres that control points go at each nudge",
+    )
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):

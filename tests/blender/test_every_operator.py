@@ -11,9 +11,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import bpy
+import numpy as np
 import pytest
 import rigs
 import worlds
+from conftest import EXTENSION
 from undo import press, state
 
 SAYS_NOTHING = re.compile(
@@ -84,6 +86,21 @@ def draw():
     bpy.ops.beyond_mocap.draw_track()
 
 
+def edit_points():
+    """A drawn curve in edit mode, all of its points selected."""
+    draw()
+    worlds.choose(bpy.context.scene.beyond_mocap.players[bpy.context.scene.beyond_mocap.active_player].drawn_track)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.curve.select_all(action="SELECT")
+
+
+def lay_cameras():
+    """Cameras round a path of three metres."""
+    cameras = importlib.import_module(f"{EXTENSION}.scene.path_cameras")
+    places = np.linspace((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), 20)
+    cameras.set_up(bpy.context.scene, cameras.Route(places, np.arange(1.0, 21.0), places, np.zeros(20)))
+
+
 def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
@@ -152,6 +169,8 @@ ROWS = {
     "mirror_side": Row("imported", prepare=pick_a_moment),
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
     "move_video": Row("video", lambda places: {"frames": 3}),
+    "nudge_points": Row("imported", lambda places: {"direction": "UP", "step": 0.3}, edit_points),
+    "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),

@@ -24,6 +24,7 @@ def state():
                                for point in (spline.bezier_points or spline.points)] for curve in bpy.data.curves},
         "keys": {action.name: keys(action) for action in bpy.data.actions},
         "owned": {f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind) if (found := ours(item))},
+        "camera": scene.camera and scene.camera.name,
         "frames": (scene.frame_start, scene.frame_end, scene.render.fps, scene.frame_current),
         "chosen": (layer.objects.active and layer.objects.active.name, sorted(o.name for o in layer.objects if o.select_get()),
                    bpy.context.mode),

@@ -1,0 +1,89 @@
+"""Path Camera: look through the next of the four cameras, or through a certain one, and back to the free view."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..beyond_mocap.errors import InputError
+from ..scene import areas, path_cameras
+from .verb import Verb
+
+WHICH = (
+    ("NEXT", "Next", "The next one; after the last the free view, from the free view the first"),
+    ("ABOVE", "Above", "From above, as a map: X to the right, Y up"),
+    ("SIDE", "Side", "From the side, the path across the picture"),
+    ("QUARTER", "Quarter", "From three quarters, a little above"),
+    ("BEHIND", "Behind", "Behind the body, following it"),
+    ("FREE", "Free View", "The view as it was before"),
+)
+_free: dict[int, str] = {}  # perspective of the free view, by the area's pointer
+
+
+class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
+    """Look through the next path camera; after the last one the free view comes back"""
+
+    bl_idname = "beyond_mocap.path_camera"
+    bl_label = "Path Camera"
+
+    which: EnumProperty(name="Which", items=WHICH, default="NEXT", description="The camera to look through")
+
+    @classmethod
+    def poll(cls, context):
+        """There are such cameras."""
+        cls.poll_message_set("Press Path Cameras in the panel Path Editing first")
+        return path_cameras.any_in(context.scene)
+
+    @classmethod
+    def description(cls, _context, properties):
+        """What this button shows, with the key that flicks."""
+        told = next(item[2] for item in WHICH if item[0] == properties.which)
+        return f"{told}.\nShift + J or Shift + Numpad 0: the next one"
+
+    def do(self, context):
+        """Make it the scene's camera, and look through it in the 3D view."""
+        scene, area = context.scene, _view(context)
+        kind = self.which if self.which != "NEXT" else _after(scene, area)
+        if kind == "FREE":
+            _look_freely(area)
+            return
+        camera = path_cameras.found(scene, kind)
+        if camera is None:
+            raise InputError("path cameras", f"no camera {path_cameras.NAMES[kind]}", "all four",
+                             "press Path Cameras in the panel Path Editing")
+        scene.camera = camera
+        if area is not None:
+            _look_through(area, camera)
+
+
+def _view(context) -> bpy.types.Area | None:
+    """The 3D view in which the key or button was pressed, or the largest; None without a window."""
+    if bpy.app.background or context.window is None:
+        return None
+    if context.area is not None and context.area.type == "VIEW_3D":
+        return context.area
+    return areas.largest(context.window.screen, "VIEW_3D")
+
+
+def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
+    """What comes next: the free view is one of the row where there is a view."""
+    row = [kind for kind in path_cameras.KINDS if path_cameras.found(scene, kind)]
+    looked = area is None or area.spaces.active.region_3d.view_perspective == "CAMERA"
+    seen = scene.camera.get(path_cameras.MARK, "") if looked and scene.camera is not None else ""
+    if area is not None:
+        row.append("FREE")
+    return row[(row.index(seen) + 1) % len(row)] if seen in row else row[0]
+
+
+def _look_through(area: bpy.types.Area, camera: bpy.types.Object) -> None:
+    space = area.spaces.active
+    if space.region_3d.view_perspective != "CAMERA":
+        _free[area.as_pointer()] = space.region_3d.view_perspective
+    if space.use_local_camera:
+        space.camera = camera
+    space.region_3d.view_perspective = "CAMERA"
+
+
+def _look_freely(area: bpy.types.Area | None) -> None:
+    if area is not None and area.spaces.active.region_3d.view_perspective == "CAMERA":
+        area.spaces.active.region_3d.view_perspective = _free.get(area.as_pointer(), "PERSP")
