@@ -7,14 +7,16 @@ Smooth is the curve of least acceleration that stays within a hand's breadth of 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solveh_banded
+
+from .smooth_spline import DEGREE, spline_pieces, spline_within
 
 SLACK = 0.06
 """Metres that the line may be off the pelvis."""
 
 TURN_SLACK = np.radians(25.0)
-_SECONDS = 0.4  # sway slower than about six times this is a way taken, faster is sway
-_ROUNDS = 8
+SECONDS = 0.4
+"""Sway slower than about six times this is a way taken, faster is sway."""
+
 WAYS = ("smooth", "straight")
 
 
@@ -36,24 +38,10 @@ def ground_path(places: np.ndarray, facing: np.ndarray, fps: float, way: str = "
 
 
 def _within(values: np.ndarray, fps: float, slack: float) -> np.ndarray:
-    """The smooth curve (T, K) that is nowhere farther than about `slack` from `values` (T, K)."""
-    weight = np.ones(len(values))
-    smooth = _smooth(values, weight, fps)
-    for _ in range(_ROUNDS):
-        off = np.linalg.norm(smooth - values, axis=1)
-        if off.max(initial=0.0) <= slack:
-            break
-        weight = weight * np.maximum(1.0, off / (0.7 * slack)) ** 2
-        smooth = _smooth(values, weight, fps)
-    return smooth
+    """The smooth curve (T, K) that is nowhere much farther than `slack` from `values` (T, K)."""
+    from scipy.interpolate import BSpline
 
-
-def _smooth(values: np.ndarray, weight: np.ndarray, fps: float) -> np.ndarray:
-    """Minimizes sum w |x - v|^2 + (seconds * fps)^4 |x''|^2 over curves x (T, K): one banded system."""
-    count, stencil = len(values), (1.0, -2.0, 1.0)
-    band, stiff = np.zeros((3, count)), (_SECONDS * fps) ** 4
-    for i, a in enumerate(stencil):
-        for j, b in enumerate(stencil[: i + 1]):
-            band[i - j, j : j + max(count - 2, 0)] += stiff * a * b
-    band[0] += weight
-    return solveh_banded(band, weight[:, None] * values, lower=True)
+    if len(values) < 2:
+        return values.copy()
+    times = np.arange(len(values)) / fps
+    return BSpline(*spline_within(values, times, spline_pieces(times[-1], SECONDS), SECONDS, slack), DEGREE)(times)

