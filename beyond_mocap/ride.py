@@ -17,11 +17,12 @@ from .motion.humanoid import heading as facing
 from .motion.humanoid import identify
 from .motion.motion import Motion, forward_kinematics
 from .motion.path import Path
-from .polish.banking import banked
-from .polish.foot_plant import plant
+from .motion.terrain import Terrain
+from .polish.foot_ride import Ground, follow
 from .polish.path_fit import fit, fit_polynomial, fit_spline
 from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
 from .polish.path_time import Timing, by_arc_length, by_time, parameter_at, shown
+from .polish.underfoot import footing, is_level, mesh_surface, path_surface
 
 ENDS = ("stop", "repeat")
 FITS = ("spline", "polynomial")
@@ -130,15 +131,16 @@ def prepare(
     place, turned = relative(settings.frame, moving, motion.root_positions, motion.rotations[:, 0])
     rotations = motion.rotations.copy()
     rotations[:, 0] = turned
+    under, up = _own_ground(motion, standing, path, arc, moving, metres) if humanoid else _flat(len(motion))
     residuals = Residuals(
         place=place, rotations=rotations, step=np.diff(metres, prepend=metres[:1]), standing=np.asarray(standing, bool),
         frames=np.arange(len(motion), dtype=float), turn=np.diff(moving.heading, prepend=moving.heading[:1]),
-        under=np.zeros((len(motion), 2)), fps=motion.fps, skeleton=motion.skeleton,
+        under=under, up=up, fps=motion.fps, skeleton=motion.skeleton,
     )  # fmt: skip
     return RideSource(motion, residuals.standing, path, arc, moving, residuals, settings.frame, humanoid, still, told)
 
 
-def ride(source: RideSource, path: Path, settings: RideSettings, ground=None) -> Ridden:
+def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain | None = None) -> Ridden:
     """The motion of `source` on `path`.
 
     ground: a `motion.terrain.Terrain` that the feet are to follow; without it the path's own height, level across it.
@@ -156,9 +158,9 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground=None) ->
     rigid = Motion(residuals.skeleton, root, rotations, residuals.fps)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     if settings.plant and source.humanoid:
-        up = moving.origin * [0.0, 0.0, 1.0]
-        held = plant(residuals.skeleton, root - up, rotations, rows.standing, residuals.fps, levels=False)
-        root, rotations, correction, miss = held.root + up, held.rotations, held.correction, held.miss
+        under = _ground(path, arc, settings, ground, moving, timing, rows)
+        held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under)
+        root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
     return Ridden(
         motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, rigid, source,
@@ -196,6 +198,37 @@ def _parameters(
     if not settings.by_arc_length:
         return parameter_at(path, timing.at / max(len(source.residuals) - 1, 1))
     return arc.parameter(timing.arc % arc.length if path.closed and arc.length > 0.0 else timing.arc)
+
+
+def _ground(
+    path: Path, arc: ArcLength, settings: RideSettings, terrain: Terrain | None, moving: MovingFrame, timing: Timing,
+    rows: Residuals,
+) -> Ground | None:
+    """What the feet are to go on; None where that is as level as what they went on."""
+    if not settings.slopes or (terrain is None and is_level(path, arc) and not rows.under.any()):
+        return None
+    surface = path_surface(path, arc, timing.arc) if terrain is None else mesh_surface(terrain, moving.origin)
+    up = quaternion.rotate(quaternion.about_up(moving.heading)[:, None], rows.up)
+    return Ground(moving.origin[:, 2:] + rows.under, up, surface)
+
+
+def _own_ground(
+    motion: Motion, standing: np.ndarray, path: Path, arc: ArcLength, moving: MovingFrame, metres: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Metres (T, 2) from the motion's own path up to the ground under its feet, and its normals (T, 2, 3) in the frame."""
+    if is_level(path, arc):
+        return _flat(len(motion))
+    body = identify(motion.skeleton)
+    joints = [[limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
+    feet = forward_kinematics(motion)[0][:, joints]
+    clear = np.zeros((len(motion), 2))
+    found = footing(feet[..., :2], standing, clear, motion.fps, path_surface(path, arc, metres))
+    back = quaternion.about_up(-moving.heading)[:, None]
+    return found.height - moving.origin[:, 2:], quaternion.rotate(back, found.normal)
+
+
+def _flat(count: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.zeros((count, 2)), np.tile([0.0, 0.0, 1.0], (count, 2, 1))
 
 
 def _humanoid(motion: Motion) -> tuple[bool, tuple[str, ...]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -59,6 +60,15 @@ class Skeleton:
     def children(self, joint: int) -> tuple[int, ...]:
         """Indices of the joints that hang on `joint`."""
         return tuple(i for i, p in enumerate(self.parents) if p == joint)
+
+    def with_ancestors(self, joints: Collection[int]) -> frozenset[int]:
+        """These joints and all above them."""
+        found: set[int] = set()
+        for joint in joints:
+            while joint >= 0 and joint not in found:
+                found.add(joint)
+                joint = self.parents[joint]
+        return frozenset(found)
 
     def scaled(self, size: float) -> "Skeleton":
         """The skeleton of a body `size` times as large."""

@@ -60,7 +60,7 @@ class Planted:
 
 
 @dataclass(frozen=True, eq=False)
-class _Foot:
+class Foot:
     """One foot laid out: hip, heel (the ankle joint) and toe (T, 3) m, rotation (T, 4) in the world, left (T, 3) level
     across it, weight (T, 2) of heel and toe, length (T,) m of its leg and `own`,
     what it was short of that in the pose that was given; `moves` (T - 1, 2, 2) m of heel and toe over the
@@ -80,7 +80,7 @@ class _Foot:
     def moves(self) -> np.ndarray:
         return np.stack([np.diff(self.heel[:, :2], axis=0), np.diff(self.toe[:, :2], axis=0)], axis=1)
 
-    def moved(self, by: np.ndarray) -> _Foot:
+    def moved(self, by: np.ndarray) -> Foot:
         """The foot moved by (T, 3) m."""
         return replace(self, heel=self.heel + by, toe=self.toe + by)
 
@@ -123,20 +123,20 @@ def plant(
     places, world = pose_kinematics(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
     moves = np.zeros((len(root), 2, 4)) if moves is None else moves
-    feet = [_laid(places, world, limb, standing[:, side]) for side, limb in enumerate((body.left, body.right))]
-    feet = [_turned(foot.moved(moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
-    lifts = [_lift(foot, sole_height(skeleton), scale) if levels else np.zeros(len(root)) for foot in feet]
+    feet = [laid_foot(places, world, limb, standing[:, side]) for side, limb in enumerate((body.left, body.right))]
+    feet = [turned_flat(foot.moved(moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
+    lifts = [lift_to_ground(foot, sole_height(skeleton), scale) if levels else np.zeros(len(root)) for foot in feet]
     firm = [foot.weight for foot in feet]
     for turn in range(_EASED_ROUNDS + 1):
         goals = [
             _goal(foot, weight, lift, tilt, scale, spread)
             for foot, weight, lift, tilt in zip(feet, firm, lifts, np.moveaxis(moves[..., 3], 1, 0))
         ]
-        drop = _drop(feet, [goal for goal, _ in goals], spread, sinks)
-        short = [_short(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
+        drop = pelvis_drop(feet, [goal for goal, _ in goals], spread, sinks)
+        short = [lacking(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
         if turn == _EASED_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
             break
-        firm = [_eased(weight, s) for weight, s in zip(firm, short)]
+        firm = [held_less(weight, s) for weight, s in zip(firm, short)]
     root = root - drop[:, None] * [0.0, 0.0, 1.0]
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     out = rotations
@@ -149,7 +149,7 @@ def plant(
     return Planted(root, out, correction, miss)
 
 
-def _laid(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray) -> _Foot:
+def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray) -> Foot:
     hip, knee, heel, toe = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
     weight = firmness(stands)
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
@@ -157,7 +157,7 @@ def _laid(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
     yaw = np.arctan2(along[:, 1], along[:, 0])
     left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
-    return _Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length, own)
+    return Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length, own)
 
 
 def firmness(stands: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ def firmness(stands: np.ndarray) -> np.ndarray:
     return weight
 
 
-def _turned(foot: _Foot, scale: float) -> _Foot:
+def turned_flat(foot: Foot, scale: float) -> Foot:
     """The foot turned about its heel and the vertical so that it keeps its direction while it lies flat."""
     yaw = np.unwrap(np.arctan2(-foot.left[:, 0], foot.left[:, 1]))
     flat = np.minimum(foot.weight[:, 0] / HEEL_SHARE, foot.weight[:, 1]).clip(0.0, 1.0)
@@ -181,18 +181,18 @@ def _turned(foot: _Foot, scale: float) -> _Foot:
 
 
 def _goal(
-    foot: _Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
+    foot: Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m and tilt (T,) radians of the heel."""
-    ground, weight = _held(foot.moves, weight, scale)
+    ground, weight = held_shift(foot.moves, weight, scale)
     moved = np.column_stack([ground, lift])
-    rise = _spread(_rise(foot, moved) * foot.weight[:, 1], spread) + tilt
+    rise = spread_over(heel_rise(foot, moved) * foot.weight[:, 1], spread) + tilt
     roll = quaternion.about_axis(foot.left, rise)
     ankle = foot.toe + moved + quaternion.rotate(roll, foot.heel - foot.toe)
     return ankle, quaternion.multiply(roll, foot.rotation)
 
 
-def _rise(foot: _Foot, moved: np.ndarray) -> np.ndarray:
+def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     """(T,) least radians, at most MOST_RISE, by which a heel turns up about its toe so that the leg reaches its ankle.
 
     With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K.
@@ -208,7 +208,7 @@ def _rise(foot: _Foot, moved: np.ndarray) -> np.ndarray:
     return np.where((asked > even) & (odd > 0.0), np.clip(rise, 0.0, MOST_RISE), 0.0)
 
 
-def _held(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+def held_shift(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than MOST_SHIFT
     are held less firmly, since a foot that slides looks better than a leg torn after it (give-way order,
     ../shared/metrics.md)."""
@@ -217,12 +217,12 @@ def _held(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.nd
         far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
         if far.max(initial=0.0) <= MOST_SHIFT:
             break
-        weight = _eased(weight, far - MOST_SHIFT)
+        weight = held_less(weight, far - MOST_SHIFT)
         ground = shift(velocity, weight, scale)
     return ground, weight
 
 
-def _eased(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
+def held_less(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
     """Weights (T, 2) with those stances held less firmly in which `excess` (T,) m is above 0: a third at 10 cm."""
     stance = weight.max(axis=1) > 0
     label = np.cumsum(np.diff(stance, prepend=False)) * stance
@@ -266,32 +266,32 @@ def _add_differences(band: np.ndarray, stencil: np.ndarray, weight: np.ndarray) 
             band[i - j, j : j + len(weight)] += weight * a * b
 
 
-def _lift(foot: _Foot, sole: float, scale: float) -> np.ndarray:
+def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
     """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes `sole` m above the
     ground, and keeps both above it at all times."""
     heel, toe, weight = foot.heel[:, 2] - sole, foot.toe[:, 2] - sole, np.ceil(foot.weight) * [HEEL_SHARE, 1.0]
     flat = weight.min(axis=1) > 0
     rest = float(np.median((heel - toe)[flat])) if np.any(flat) else float(np.percentile(heel, 5))
     low = np.stack([heel - max(rest, 0.0), toe], axis=1)
-    lift = _settle(-(low * weight).sum(axis=1), weight.sum(axis=1), scale)
+    lift = settled(-(low * weight).sum(axis=1), weight.sum(axis=1), scale)
     for _ in range(3):
         below = np.minimum(low.min(axis=1) + lift, 0.0)
         if below.min() > -1e-3:
             break
         sunk = np.where(below < -1e-3, 1.0, 0.0)
-        lift = lift + _settle(-below * sunk, sunk, scale)
+        lift = lift + settled(-below * sunk, sunk, scale)
     return lift
 
 
-def _settle(right: np.ndarray, weight: np.ndarray, scale: float) -> np.ndarray:
+def settled(right: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH) -> np.ndarray:
     """The smooth curve (T,) that is `right` / `weight` where weight is large, and small elsewhere."""
     band = np.zeros((4, len(weight)))
-    _add_differences(band, np.array([-1.0, 3.0, -3.0, 1.0]), np.full(max(len(weight) - 3, 0), SMOOTH / scale**6))
+    _add_differences(band, np.array([-1.0, 3.0, -3.0, 1.0]), np.full(max(len(weight) - 3, 0), smooth / scale**6))
     band[0] += weight + 2e-2
     return solveh_banded(band, right, lower=True)
 
 
-def _drop(feet: list[_Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:
+def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:
     """(T,) metres to lower the pelvis so that standing ankles can be reached, at most `most`, without a jerk."""
     need = np.zeros(len(goals[0]))
     for foot, goal in zip(feet, goals):
@@ -300,10 +300,10 @@ def _drop(feet: list[_Foot], goals: list[np.ndarray], spread: int, most: float) 
         highest = goal[:, 2] + np.sqrt(np.maximum(length**2 - level**2, 0.0))
         lacks = np.where(level < length, foot.hip[:, 2] - highest, most)
         need = np.maximum(need, np.where(foot.carries > 0, lacks, 0.0))
-    return _spread(np.clip(need, 0.0, most), spread)
+    return spread_over(np.clip(need, 0.0, most), spread)
 
 
-def _spread(need: np.ndarray, reach: int) -> np.ndarray:
+def spread_over(need: np.ndarray, reach: int) -> np.ndarray:
     """A smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
     window = np.hanning(2 * reach + 3)[1:-1]
     widened = maximum_filter1d(need, 2 * reach + 1, mode="nearest")
@@ -311,13 +311,13 @@ def _spread(need: np.ndarray, reach: int) -> np.ndarray:
     return np.convolve(padded, window / window.sum(), mode="valid")
 
 
-def _short(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
+def lacking(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
     """(T,) metres that a standing foot's leg lacks."""
     reach = goal - foot.hip + drop[:, None] * [0.0, 0.0, 1.0]
     return np.where(foot.carries > 0, np.linalg.norm(reach, axis=1) - foot.longest, 0.0)
 
 
-def _within_reach(foot: _Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
+def _within_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
     """Goals (T, 3) with those of feet in the air brought as near as the leg is long, or was in the recording."""
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip

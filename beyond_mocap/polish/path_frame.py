@@ -18,10 +18,10 @@ from ..motion.skeleton import Skeleton
 
 FRAMES = ("path", "tangent", "absolute")
 
-CLEAR = 0.15
+CLEAR = 0.25
 """m/s over the ground from which on a direction of travel is believed; below, the heading is carried across."""
 
-_FULL, _POWER, _MOST = 0.25, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
+_FULL, _POWER, _MOST = 0.4, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
 _STIFF, _TIGHT = 0.1, 0.3  # seconds: of the heading's smoothness, and beyond which a gap is crossed in a straight line
 _STILL = 0.01
 
@@ -33,7 +33,8 @@ class Residuals:
     place (T, 3) m of the root and rotations (T, J, 4) local, the root's relative to the frame; step (T,) m of the path's
     length since the frame before, 0 in the first; standing (T, 2, 2) bool of heels and toes, left and right; frames (T,)
     of the source, in general fractional; turn (T,) radians that the path turns since the frame before; under (T, 2) m
-    from the ground under the body up to the ground under each foot; fps, skeleton. Every array has a row a frame.
+    from the path up to the ground under each foot and up (T, 2, 3) its normal in the frame; fps, skeleton. Every array has
+    a row a frame.
     """
 
     place: np.ndarray
@@ -43,6 +44,7 @@ class Residuals:
     frames: np.ndarray
     turn: np.ndarray
     under: np.ndarray
+    up: np.ndarray
     fps: float
     skeleton: Skeleton
 

@@ -66,7 +66,7 @@ def shown(residuals: Residuals, at: np.ndarray) -> Residuals:
         return a + (b - a) * share.reshape(-1, *[1] * (a.ndim - 1))
 
     rotations = quaternion.slerp(first.rotations, second.rotations, share[:, None])
-    out = {name: mixed(name) for name in ("place", "frames", "under")}
+    out = {name: mixed(name) for name in ("place", "frames", "under", "up")}
     return _stepped(residuals, near.changed(rotations=rotations, **out), at)
 
 

@@ -52,9 +52,31 @@ def two_bone(
     Raises InputError where a joint does not hang below the one before. Source: `motion.limb`.
     """
     _check_chain(skeleton, joints)
+    places, world = pose_kinematics(skeleton, root, rotations)
+    end = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
+    found, miss = bent_limb(skeleton, places, world, joints, target, pole=pole, soft=soft, **end)
+    out = np.array(rotations, dtype=float)
+    for joint, local in found.items():
+        out[:, joint] = local
+    return Reached(quaternion.continuous(out), miss)
+
+
+def bent_limb(
+    skeleton: Skeleton,
+    places: np.ndarray,
+    world: np.ndarray,
+    joints: tuple[int, int, int],
+    target: np.ndarray,
+    *,
+    end_rotation: np.ndarray | None = None,
+    keep_end_rotation: bool = True,
+    pole: np.ndarray | None = None,
+    soft: float | np.ndarray = 0.01,
+) -> tuple[dict[int, np.ndarray], np.ndarray]:
+    """As `two_bone`, of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known, those of the limb
+    at least: the new local rotations (T, 4) by joint, and the miss (T,) m."""
     upper, middle, end = joints
     target = np.asarray(target, dtype=float)
-    places, world = pose_kinematics(skeleton, root, rotations)
     top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
     lengths = (np.linalg.norm(knee - top, axis=-1), np.linalg.norm(ankle - knee, axis=-1))
     old_pole = _own_pole(top, knee, ankle, world[:, upper])
@@ -66,7 +88,6 @@ def two_bone(
         quaternion.multiply(_frame(b - a, new_hinge), quaternion.inverse(_frame(d - c, old_hinge)))
         for a, b, c, d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
     ]
-    out = np.array(rotations, dtype=float)
     new_world = world.copy()
     _turn_chain(skeleton, new_world, upper, middle, turns[0])
     _turn_chain(skeleton, new_world, middle, end, turns[1])
@@ -74,9 +95,8 @@ def two_bone(
         new_world[:, end] = end_rotation
     elif not keep_end_rotation:
         new_world[:, end] = quaternion.multiply(turns[1], world[:, end])
-    for joint in _between(skeleton, upper, end) + [end]:
-        out[:, joint] = _local(skeleton, new_world, joint)
-    return Reached(quaternion.continuous(out), np.linalg.norm(new_ankle - target, axis=-1))
+    changed = [*_between(skeleton, upper, end), end]
+    return {joint: _local(skeleton, new_world, joint) for joint in changed}, np.linalg.norm(new_ankle - target, axis=-1)
 
 
 def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:

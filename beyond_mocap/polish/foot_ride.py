@@ -1,0 +1,168 @@
+"""The feet of a motion that rides another path: held where they stand, on level ground or any other.
+
+As `foot_plant`, with three differences. The ground may rise and tip (`underfoot`): feet keep the height above it that they
+had above their own, soles and their steps tip with it, and the pelvis follows the mean of what is under both feet. A leg
+that is asked to be straighter than it was nears its full length gently, the same in the air and on the ground, so that no
+knee pops when a foot arrives. And only the joints of the legs are looked at, since paths are dragged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..motion import quaternion
+from ..motion.humanoid import identify
+from ..motion.motion import pose_kinematics
+from ..motion.skeleton import Skeleton
+from ..motion.track import zero_phase_hann
+from .foot_plant import (
+    MOST_DROP,
+    Foot,
+    Planted,
+    heel_rise,
+    held_less,
+    held_shift,
+    lacking,
+    laid_foot,
+    pelvis_drop,
+    settled,
+    spread_over,
+    turned_flat,
+)
+from .reach import bent_limb
+from .underfoot import Footing, Surface, footing
+
+DROP_BY_SLOPE = 0.15
+"""Metres more that the pelvis is lowered at most, times the slope of the ground: downhill the other foot is low."""
+
+SPARE = 0.008
+"""Metres below full length within which a leg that was bent more eases towards it."""
+
+BENT_ALOFT, STRAIGHT_ALOFT, STIFF = 0.2, 0.01, 0.05
+"""Weights of what the goals ask of a leg in the air, bent more or straighter than it was, against 1 on the ground, and
+of a smooth course."""
+
+LEAST_BEND = 0.01
+"""Root of the metres that a leg always lacks to its full length."""
+
+_FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
+_PELVIS_SECONDS = 0.5
+_ROUNDS, _SLIDES_FROM = 2, 0.004
+_BEHIND = 0.1  # seconds by which a rise or drop is spread
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What the feet go on. own (T, 2) m: heights of each foot's ground that the motion was laid with; up (T, 2, 3) its
+    normals; surface: what they are to go on instead."""
+
+    own: np.ndarray
+    up: np.ndarray
+    surface: Surface
+
+
+def follow(
+    skeleton: Skeleton,
+    root: np.ndarray,
+    rotations: np.ndarray,
+    standing: np.ndarray,
+    fps: float,
+    ground: Ground | None = None,
+    moves: np.ndarray | None = None,
+) -> Planted:
+    """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
+
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. ground: None where feet keep their heights. moves
+    (T, 2, 2) m over the ground by which each foot is moved before that.
+    """
+    body = identify(skeleton)
+    limbs = (body.left, body.right)
+    chain = [joint for limb in limbs for joint in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot)]
+    places, world = pose_kinematics(skeleton, root, rotations, chain)
+    scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
+    feet = [laid_foot(places, world, limb, standing[:, side]) for side, limb in enumerate(limbs)]
+    if moves is not None:
+        feet = [foot.moved(np.pad(moves[:, side], ((0, 0), (0, 1)))) for side, foot in enumerate(feet)]
+    feet = [turned_flat(foot, scale) for foot in feet]
+    firm, sunk, most = [foot.weight for foot in feet], np.zeros(len(root)), MOST_DROP
+    for turn in range(_ROUNDS + 1):
+        shifts = [held_shift(foot.moves, weight, scale)[0] for foot, weight in zip(feet, firm)]
+        put = [foot.moved(np.pad(by, ((0, 0), (0, 1)))) for foot, by in zip(feet, shifts)]
+        if ground is not None:
+            put, sunk, most = _on_ground(put, standing, fps, ground)
+        goals = [_goal(foot, spread) for foot in put]
+        drop = pelvis_drop(put, [goal for goal, _ in goals], spread, most)
+        short = [lacking(foot, goal, drop) for foot, (goal, _) in zip(put, goals)]
+        if turn == _ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
+            break
+        firm = [held_less(weight, s) for weight, s in zip(firm, short)]
+    down = (sunk + drop)[:, None] * [0.0, 0.0, 1.0]
+    places = places - down[:, None]
+    out, correction, miss = np.array(rotations, dtype=float), np.zeros((len(root), 2)), np.zeros((len(root), 2))
+    for side, (foot, (goal, turned)) in enumerate(zip(put, goals)):
+        hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
+        target = _eased(foot, goal, hip, scale)
+        joints = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
+        found, _ = bent_limb(skeleton, places, world, joints, target, end_rotation=turned, soft=1e-4)
+        for joint, local in found.items():
+            out[:, joint] = local
+        miss[:, side] = np.where(foot.carries > 0.0, np.linalg.norm(target - goal, axis=1), 0.0)
+        correction[:, side] = np.linalg.norm((target - places[:, foot.limb.foot])[:, :2], axis=1)
+    return Planted(root - down, out, correction, miss)
+
+
+def _frames(seconds: float, fps: float) -> int:
+    return int(round(seconds * fps))
+
+
+def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground) -> tuple[list[Foot], np.ndarray, float]:
+    """Feet on their ground, metres (T,) by which the body goes down for that, and those that it may go down further."""
+    over = np.stack([np.stack([foot.heel, foot.toe], axis=1) for foot in feet], axis=1)
+    clear = over[..., 2].min(axis=2) - ground.own
+    under = footing(over[..., :2], standing, clear, fps, ground.surface)
+    rise = under.height - ground.own
+    up = zero_phase_hann(rise.mean(axis=1)[:, None], fps, _PELVIS_SECONDS)[:, 0]
+    tip = quaternion.between(ground.up, under.normal)
+    put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
+    return put, -up, MOST_DROP + DROP_BY_SLOPE * float(np.abs(under.slope).max(initial=0.0))
+
+
+def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Foot:
+    """The foot tipped (T, 4) about its toe and brought up by rise (T,) m; its hip goes up by `up` (T,) m."""
+    toe = foot.toe + rise[:, None] * [0.0, 0.0, 1.0]
+    return replace(
+        foot,
+        hip=foot.hip + up[:, None] * [0.0, 0.0, 1.0],
+        toe=toe,
+        heel=toe + quaternion.rotate(tip, foot.heel - foot.toe),
+        rotation=quaternion.multiply(tip, foot.rotation),
+        left=quaternion.rotate(tip, foot.left),
+    )
+
+
+def _goal(foot: Foot, spread: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4): on its toe where the leg does not reach."""
+    rise = spread_over(heel_rise(foot, np.zeros((1, 3))) * foot.weight[:, 1], spread)
+    roll = quaternion.about_axis(foot.left, rise)
+    return foot.toe + quaternion.rotate(roll, foot.heel - foot.toe), quaternion.multiply(roll, foot.rotation)
+
+
+def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.ndarray:
+    """Goals (T, 3) as a leg can follow them, brought nearer to the hip or further away.
+
+    A knee bends with the root of what its leg lacks to its full length. In these roots what a leg is to differ from the
+    recording is one smooth curve: what the goals ask for where the foot stands, and little of it in the air where that
+    would make the leg straighter than it was.
+    """
+    line = goal - hip
+    far = np.linalg.norm(line, axis=1)
+    own = np.maximum(foot.own, 1e-5)
+    room = SPARE * (1.0 - np.exp(-own / SPARE))
+    left = room / _FIRM * np.logaddexp(0.0, _FIRM * (foot.length - far) / room)
+    more = np.sqrt(left) - np.sqrt(own)
+    weight = np.where(foot.carries > 0.0, 1.0, np.where(more > 0.0, BENT_ALOFT, STRAIGHT_ALOFT))
+    bend = np.sqrt(own) + settled(weight * more, weight, scale, STIFF)
+    bend = 0.5 * (bend + np.sqrt(bend**2 + LEAST_BEND**2))
+    return hip + line * ((foot.length - bend**2) / np.maximum(far, 1e-9))[:, None]
