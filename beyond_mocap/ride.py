@@ -7,10 +7,11 @@ as often as the path is dragged.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from .errors import InputError, TimedLine
+from .errors import InputError
 from .motion import contacts, quaternion
 from .motion.arc_length import ArcLength
 from .motion.humanoid import heading as facing
@@ -18,7 +19,10 @@ from .motion.humanoid import identify
 from .motion.motion import Motion, forward_kinematics
 from .motion.path import Path
 from .motion.terrain import Terrain
+from .polish.cycle import cycled
 from .polish.foot_ride import Ground, follow
+from .polish.loops import Loop, find_loops
+from .polish.path_end import Ending, ending
 from .polish.path_fit import fit, fit_polynomial, fit_spline
 from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
 from .polish.path_time import Timing, by_arc_length, by_time, parameter_at, shown
@@ -87,12 +91,18 @@ class RideSource:
     still: bool
     warnings: tuple[str, ...] = ()
 
+    @cached_property
+    def loops(self) -> tuple[Loop, ...]:
+        """Where the motion can be repeated, the best first; looked for when it is first asked."""
+        return find_loops(self.residuals)
+
 
 @dataclass(frozen=True, eq=False)
 class Ridden:
     """A motion on its new path, N frames. frames (N,): of the source, in general fractional; standing (N, 2, 2) bool,
-    carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,): frames
-    at which the motion begins again; correction (N, 2) m by which each foot was moved, miss (N, 2) m that it is short of
+    carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,): first
+    frames after a jump from a cycle's end to its start, faded over; again (R,): first frames where motion and path begin
+    anew, a cut; correction (N, 2) m by which each foot was moved, miss (N, 2) m that it is short of
     where it should be; rigid: the motion before leaning and planting."""
 
     motion: Motion
@@ -107,6 +117,7 @@ class Ridden:
     rigid: Motion
     source: RideSource
     warnings: tuple[str, ...] = field(default=())
+    again: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
 def prepare(
@@ -148,7 +159,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     has no length.
     """
     arc = source.arc if path is source.path else ArcLength(path)
-    residuals, seams, timing, told = _timed(source, path, arc, settings)
+    residuals, seams, timing, end = _timed(source, path, arc, settings)
     rows = shown(residuals, timing.at)
     at = _parameters(source, path, arc, timing, rows, settings)
     origin, tangent = path.at(at), path.at(at, 1)
@@ -162,31 +173,44 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under)
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
-    return Ridden(
+    ridden = Ridden(
         motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, rigid, source,
-        (*source.warnings, *told),
+        (*source.warnings, *end.told), end.again,
     )  # fmt: skip
+    return _begun_again(ridden, end.shown) if len(end.again) else ridden
 
 
 def _timed(
     source: RideSource, path: Path, arc: ArcLength, settings: RideSettings
-) -> tuple[Residuals, np.ndarray, Timing, tuple[str, ...]]:
-    """The residuals as they are shown, cut or repeated; the frames at which they begin again; when each is shown where;
-    and what is to be told."""
-    residuals, none = source.residuals, np.zeros(0, dtype=int)
+) -> tuple[Residuals, np.ndarray, Timing, Ending]:
+    """The residuals as they are shown, once through, cut or cycled; the cycles' seams; when each is shown where; and what
+    happens at the path's end."""
+    residuals, seams, told = source.residuals, np.zeros(0, dtype=int), ()
+    if settings.cycle and settings.by_arc_length:
+        around = cycled(residuals, arc.length, source.loops)
+        residuals, seams, told = around.residuals, around.seams, around.told
+    elif settings.cycle:
+        told = ("by time the motion fills every path: it is not cycled",)
     if source.still:
-        told = "the motion stands still: it is placed at the path's beginning"
-        return residuals, none, by_arc_length(residuals, settings.speed, settings.delay), (told,)
-    if not settings.by_arc_length:
-        return residuals, none, by_time(residuals, path, arc, settings.speed, settings.delay), ()
-    timing = by_arc_length(residuals, settings.speed, settings.delay)
-    if path.closed or timing.arc[-1] <= arc.length + 1e-6:
-        return residuals, none, timing, ()
-    count = int(np.searchsorted(timing.arc, arc.length + 1e-6, side="right"))
-    when = count / residuals.fps
-    left = len(timing.arc) / residuals.fps - when
-    told = TimedLine(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
-    return residuals, none, timing.first(max(count, 1)), (told,)
+        told += ("the motion stands still: it is placed at the path's beginning",)
+    if settings.by_arc_length or source.still:
+        timing = by_arc_length(residuals, settings.speed, settings.delay)
+    else:
+        timing = by_time(residuals, path, arc, settings.speed, settings.delay)
+    end = ending(timing.arc, arc.length, residuals.fps, settings.end, path.closed or source.still)
+    timing = timing.first(end.count)
+    seams = np.searchsorted(timing.at, seams - 1e-9)
+    return residuals, seams[seams < end.count], timing, replace(end, told=(*told, *end.told))
+
+
+def _begun_again(ridden: Ridden, shown: np.ndarray) -> Ridden:
+    """The frames `shown` (N,) of a motion that begins again: each time it is laid out alike."""
+    rows = ("frames", "standing", "arc", "origin", "heading", "correction", "miss")
+    motions = {
+        name: replace(motion, root_positions=motion.root_positions[shown], rotations=motion.rotations[shown])
+        for name, motion in (("motion", ridden.motion), ("rigid", ridden.rigid))
+    }
+    return replace(ridden, **{name: getattr(ridden, name)[shown] for name in rows}, **motions)
 
 
 def _parameters(

@@ -12,8 +12,7 @@ longer or shorter by at most MOST_SCALE; where that cannot be, the motion is cut
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,9 +20,7 @@ from ..errors import InputError
 from ..motion import quaternion
 from .cross_fade import faded_rotations, share
 from .loops import Loop, find_loops, smooth_speed
-
-if TYPE_CHECKING:
-    from .path_frame import Residuals
+from .path_frame import Residuals
 
 FADE_SECONDS = 0.2
 """Half a fade, at most; a short loop is faded over its own length."""
@@ -81,8 +78,13 @@ def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None =
     plan = _exact_end(found, own, length) or _steady(residuals, found, own, length)
     jumps, told = _bounded(residuals, plan, length)
     shown, seams = _jumped(residuals, jumps)
-    scale = length / float(shown.step.sum()) if plan.ends and len(jumps) == len(plan.jumps) else 1.0
-    return Cycled(replace(shown, step=shown.step * scale), seams, scale, told)
+    if plan.ends and not told:
+        scale = length / float(shown.step.sum())
+        return Cycled(shown.changed(step=shown.step * scale), seams, scale)
+    count = int(np.searchsorted(np.cumsum(shown.step), length + SAME_LENGTH, side="right"))
+    if count < len(shown):
+        told = ("no number of loops brings the motion's own end to the path's end: it is cut there",)
+    return Cycled(shown.rows(slice(count)), seams[seams < count], 1.0, told)
 
 
 _NEXT_STEP = "switch cycling off, take a clip that walks or runs for two strides, or shorten the path"
@@ -93,11 +95,11 @@ def _stretched(residuals: Residuals, length: float, own: float) -> Cycled:
     scale = length / own if own > 0.0 else 1.0
     if own - length <= SAME_LENGTH or scale < 1.0 - MOST_SCALE:
         return Cycled(residuals, np.zeros(0, int))
-    return Cycled(replace(residuals, step=residuals.step * scale), np.zeros(0, int), scale)
+    return Cycled(residuals.changed(step=residuals.step * scale), np.zeros(0, int), scale)
 
 
 def _why_not(residuals: Residuals) -> str:
-    metres, seconds = float(residuals.step.sum()), len(residuals.step) / residuals.fps
+    metres, seconds = float(residuals.step.sum()), len(residuals) / residuals.fps
     if metres < 0.3 or not (smooth_speed(residuals) > 0.2).any():
         return f"the motion stays where it is ({metres:.2f} m in {seconds:.1f} s)"
     return f"no stretch of the motion ({metres:.2f} m, {seconds:.1f} s) can be repeated"
@@ -155,7 +157,7 @@ def _steady(residuals: Residuals, loops: tuple[Loop, ...], own: float, length: f
 
 def _bounded(residuals: Residuals, plan: _Plan, length: float) -> tuple[tuple[Loop, ...], tuple[str, ...]]:
     """The plan's jumps, but not more than MOST_FRAMES hold, and what is to be told then."""
-    frames = len(residuals.step) + np.cumsum([len(loop) for loop in plan.jumps])
+    frames = len(residuals) + np.cumsum([len(loop) for loop in plan.jumps])
     kept = max(int((frames <= MOST_FRAMES).sum()), 1)
     if kept >= len(plan.jumps):
         return plan.jumps, ()
@@ -170,7 +172,7 @@ def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, n
     Every jump over one loop is faded alike, so that it is worked out once: the frames are taken from the motion with
     one fade for each loop behind it.
     """
-    count, kinds = len(residuals.step), list(dict.fromkeys(jumps))
+    count, kinds = len(residuals), list(dict.fromkeys(jumps))
     reach = _reach(residuals, jumps)
     begins = [0] + [loop.start for loop in jumps]
     ends = [loop.end for loop in jumps] + [count]
@@ -188,25 +190,19 @@ def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, n
     values = {name: np.concatenate(parts)[taken] for name, parts in shown.items()}
     values["frames"] = residuals.frames[source[taken]]
     values["rotations"] = quaternion.continuous(values["rotations"])
-    return replace(residuals, **values), seams
+    return residuals.changed(**values), seams
 
 
 def _reach(residuals: Residuals, jumps: tuple[Loop, ...]) -> int:
     """Frames of a fade on either side, so many that no two fades meet."""
     pieces = [jumps[0].end] + [b.end - a.start for a, b in zip(jumps[:-1], jumps[1:])]
-    pieces.append(len(residuals.step) - jumps[-1].start)
+    pieces.append(len(residuals) - jumps[-1].start)
     return max(min(int(round(FADE_SECONDS * residuals.fps)), min(pieces) // 2), 1)
 
 
 def _rows(residuals: Residuals) -> dict[str, np.ndarray]:
-    """Everything that a motion has one row a frame of, but the numbers of its frames."""
-    count = len(residuals.step)
-    named = {field.name: getattr(residuals, field.name) for field in fields(residuals)}
-    return {
-        name: values
-        for name, values in named.items()
-        if isinstance(values, np.ndarray) and values.ndim and len(values) == count and name != "frames"
-    }
+    """Everything but the numbers of the frames, which cannot be mixed."""
+    return {name: values for name, values in residuals.arrays.items() if name != "frames"}
 
 
 def _faded(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray]:
@@ -216,7 +212,7 @@ def _faded(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray
     after = window >= 0
     through = (window + reach) / (2.0 * reach)
     come = np.where(after, 1.0 - share(through, after), share(through, after))
-    both = _Both(len(residuals.step), loop, window, residuals.fps)
+    both = _Both(len(residuals), loop, window, residuals.fps)
     rows = _rows(residuals)
     rotations, standing = rows.pop("rotations"), rows.pop("standing")
     out = {name: _mixed(*both.values(values), come) for name, values in rows.items()}

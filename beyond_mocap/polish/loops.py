@@ -9,7 +9,6 @@ exact around the best two dozen pairs.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -18,9 +17,7 @@ from ..errors import InputError
 from ..motion.humanoid import identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
-
-if TYPE_CHECKING:
-    from .path_frame import Residuals
+from .path_frame import Residuals
 
 WINDOW_SECONDS = 0.12
 """Pairs are compared over so much before and after."""

@@ -1,0 +1,76 @@
+"""Riding paths longer and shorter than the motion: cycled, cut, begun again, round and round."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.polish.path_line import through
+from beyond_mocap.ride import RideSettings, prepare, ride
+
+
+def line(length):
+    return through(np.stack([np.linspace(0.0, length, 50), np.zeros(50), np.zeros(50)], axis=1), "path")
+
+
+def circle(radius):
+    angle = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
+    return through(radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), "path", closed=True)
+
+
+@pytest.fixture(scope="module")
+def source():
+    return prepare(gait(1.4, 4.0, 30.0, seed=1), RideSettings())
+
+
+def asked(**settings):
+    return RideSettings(**{"plant": False, "lean": False, **settings})
+
+
+def test_a_longer_path_is_filled_by_cycling(source):
+    own = source.arc.length
+    out = ride(source, line(3.0 * own), asked(cycle=True))
+    assert out.arc[-1] == pytest.approx(3.0 * own, abs=1e-3) and len(out.seams)
+    assert np.all(out.seams < len(out.motion)) and np.isfinite(out.motion.rotations).all()
+    assert out.frames[-1] == source.residuals.frames[-1]
+    assert len(ride(source, line(3.0 * own), asked()).motion) == len(source.motion)
+
+
+@pytest.mark.parametrize("speed, delay", [(0.5, 0.0), (2.0, 1.0)])
+def test_seams_are_told_in_the_frames_that_are_shown(source, speed, delay):
+    plain, other = (ride(source, line(14.0), asked(cycle=True, **more)) for more in ({}, {"speed": speed, "delay": delay}))
+    seconds = delay + plain.seams / plain.motion.fps / speed
+    assert np.allclose(other.seams / other.motion.fps, seconds, atol=1.01 / other.motion.fps)
+
+
+def test_planted_cycles_stay_on_the_path(source):
+    out = ride(source, circle(3.0), RideSettings(cycle=True))
+    assert out.arc[-1] == pytest.approx(6.0 * np.pi, abs=0.01)
+    assert np.linalg.norm(out.motion.root_positions[-1, :2] - [3.0, 0.0]) < 0.15
+    assert out.correction.max() < 0.15
+
+
+def test_the_motion_begins_again_with_the_path(source):
+    out = ride(source, line(2.0), RideSettings(end="repeat"))
+    assert len(out.motion) == len(source.motion) and len(out.again) == 2
+    lap = out.again[0]
+    assert np.array_equal(out.motion.root_positions[lap : 2 * lap], out.motion.root_positions[:lap])
+    assert len(ride(source, line(2.0), RideSettings()).motion) == lap
+
+
+def test_a_closed_path_is_gone_round_without_a_cut(source):
+    out = ride(source, circle(0.5), asked())
+    assert len(out.motion) == len(source.motion) and not len(out.again)
+    step = np.linalg.norm(np.diff(out.motion.root_positions, axis=0), axis=1)
+    assert step.max() < 0.1
+
+
+def test_who_stands_still_is_not_cycled():
+    source = prepare(gait(0.0, 3.0, 30.0), RideSettings())
+    with pytest.raises(InputError, match="cycling off"):
+        ride(source, line(5.0), asked(cycle=True))
+
+
+def test_by_time_nothing_is_cycled_and_that_is_told(source):
+    out = ride(source, line(20.0), asked(cycle=True, by_arc_length=False))
+    assert len(out.motion) == len(source.motion) and any("by time" in line for line in out.warnings)
