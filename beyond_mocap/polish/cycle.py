@@ -75,15 +75,19 @@ def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None =
     found = _good(find_loops(residuals) if loops is None else loops)
     if not found:
         raise InputError("cycling", _why_not(residuals), "at least one whole stride", _NEXT_STEP)
+    wanted, length = length, min(length, _longest(residuals, found[0], own))
     plan = _exact_end(found, own, length) or _steady(residuals, found, own, length)
-    jumps, told = _bounded(residuals, plan, length)
-    shown, seams = _jumped(residuals, jumps)
-    if plan.ends and not told:
+    shown, seams = _jumped(residuals, plan.jumps)
+    told = ()
+    if length < wanted:
+        minutes = len(shown) / residuals.fps / 60.0
+        told = (f"the path is {wanted:.0f} m long: the motion ends after {minutes:.0f} minutes and {length:.0f} m of it",)
+    if plan.ends:
         scale = length / float(shown.step.sum())
-        return Cycled(shown.changed(step=shown.step * scale), seams, scale)
+        return Cycled(shown.changed(step=shown.step * scale), seams, scale, told)
     count = int(np.searchsorted(np.cumsum(shown.step), length + SAME_LENGTH, side="right"))
     if count < len(shown):
-        told = ("no number of loops brings the motion's own end to the path's end: it is cut there",)
+        told += ("no number of loops brings the motion's own end to the path's end: it is cut there",)
     return Cycled(shown.rows(slice(count)), seams[seams < count], 1.0, told)
 
 
@@ -155,15 +159,9 @@ def _steady(residuals: Residuals, loops: tuple[Loop, ...], own: float, length: f
     return _Plan((loop,) * max(int(np.ceil((length - own + outro) / loop.metres)), 1), False)
 
 
-def _bounded(residuals: Residuals, plan: _Plan, length: float) -> tuple[tuple[Loop, ...], tuple[str, ...]]:
-    """The plan's jumps, but not more than MOST_FRAMES hold, and what is to be told then."""
-    frames = len(residuals) + np.cumsum([len(loop) for loop in plan.jumps])
-    kept = max(int((frames <= MOST_FRAMES).sum()), 1)
-    if kept >= len(plan.jumps):
-        return plan.jumps, ()
-    minutes = frames[kept - 1] / residuals.fps / 60.0
-    line = f"the path is {length:.0f} m long; the motion goes on for {minutes:.0f} minutes and ends before it does"
-    return plan.jumps[:kept], (line,)
+def _longest(residuals: Residuals, loop: Loop, own: float) -> float:
+    """Metres that MOST_FRAMES are good for."""
+    return own + max((MOST_FRAMES - len(residuals)) // len(loop), 1) * loop.metres
 
 
 def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, np.ndarray]:
