@@ -40,8 +40,8 @@ def planted(count, period=PERIOD, offset=0, drift=0.0):
     standing = np.repeat(np.stack([left, np.sin(phase + np.pi + 0.3) > -0.2], axis=1)[..., None], 2, axis=2)
     return Residuals(
         place=sway + drift * np.arange(count)[:, None] * [0.0, 1.0, 0.0], rotations=rotations, step=step,
-        standing=standing, frames=frames.astype(float), turn=0.01 * np.cos(phase), under=np.zeros((count, 2)), fps=FPS,
-        skeleton=skeleton,
+        standing=standing, frames=frames.astype(float), turn=0.01 * np.cos(phase), under=np.zeros((count, 2)),
+        up=np.tile([0.0, 0.0, 1.0], (count, 2, 1)), fps=FPS, skeleton=skeleton,
     )  # fmt: skip
 
 
