@@ -63,6 +63,28 @@ def test_exit_status(run, order, tmp_path, capfd):
     assert list(tmp_path.glob("player*")) == []
 
 
+@pytest.mark.parametrize("suffix", (".bvh", ".blend", ".fbx", ".glb", ".usdc"))
+def test_a_ride_comes_out_in_every_form(run, tmp_path, suffix):
+    (tmp_path / "bend.csv").write_text("x_m,y_m\n0,0\n1,0\n2,1\n2,3\n")
+    out = tmp_path / "out" / f"rider{suffix}"
+    out.parent.mkdir()
+    walk = SAMPLE / "library" / "walking_1_2.bvh"
+    assert run(["path", str(walk), "--path", str(tmp_path / "bend.csv"), "--out", str(out)]) == 0
+    assert out.stat().st_size > 1000 and [path.name for path in out.parent.iterdir()] == [out.name]
+
+
+def test_the_blend_file_of_a_ride_holds_the_rider_on_its_path(run, tmp_path):
+    (tmp_path / "line.csv").write_text("x_m,y_m\n5,-2\n5,20\n")
+    walk = SAMPLE / "library" / "walking_1_2.bvh"
+    words = ["path", str(walk), "--path", str(tmp_path / "line.csv"), "--out", str(tmp_path / "rider.blend")]
+    assert run(words) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "rider.blend"))
+    scene, player = bpy.context.scene, bpy.data.objects["Player"]
+    scene.frame_set(scene.frame_end)
+    hips = player.matrix_world @ player.pose.bones[0].head
+    assert hips.x == pytest.approx(5.0, abs=0.1) and hips.y > 0.0
+
+
 @pytest.mark.parametrize("arguments, status", ((["--version"], 0), (["mirror", "missing.bvh", "out.bvh"], 2)))
 def test_batch_needs_no_installed_extension(tmp_path, arguments, status):
     command = [sys.executable, "-P", str(TOP / "batch.py"), "--", *arguments]
