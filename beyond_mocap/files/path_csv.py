@@ -10,7 +10,7 @@ from ..errors import InputError
 from .tables import number, read_rows
 
 COLUMNS = ("x_m", "y_m", "z_m")
-_SAME = 1e-6  # metres
+_SAME, _LONGEST = 1e-6, 1e5  # metres
 
 
 def read_curve(path: str | os.PathLike) -> np.ndarray:
@@ -18,7 +18,7 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
     column is missing; other columns are ignored.
 
     InputError, with the line, where a cell is no number or lies beyond 10 km; where fewer than two different points are
-    given.
+    given, or more than 100 km in all.
     """
     names, points = COLUMNS[:2], []
     for place, row in read_rows(path, names):
@@ -31,4 +31,6 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
     if not len(line) or np.ptp(line, axis=0).max() < _SAME:
         what = f"{len(line)} points, all at one place" if len(line) > 1 else f"{len(line)} points"
         raise InputError(path, what, "at least two rows under x_m,y_m[,z_m] that lie apart", "add points")
+    if (length := np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) > _LONGEST:
+        raise InputError(path, f"a path of {length / 1000:.0f} km", f"at most {_LONGEST / 1000:.0f} km", "check the unit")
     return line

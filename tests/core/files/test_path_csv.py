@@ -37,6 +37,7 @@ def test_points_in_the_order_of_their_rows(tmp_path, content, points):
     (b"x_m,y_m\n1,2\n1,inf\n", ":3: y_m 'inf'"),
     (b"x_m,y_m,z_m\n1,2,0\n1,3,nan\n", ":3: z_m 'nan'"),
     (b"x_m,y_m\n1,2\n1,2e5\n", ":3: y_m 2e5"),
+    (b"x_m,y_m\n" + b"-9000,0\n9000,0\n" * 4, "126 km"),
     (b"x_m,y_m,x_m\n1,2,3\n1,2,3\n", "a column twice"),
 ])  # fmt: skip
 def test_what_is_no_path_is_told_with_its_line(tmp_path, content, part):
