@@ -111,6 +111,22 @@ def test_every_option_gives_a_sound_motion(run, tmp_path, more, curve):
     assert np.isfinite(motion.rotations).all() and len(motion) > 30
 
 
+def test_the_ground_lifts_the_body(run, place, tmp_path):
+    assert run()[0] == 0
+    flat = bvh.read(tmp_path / "out.bvh", 0.01).motion.root_positions[:, 2]
+    assert run("--ground", place / "flat.obj")[0] == 0
+    raised = bvh.read(tmp_path / "out.bvh", 0.01).motion.root_positions[:, 2]
+    assert np.abs(raised - flat - 0.5).max() < 0.03
+
+
+def test_a_path_that_ends_stops_the_motion_and_cycling_goes_on(run, tmp_path):
+    counts = {}
+    for name, more in (("stop", ()), ("cycle", ("--cycle",))):
+        assert run(*more, curve="short" if name == "stop" else "bend")[0] == 0
+        counts[name] = len(bvh.read(tmp_path / "out.bvh", 0.01).motion)
+    assert counts["stop"] < 120 and counts["cycle"] > 380
+
+
 @pytest.mark.parametrize("content, parts", [
     ("", ["bad.csv", "empty"]),
     ("\0\1\2", ["bad.csv", "binary"]),
