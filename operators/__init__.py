@@ -14,6 +14,7 @@ from . import (
     add_stage,
     annotate,
     annotate_clip,
+    bake_path,
     bake_to_rig,
     bone_map,
     build_library,
@@ -23,6 +24,7 @@ from . import (
     delete_moment,
     discard,
     draw_track,
+    edit_path,
     edit_words,
     error_curves,
     export_bvh,
@@ -36,6 +38,7 @@ from . import (
     join_spans,
     jump_to,
     keymap,
+    leave_path,
     list_clips,
     load_video,
     make_assets,
@@ -45,6 +48,7 @@ from . import (
     move_video,
     nudge_points,
     path_camera,
+    path_curve,
     pick_moment,
     place_players,
     player_from_dot,
@@ -66,6 +70,7 @@ from . import (
     track_object,
     update,
     update_live,
+    update_path,
     variants,
     words_to_text,
 )
@@ -141,6 +146,11 @@ CLASSES = (
     export_motion.BEYOND_MOCAP_OT_export_motion,
     path_camera.BEYOND_MOCAP_OT_path_camera,
     nudge_points.BEYOND_MOCAP_OT_nudge_points,
+    edit_path.BEYOND_MOCAP_OT_edit_path,
+    path_curve.BEYOND_MOCAP_OT_path_curve,
+    update_path.BEYOND_MOCAP_OT_update_path,
+    bake_path.BEYOND_MOCAP_OT_bake_path,
+    leave_path.BEYOND_MOCAP_OT_leave_path,
 )
 
 

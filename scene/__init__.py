@@ -22,6 +22,7 @@
 - `freshness`   what is out of date; `hand_keys` what of a result is the user's; `variants`, `stretch` other solutions
 - `rig`, `bone_maps`, `rig_controls`, `rig_bake`, `rig_copy`   a motion onto somebody's own rig, by a map of its bones
 - `key_reduction`   keys that curves do not need are left out
+- `ride`        path editing: armatures whose motion rides a curve
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -34,9 +35,12 @@ from . import (
     background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, result, rig,
     session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
+from .ride import live as ride_live
+from .ride.settings import BeyondMocapRide
 
 CLASSES = (
     *result.CLASSES,
+    BeyondMocapRide,
     video.BeyondMocapVideo,
     view_settings.BeyondMocapView,
     view_settings.BeyondMocapPlayhead,
@@ -59,6 +63,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("TimelineMarker", "beyond_mocap", strip_lines.BeyondMocapLine),
     ("Object", "beyond_mocap_lanes", lanes.BeyondMocapLanes),
     ("Object", "beyond_mocap_dot", dots.BeyondMocapDot),
+    ("Object", "beyond_mocap_ride", BeyondMocapRide),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
     ("WindowManager", "beyond_mocap_problems", word_checks.BeyondMocapProblems),
     ("WindowManager", "beyond_mocap_work", settings.BeyondMocapWork),
@@ -82,10 +87,12 @@ def register():
     freshness.register()
     drawn_labels.register()
     live.register()
+    ride_live.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    ride_live.unregister()
     live.unregister()
     drawn_labels.unregister()
     freshness.unregister()

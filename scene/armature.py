@@ -108,6 +108,11 @@ def rest_positions(skeleton: Skeleton) -> np.ndarray:
 def placement(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
     """How the armature's space lies in the scene; InputError where its scale is uneven, which turns bones askew."""
     bpy.context.view_layer.update()  # a script may have moved it a line ago
+    return placement_now(body, scene)
+
+
+def placement_now(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
+    """The same as Blender has worked it out last, which is quick."""
     origin, rotation, scale = body.matrix_world.decompose()
     if min(scale) <= 0.0 or max(scale) > 1.001 * min(scale):
         raise InputError(f"object {body.name}", f"scale {tuple(round(s, 4) for s in scale)}", "one positive scale",

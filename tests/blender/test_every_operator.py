@@ -101,6 +101,17 @@ def lay_cameras():
     cameras.set_up(bpy.context.scene, cameras.Route(places, np.arange(1.0, 21.0), places, np.zeros(20)))
 
 
+def ride():
+    """The active body's motion rides a curve, which is active."""
+    bpy.ops.beyond_mocap.edit_path()
+
+
+def ride_elsewhere():
+    """The same, the curve pulled aside, and nothing has followed."""
+    ride()
+    bpy.context.object.location.y += 1.0
+
+
 def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
@@ -140,6 +151,7 @@ ROWS = {
     "add_stage": Row("imported"),
     "annotate": Row("imported", lambda places: {"keys": "2 2 3 5 ENTER"}),
     "annotate_clip": Row("imported", prepare=list_clips),
+    "bake_path": Row("accepted", prepare=ride),
     "bake_to_rig": Row("rig"),
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
@@ -147,6 +159,7 @@ ROWS = {
     "delete_moment": Row("imported", prepare=pick_a_moment),
     "discard": Row("synthesized"),
     "draw_track": Row("imported"),
+    "edit_path": Row("accepted"),
     "edit_words": Row("imported", lambda places: {"words": "header"}, pick_a_moment),
     "error_curves": Row("synthesized"),
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
@@ -160,6 +173,7 @@ ROWS = {
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
     "keep_bone_map": Row("rig", changes=False),
+    "leave_path": Row("accepted", prepare=ride),
     "list_clips": Row("imported", changes=False),
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
@@ -171,6 +185,7 @@ ROWS = {
     "move_video": Row("video", lambda places: {"frames": 3}),
     "nudge_points": Row("imported", lambda places: {"direction": "UP", "step": 0.3}, edit_points),
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
+    "path_curve": Row("accepted", lambda places: {"count": 7}, ride),
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),
@@ -194,6 +209,7 @@ ROWS = {
     "track_object": Row("imported", prepare=draw),
     "unbake": Row("rig", prepare=bake_it),
     "update": Row("synthesized"),
+    "update_path": Row("accepted", prepare=ride_elsewhere),
     "update_live": Row("synthesized", lambda places: {"player": "player1", "kind": "quick"}),
     "use_selected_rig": Row("rig", prepare=another_rig),
     "variants": Row("synthesized", lambda places: {"count": 2}),

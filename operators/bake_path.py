@@ -1,0 +1,32 @@
+"""Keep: what a rider does becomes an ordinary action."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.ride import riders
+from ..scene.ride.settings import meant
+from .verb import Verb
+
+
+class BEYOND_MOCAP_OT_bake_path(Verb, bpy.types.Operator):
+    """Keep the motion on its new path as an ordinary action with a key on every frame. The original action and the curve stay in
+the file"""
+
+    bl_idname = "beyond_mocap.bake_path"
+    bl_label = "Keep"
+
+    @classmethod
+    def poll(cls, context):
+        """A rider."""
+        cls.poll_message_set("Select an armature that rides a path, or its curve")
+        return bool(meant(context))
+
+    def do(self, context):
+        """All that are meant: worked out first, so that nothing is kept where one cannot be."""
+        chosen = meant(context)
+        for body in chosen:
+            riders.renew(context.scene, body)
+        kept = [riders.keep(context.scene, body).name for body in chosen]
+        riders.back_to(context, chosen)
+        self.report({"INFO"}, f"kept as {', '.join(kept)}")

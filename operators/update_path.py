@@ -1,0 +1,27 @@
+"""Update Path: riders are worked out anew, whatever seems to have changed."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.ride import riders
+from ..scene.ride.settings import meant
+from .verb import Verb
+
+
+class BEYOND_MOCAP_OT_update_path(Verb, bpy.types.Operator):
+    """Work out the rider's motion anew: after edits of the original action, while Live is off, or in a script"""
+
+    bl_idname = "beyond_mocap.update_path"
+    bl_label = "Update Path"
+
+    @classmethod
+    def poll(cls, context):
+        """A rider."""
+        cls.poll_message_set("Select an armature that rides a path, or its curve")
+        return bool(meant(context))
+
+    def do(self, context):
+        """All that are meant."""
+        for body in meant(context):
+            riders.renew(context.scene, body, anew=True)

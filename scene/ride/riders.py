@@ -1,0 +1,269 @@
+"""Riders: armatures whose motion rides a curve. Begun, brought up to date, kept or ended; what the buttons do."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from functools import cached_property
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import BeyondMocapError, InputError
+from .. import channels, linked
+from ..set_aside import drop, play_as_before
+from . import curve, keys, source
+from .carrier import MARK, carrier_of
+from .settings import riders, wishes
+
+_SAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What was worked out for a rider: plain numbers, in metres of the scene's world.
+
+    first: scene frame of the first frame; fps; source, path, ridden: of the core; number: another each time it is worked
+    out.
+    """
+
+    first: int
+    fps: float
+    source: object
+    path: object
+    ridden: object
+    number: int
+
+    @cached_property
+    def source_line(self) -> np.ndarray:
+        """The original path (N, 3)."""
+        return _along(self.source.path)
+
+    @cached_property
+    def line(self) -> np.ndarray:
+        """The new path (N, 3)."""
+        return _along(self.path)
+
+    def frames(self, frame: float) -> tuple[int, int]:
+        """Index of the ridden frame at a scene frame, and of the original's that is shown there; both within range."""
+        own = int(np.clip(round(frame - self.first), 0, len(self.ridden.motion) - 1))
+        return own, int(np.clip(round(self.ridden.frames[own]), 0, len(self.source.motion) - 1))
+
+
+_shown: dict[int, tuple[str, Shown]] = {}  # by session_uid of the armature: digest, what was worked out
+_counted = 0
+
+
+def forget() -> None:
+    """Nothing is remembered any more: another file is open."""
+    _shown.clear()
+    source.forget()
+    keys.forget()
+
+
+def shown(body: bpy.types.Object) -> Shown | None:
+    """What was worked out for a rider last; None where nothing was in this session."""
+    return _shown[body.session_uid][1] if body.session_uid in _shown and body.beyond_mocap_ride.on else None
+
+
+def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) -> bool:
+    """Bring a rider's motion up to date with curve and settings; whether anything had to be worked out.
+
+    anew: look at everything and write it, whether or not it seems to have changed. InputError, and the motion as it was,
+    where that makes no sense just now.
+    """
+    from ...beyond_mocap.ride import RideSettings, ride
+
+    global _counted
+    ridden_by, carrier = body.beyond_mocap_ride, carrier_of(body)
+    carrier.check()
+    if anew:
+        bpy.context.view_layer.update()
+        source.unsure()
+        keys.refresh()
+    settings, drawn = RideSettings(**wishes(ridden_by)), curve.read(scene, ridden_by.curve)
+    known = source.of(carrier, scene, settings)
+    ground = source.ground_digest(ridden_by.ground)
+    parts = known.digest + drawn.digest + ground + repr(settings).encode()
+    digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
+    made = carrier.ours()[0]
+    up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
+    if up_to_date and remembered and not anew:
+        return False
+    path = drawn.path()
+    ridden = ride(known.core, path, settings, source.ground_of(scene, ridden_by.ground, ground))
+    if anew or not up_to_date:
+        carrier.write(scene, known.read, ridden, digest)
+    _counted += 1
+    _shown[body.session_uid] = digest, Shown(known.read.first, known.read.motion.fps, known.core, path, ridden, _counted)
+    _tell(ridden_by, "\n".join((*drawn.notes, *ridden.warnings)), _figures(known.core, ridden))
+    return True
+
+
+def begin(
+    context: bpy.types.Context, body: bpy.types.Object, drawn: bpy.types.Object | None = None, count: int = 0,
+    kind: str = "BEZIER", degree: int = 3, straight: bool = False,
+) -> bpy.types.Object:
+    """Let an armature ride `drawn`, or a new curve along its own path (see `curve.create`); its action is put aside.
+    Returns the curve. InputError, and nothing changed, where it cannot."""
+    from ...beyond_mocap.ride import RideSettings
+
+    scene, ride, carrier = context.scene, body.beyond_mocap_ride, carrier_of(body)
+    if ride.on:
+        raise InputError(f"armature {body.name}", "it rides already", "one that does not", "edit its curve, or press Leave")
+    carrier.check()
+    context.view_layer.update()
+    source.unsure()
+    known = source.of(carrier, scene, RideSettings(**wishes(ride))).core
+    before = ride.curve
+    if drawn is None and before is not None and before.name in scene.objects:
+        drawn = before
+    made = None
+    if drawn is None:
+        made = drawn = curve.create(context, f"{body.name} path", *_own_path(known, straight), count, kind, degree)
+    else:
+        curve.read(scene, drawn).path()
+    carrier.begin()
+    ride.on, ride.curve = True, drawn
+    try:
+        renew(scene, body)
+    except BeyondMocapError:
+        revert(body, before, made)
+        raise
+    return drawn
+
+
+def revert(body: bpy.types.Object, before: bpy.types.Object | None, made: bpy.types.Object | None) -> None:
+    """As before `begin`: the curve that the armature had before, and the one that was made for it taken away."""
+    end(body)
+    body.beyond_mocap_ride.curve = before
+    if made is not None:
+        bpy.data.curves.remove(made.data)
+
+
+def new_curve(
+    context: bpy.types.Context, body: bpy.types.Object, shape: str = "FITTED", count: int = 0, kind: str = "BEZIER",
+    degree: int = 3,
+) -> bpy.types.Object:
+    """Another curve for a rider; shape: one of `curve.SHAPES`. The one before is removed where it was made here and nobody
+    else rides it. Returns the new one."""
+    from ...beyond_mocap.ride import RideSettings
+
+    scene, ride = context.scene, body.beyond_mocap_ride
+    before = ride.curve
+    if shape == "PRESENT":
+        path, straight = curve.read(scene, before).path(), False
+    else:
+        settings = RideSettings(**wishes(ride))
+        path, straight = _own_path(source.of(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
+    made = curve.create(context, f"{body.name} path", path, straight, count, kind, degree)
+    ride.curve = made
+    try:
+        renew(scene, body)
+    except BeyondMocapError:
+        ride.curve = before
+        bpy.data.curves.remove(made.data)
+        raise
+    if before is not None and before.get(curve.MARK) and not any(r.beyond_mocap_ride.curve == before for r in riders(scene)):
+        name = before.name
+        bpy.data.objects.remove(before)
+        made.name = name
+    return made
+
+
+def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> bpy.types.Action:
+    """The ridden motion becomes an ordinary action of the armature; the original stays in the file. Returns the action."""
+    ride, carrier = body.beyond_mocap_ride, carrier_of(body)
+    renew(scene, body)
+    made, slot = carrier.ours()
+    original = ride.before.action
+    carrier.settle()
+    play_as_before(ride.before, body.animation_data)
+    drop(ride.before, MARK)
+    del made[MARK]
+    made.name = f"{original.name} on {ride.curve.name}" if original is not None else f"{body.name} path motion"
+    _over(ride)
+    return made
+
+
+def may_end(body: bpy.types.Object) -> None:
+    """InputError where an armature's original motion cannot be brought back here."""
+    linked.refuse(body)
+    channels.check_free(body)
+
+
+def end(body: bpy.types.Object) -> None:
+    """The armature plays its original motion again, to the last bit."""
+    carrier_of(body).end()
+    _over(body.beyond_mocap_ride)
+
+
+def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    """Select one object and nothing else, and make it active, so that Tab edits it."""
+    if thing.name not in context.view_layer.objects:
+        return
+    for other in list(context.selected_objects):
+        other.select_set(False)
+    thing.hide_set(False)
+    thing.select_set(True)
+    context.view_layer.objects.active = thing
+
+
+def back_to(context: bpy.types.Context, bodies: list[bpy.types.Object]) -> None:
+    """Where a curve was active that nobody rides any more, the armatures that did are chosen."""
+    active = context.view_layer.objects.active
+    if context.mode != "OBJECT" or active is None or active.type != "CURVE":
+        return
+    if any(body.beyond_mocap_ride.curve == active for body in riders(context.scene)):
+        return
+    choose(context, bodies[0])
+    for body in bodies:
+        if body.name in context.view_layer.objects:
+            body.select_set(True)
+
+
+def _own_path(known, straight: bool):
+    """The path for a new curve, and whether it is to be straight: of who stands still two metres straight ahead."""
+    from ...beyond_mocap.motion.path import SplinePath
+    from ...beyond_mocap.polish.path_line import SHORTEST
+
+    if known.arc.length >= 2.0 * SHORTEST:
+        return known.path, straight
+    start, yaw = known.moving.origin[0], known.moving.heading[0]
+    ends = np.array([start, start + 2.0 * np.array([np.cos(yaw), np.sin(yaw), 0.0])])
+    return SplinePath(np.array([0.0, 0.0, 1.0, 1.0]), ends, 1), True
+
+
+def _figures(known, ridden) -> dict:
+    """What a panel says of a result, in metres and seconds."""
+    motion = ridden.motion
+    return {
+        "seconds": round(motion.duration, 3), "source_seconds": round(known.motion.duration, 3),
+        "metres": round(float(ridden.arc[-1] - ridden.arc[0]), 3), "source_metres": round(float(known.arc.length), 3),
+        "seams": len(ridden.seams), "correction": round(float(np.percentile(ridden.correction, 95)), 4),
+        "miss": round(float(ridden.miss.max(initial=0.0)), 4),
+    }
+
+
+def tell(body: bpy.types.Object, line: str) -> None:
+    """Note for the panel why a rider could not follow."""
+    _tell(body.beyond_mocap_ride, line, None)
+
+
+def _tell(ride, lines: str, figures: dict | None) -> None:
+    """Write only what is new: each write is a change of the object, which is looked at again."""
+    if ride.told != lines:
+        ride.told = lines
+    text = json.dumps(figures) if figures is not None else ride.figures
+    if ride.figures != text:
+        ride.figures = text
+
+
+def _over(ride) -> None:
+    ride.on = False
+    ride.told = ride.figures = ""
+
+
+def _along(path) -> np.ndarray:
+    return path.at(np.linspace(*path.domain, _SAMPLES))

@@ -1,0 +1,99 @@
+"""A rider's original motion relative to its own path, worked out once and kept as long as nothing of it changes; and the
+ground that its feet follow."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import InputError
+from ..measure import units_per_metre
+from . import keys
+from .carrier import Carrier, Read
+
+MADE_OF = ("fit", "degree", "frame")  # settings that the original's own path and the offsets from it depend on
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """read: the original motion; core: it relative to its own path; digest: of what both were made of."""
+
+    read: Read
+    core: object
+    digest: bytes
+
+
+_sources: dict[int, Source] = {}  # by session_uid of the armature
+_keys: dict[int, tuple[int, bytes]] = {}  # likewise: the original action and its keys' digest, until they may have changed
+_grounds: dict[int, tuple[bytes, object]] = {}  # by session_uid of the mesh object
+
+
+def forget() -> None:
+    """Nothing is remembered any more: another file is open."""
+    _sources.clear()
+    _keys.clear()
+    _grounds.clear()
+
+
+def unsure() -> None:
+    """Keys of any original may be others: they are looked at again."""
+    _keys.clear()
+
+
+def of(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
+    """An armature's original motion for these settings of the core. InputError where there is none."""
+    from ...beyond_mocap.ride import prepare
+
+    uid, wishes = carrier.body.session_uid, tuple(getattr(settings, name) for name in MADE_OF)
+    original = carrier.source()[0]
+    number = original.session_uid if original is not None else 0
+    if uid not in _keys or _keys[uid][0] != number:
+        _keys[uid] = number, carrier.keys_digest()
+    parts = _keys[uid][1] + carrier.stamp(scene)
+    digest = hashlib.blake2b(parts + repr(wishes).encode(), digest_size=16).digest()
+    known = _sources.get(uid)
+    if known is not None and known.digest == digest:
+        return known
+    keys.refresh()
+    read = carrier.read(scene)
+    found = Source(read, prepare(read.motion, settings, read.standing), digest)
+    _sources[uid] = found
+    return found
+
+
+def ground_digest(ground: bpy.types.Object | None) -> bytes:
+    """Another where the ground's mesh, as it is shown, is another."""
+    if ground is None:
+        return b""
+    places, corners = _mesh(ground)
+    return hashlib.blake2b(places.tobytes() + corners.tobytes(), digest_size=16).digest()
+
+
+def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: bytes):
+    """The `Terrain` of a mesh object in metres; None without one. digest: of `ground_digest`."""
+    from ...beyond_mocap.motion.terrain import Terrain
+
+    if ground is None:
+        return None
+    units = units_per_metre(scene)
+    digest += repr(units).encode()
+    if _grounds.get(ground.session_uid, (b"", None))[0] != digest:
+        places, corners = _mesh(ground)
+        if not len(corners):
+            raise InputError(f"ground {ground.name}", "a mesh without faces", "a surface", "choose another")
+        _grounds[ground.session_uid] = digest, Terrain(places / units, corners)
+    return _grounds[ground.session_uid][1]
+
+
+def _mesh(ground: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh object as it is shown: vertices (V, 3) in the world, in Blender's units, and triangles (F, 3)."""
+    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = shown.data
+    places, corners = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.vertices.foreach_get("co", places)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    world = np.array(shown.matrix_world)
+    return places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3], corners.reshape(-1, 3)
