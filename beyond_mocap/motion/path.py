@@ -98,7 +98,9 @@ class SplinePath(Path):
     def _spline(self):
         from scipy.interpolate import BSpline
 
-        return BSpline(self.knots, self.coefficients, self.degree)
+        return BSpline(self.knots, self.coefficients - self.coefficients[0], self.degree)
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
-        return self._spline(self._inside(u), derivative)
+        # about the first control point: far from the origin derivatives would lose their digits
+        values = self._spline(self._inside(u), derivative)
+        return values if derivative else values + self.coefficients[0]

@@ -87,11 +87,20 @@ def _knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
 
 
 def _basis(at: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The four B-splines (N, 4) that are not zero at parameters (N,), and the first of them (N,)."""
-    from scipy.interpolate import BSpline
-
-    design = BSpline.design_matrix(at, knots, DEGREE)
-    return design.data.reshape(-1, _WIDTH), design.indices.reshape(-1, _WIDTH)[:, 0]
+    """The four B-splines (N, 4) that are not zero at parameters (N,), and the first of them (N,): Cox and de Boor."""
+    inner = knots[DEGREE : len(knots) - DEGREE]
+    pieces = len(inner) - 1
+    left = np.clip(((at - inner[0]) * (pieces / (inner[-1] - inner[0]))).astype(int), 0, pieces - 1)
+    basis = np.ones((1, len(at)))
+    for degree in range(1, DEGREE + 1):
+        more = np.zeros((degree + 1, len(at)))
+        for own in range(degree):
+            end, begin = knots[left + DEGREE + 1 + own], knots[left + DEGREE + 1 + own - degree]
+            share = basis[own] / (end - begin)
+            more[own] += (end - at) * share
+            more[own + 1] = (at - begin) * share
+        basis = more
+    return basis.T, left
 
 
 def _bends(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np.ndarray]:

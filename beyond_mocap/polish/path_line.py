@@ -18,8 +18,8 @@ ROUNDING = 0.15
 SHORTEST = 0.2
 """Metres that a line has at least."""
 
-_SAMPLE = 1 / 6  # of the rounding, between samples of the line
-_PIECE = 1 / 3  # of the rounding, a piece of the spline
+_SAMPLE = 1 / 4  # of the rounding, between samples of the line
+_PIECE = 1 / 2  # of the rounding, a piece of the spline
 _MOST_PIECES = 4000
 _HAIRPIN = 5.0  # roundings from where a line turns back to where it begins to swing out
 _LARGEST = (6 / 7) ** 3 / np.sqrt(7)  # value of x (1 - x^2)^3

@@ -76,3 +76,13 @@ def test_beyond_its_ends_it_is_at_its_ends():
     arc = ArcLength(bezier((0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)))
     assert arc.at(np.array([-1.0, 2.0])) == pytest.approx([0.0, 3.0])
     assert arc.parameter(np.array([-1.0, 9.0])) == pytest.approx([0.0, 1.0])
+
+
+def test_large_coordinates_are_no_reason_to_halve_for_ever():
+    """A kilometre of a wave, 1e5 m from the origin: as many pieces and the same length as at the origin."""
+    at = np.linspace(0.0, 1000.0, 8001)
+    coefficients = np.stack([at, np.sin(at), 0 * at], axis=1)
+    knots = np.concatenate([[0.0] * 3, np.linspace(0, 1, len(at) - 2), [1.0] * 3])
+    near, far = (ArcLength(SplinePath(knots, coefficients + move)) for move in (0.0, 1e5))
+    assert far.length == pytest.approx(near.length, abs=1e-6)
+    assert back_and_forth(far) < 1e-9
