@@ -187,7 +187,6 @@ def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, n
     taken[seams[:, None] + window] = count + kind[:, None] * 2 * reach + window + reach
     values = {name: np.concatenate(parts)[taken] for name, parts in shown.items()}
     values["frames"] = residuals.frames[source[taken]]
-    values["rotations"] = quaternion.continuous(values["rotations"])
     return residuals.changed(**values), seams
 
 
@@ -212,6 +211,8 @@ def _faded(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray
     come = np.where(after, 1.0 - share(through, after), share(through, after))
     both = _Both(len(residuals), loop, window, residuals.fps)
     rows = _rows(residuals)
+    for name in ("step", "turn"):
+        rows[name] = _since_before(rows[name])
     rotations, standing = rows.pop("rotations"), rows.pop("standing")
     out = {name: _mixed(*both.values(values), come) for name, values in rows.items()}
     ending, beginning = both.rotations(rotations)
@@ -222,6 +223,16 @@ def _faded(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray
     return out
 
 
+def _turned(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3) radians from rotations (..., 4) to others, as seen from the former."""
+    return quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(before), after))
+
+
+def _since_before(values: np.ndarray) -> np.ndarray:
+    """Changes (T,) since the frame before, the first frame's guessed from the second's."""
+    return np.concatenate([values[1:2], values[1:]])
+
+
 def _mixed(a: np.ndarray, b: np.ndarray, share_of_b: np.ndarray) -> np.ndarray:
     return a + share_of_b.reshape(-1, *[1] * (a.ndim - 1)) * (b - a)
 
@@ -229,7 +240,7 @@ def _mixed(a: np.ndarray, b: np.ndarray, share_of_b: np.ndarray) -> np.ndarray:
 def _along(place: np.ndarray, faded: np.ndarray, both: _Both, come: np.ndarray) -> np.ndarray:
     """(R,) metres to add to the steps, so that the body's speed along the path is the mean of both stretches' speeds
     although the place in the frame goes over from the one's to the other's."""
-    moved = np.diff(place[:, 0], prepend=place[0, 0])
+    moved = _since_before(np.diff(place[:, 0], prepend=place[0, 0]))
     wanted = _mixed(*both.values(moved), come)
     before = place[max(both.loop.end + both.window[0] - 1, 0), 0]
     return wanted - np.diff(faded[:, 0], prepend=before)
@@ -260,24 +271,34 @@ class _Both:
         """Frames (R,) of the ending and of the beginning stretch, held at the motion's own ends."""
         return tuple(np.clip(at + self.window, 0, self.count - 1) for at in (self.loop.end, self.loop.start))
 
-    def _carried(self, apart: np.ndarray) -> np.ndarray:
-        """Differences (R, ...) of both stretches with those beyond the recording carried on from its end."""
+    def _carried(self, apart: np.ndarray, ending: np.ndarray, beginning: np.ndarray) -> np.ndarray:
+        """Differences (R, ...) of both stretches with those beyond the recording carried on from its end; ending and
+        beginning (S, ...): what they change by in each of the S frames before and after the jump."""
         first, last = (edge - int(self.window[0]) for edge in self._known)
         over = max(int(round(_SLOPE_SECONDS * self.fps)), 1)
+        whole, slope = last - first >= over, ending.mean(axis=0) - beginning.mean(axis=0)
         out, longest = apart.copy(), _FURTHER * self.fps
         for edge, inner, beyond in (
             (first, min(first + over, last), np.arange(first)),
             (last, max(last - over, first), np.arange(last + 1, len(apart))),
         ):
-            slope = (apart[edge] - apart[inner]) / max(abs(edge - inner), 1)
-            far = longest * (1.0 - np.exp(-np.abs(beyond - edge) / longest))
-            out[beyond] = apart[edge] + far.reshape(-1, *[1] * (apart.ndim - 1)) * slope
+            near = (apart[edge] - apart[inner]) / (edge - inner) if whole else slope
+            far = np.sign(beyond - edge) * longest * (1.0 - np.exp(-np.abs(beyond - edge) / longest))
+            out[beyond] = apart[edge] + far.reshape(-1, *[1] * (apart.ndim - 1)) * near
         return out
+
+    @property
+    def _changes(self) -> tuple[np.ndarray, np.ndarray]:
+        """The last frames (S,) before the jump and the first after it, whose changes are known without the other's."""
+        over = max(int(round(_SLOPE_SECONDS * self.fps)), 1)
+        return self.loop.end - np.arange(over), self.loop.start + 1 + np.arange(over)
 
     def values(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (R, ...) of the ending and of the beginning stretch."""
         ending, beginning = (np.asarray(values[at], dtype=float) for at in self._places())
-        apart = self._carried(ending - beginning)
+        if self._known == (self.window[0], self.window[-1]):
+            return ending, beginning
+        apart = self._carried(ending - beginning, *(values[at] - values[at - 1] for at in self._changes))
         first, last = (edge - int(self.window[0]) for edge in self._known)
         ending[last + 1 :] = beginning[last + 1 :] + apart[last + 1 :]
         beginning[:first] = ending[:first] - apart[:first]
@@ -286,11 +307,11 @@ class _Both:
     def rotations(self, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotations (R, J, 4) of the ending and of the beginning stretch."""
         ending, beginning = (rotations[at].copy() for at in self._places())
-        first, last = (edge - int(self.window[0]) for edge in self._known)
-        if first == 0 and last == len(ending) - 1:
+        if self._known == (self.window[0], self.window[-1]):
             return ending, beginning
-        apart = self._carried(quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(beginning), ending)))
-        turn = quaternion.from_rotation_vector(apart)
+        changes = (_turned(rotations[at - 1], rotations[at]) for at in self._changes)
+        turn = quaternion.from_rotation_vector(self._carried(_turned(beginning, ending), *changes))
+        first, last = (edge - int(self.window[0]) for edge in self._known)
         ending[last + 1 :] = quaternion.multiply(beginning[last + 1 :], turn[last + 1 :])
         beginning[:first] = quaternion.multiply(ending[:first], quaternion.inverse(turn[:first]))
         return ending, beginning

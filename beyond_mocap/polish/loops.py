@@ -2,8 +2,8 @@
 
 Compared are places and velocities of the main joints as seen from the path's moving frame, travelling with the body, in
 a window around both frames; which soles stand; and how far the body lies off its path. A motion graph (Kovar et al.
-2002) finds its transitions alike. The search is bounded: rough over at most a thousand frames by nine thousand, then
-exact around the best two dozen pairs.
+2002) finds its transitions alike. The search is bounded: rough over at most four million pairs, then exact around
+the best two dozen.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ WINDOW_SECONDS = 0.12
 """Pairs are compared over so much before and after."""
 
 _VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
-_ROUGH_FPS, _ROWS, _COLUMNS, _TRIED = 30.0, 1000, 9000, 24
+_ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 4_000_000, 9000, 24
 _STRIDE_SHARE = 0.85  # a loop is at least so long, of the stride's time: strides differ
 _SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which nobody loops: a stop is no gait
 _LABEL = 0.06  # metres that a wrong sole costs
@@ -172,7 +172,7 @@ def _rough(
     count, fps = len(features), residuals.fps
     every = max(int(round(fps / _ROUGH_FPS)), -(-count // _COLUMNS), 1)
     ends = np.arange(0, count, every)
-    starts = ends[:: max(-(-len(ends) // _ROWS), 1)]
+    starts = ends[:: max(-(-(len(ends) ** 2) // _PAIRS), 1)]
     starts, ends = starts[free[starts]], ends[free[ends]]
     if not len(starts) or not len(ends):
         return []
