@@ -1,0 +1,146 @@
+"""Bodies that come too near each other: who, when, where and how near, exactly, between the frames too.
+
+A body is an upright capsule on its place on the ground: a segment of `height` less its own thickness, with `distance`
+as the least gap between two such segments. So bodies on two floors, or one on a bridge, do not meet. Between two frames
+each body moves in a straight line; the gap is then a convex function of time, made of at most three pieces (one below
+the other, level, above), and its least value and the times at which it crosses `distance` are those of quadratics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+HEIGHT = 1.8
+"""Metres of a standing body."""
+DISTANCE = 0.6
+"""Metres between two bodies' middles at which their shoulders begin to touch."""
+_JUMP = 15.0  # m/s: nobody runs like that; such a step is a motion that starts again somewhere else
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two bodies nearer than the distance asked for, without a break.
+
+    first, second: numbers of the bodies, first < second. start, end: seconds. time: when they are nearest. gap: metres
+    between them then. place (3,): metres, the middle between both then.
+    """
+
+    first: int
+    second: int
+    start: float
+    end: float
+    time: float
+    gap: float
+    place: tuple[float, float, float]
+
+
+def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE, height: float = HEIGHT) -> list:
+    """All collisions, by time.
+
+    times (T,): seconds, rising. places (N, T, 3): metres on the ground.
+    """
+    found = []
+    for first in range(len(places) - 1):
+        found += collisions_of(first, range(first + 1, len(places)), times, places, distance, height)
+    return sorted(found, key=lambda collision: (collision.start, collision.first, collision.second))
+
+
+def collisions_of(one: int, others, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
+    """The collisions of body `one` with these others; arrays as in `collisions`."""
+    others = np.asarray([other for other in others if other != one], dtype=int)
+    if len(times) < 2 or not len(others):
+        return []
+    near, off, move = _near_steps(places[one], places[others], np.diff(times), distance)
+    found = []
+    for row in np.unique(near[0]):
+        steps = near[1][near[0] == row]
+        pair = min(one, others[row]), max(one, others[row])
+        found += _joined(pair, steps, off[row, steps], move[row, steps], times, places, distance, height)
+    return found
+
+
+def _near_steps(place, places, seconds, distance):
+    """Which steps may matter: (rows, steps), and offsets (N, T, 3) and moves (N, T-1, 3) of the others against one."""
+    off = places - place
+    move = np.diff(off, axis=1)
+    reach = distance + np.hypot(move[..., 0], move[..., 1])
+    near = off[:, :-1, 0] ** 2 + off[:, :-1, 1] ** 2 <= reach**2
+    if not near.any():
+        return np.nonzero(near), off, move
+    jump = _jumps(place[None], seconds) | _jumps(places, seconds)
+    return np.nonzero(near & ~jump), off, move
+
+
+def _jumps(places, seconds):
+    """Which steps (N, T-1) are no movement."""
+    step = np.diff(places, axis=1)
+    return np.einsum("ntk,ntk->nt", step, step) > (_JUMP * seconds) ** 2
+
+
+def _joined(pair, steps, off, move, times, places, distance, height):
+    """The collisions of one pair: those of its steps joined where one goes on in the next."""
+    enter, leave, nearest, gap = gaps(off, move, distance, max(height - distance, 0.0))
+    hit = gap < distance
+    steps, enter, leave, nearest, gap = (values[hit] for values in (steps, enter, leave, nearest, gap))
+    found = []
+    breaks = np.flatnonzero((np.diff(steps) > 1) | (leave[:-1] < 1.0) | (enter[1:] > 0.0)) + 1
+    for part in np.split(np.arange(len(steps)), breaks):
+        if not len(part):
+            continue
+        best = part[np.argmin(gap[part])]
+        span = [times[step] + share * (times[step + 1] - times[step])
+                for step, share in ((steps[part[0]], enter[part[0]]), (steps[part[-1]], leave[part[-1]]))]
+        step, share = steps[best], nearest[best]
+        both = places[list(pair), step] * (1 - share) + places[list(pair), step + 1] * share
+        when = times[step] + share * (times[step + 1] - times[step])
+        found.append(Collision(int(pair[0]), int(pair[1]), float(span[0]), float(span[1]), float(when),
+                               float(gap[best]), tuple(map(float, both.mean(axis=0)))))
+    return found
+
+
+def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
+    """Within steps: shares (M,) of the step at which the gap falls below and rises above `distance`, at which it is
+    least, and the least gap (M,) metres. Where it stays above, the first two mean nothing.
+
+    off, move (M, 3): offset of one body against the other at the start, and its change. span: metres of the segments.
+    """
+    enter, leave = np.full(len(off), np.inf), np.full(len(off), -np.inf)
+    nearest, gap = np.zeros(len(off)), np.full(len(off), np.inf)
+    for low, high, shift in ((-span, span, None), (span, np.inf, span), (-np.inf, -span, -span)):
+        begin, end = _while_between(off[:, 2], move[:, 2], low, high)
+        level = np.array([1.0, 1.0, 0.0 if shift is None else 1.0])
+        start, change = (off - np.array([0.0, 0.0, shift or 0.0])) * level, move * level
+        at, least, into, out = _quadratic(start, change, begin, end, distance)
+        better = least < gap
+        nearest, gap = np.where(better, at, nearest), np.where(better, least, gap)
+        enter, leave = np.minimum(enter, into), np.maximum(leave, out)
+    return enter, leave, nearest, gap
+
+
+def _while_between(value, change, low, high):
+    """The shares (M,), (M,) of a step between which value + share * change lies in [low, high]; empty: first > last."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, last = (low - value) / change, (high - value) / change
+    still = change == 0.0
+    inside = (value >= low) & (value <= high)
+    first, last = np.minimum(first, last), np.maximum(first, last)
+    first = np.where(still, np.where(inside, 0.0, 2.0), np.maximum(first, 0.0))
+    last = np.where(still, np.where(inside, 1.0, -1.0), np.minimum(last, 1.0))
+    return first, last
+
+
+def _quadratic(start, change, begin, end, distance):
+    """Least length of start + share * change for shares in [begin, end], and where it is below `distance`."""
+    a, b = np.einsum("mk,mk->m", change, change), np.einsum("mk,mk->m", start, change)
+    empty = begin > end
+    at = np.clip(np.divide(-b, a, out=np.zeros_like(a), where=a > 0), begin, np.maximum(begin, end))
+    at = np.where(np.isfinite(at), at, 0.0)
+    least = np.linalg.norm(start + at[:, None] * change, axis=1)
+    room = b**2 - a * (np.einsum("mk,mk->m", start, start) - distance**2)
+    root = np.sqrt(np.maximum(room, 0.0))
+    into, out = (np.divide(-b + sign * root, a, out=np.full_like(a, sign * np.inf), where=a > 0) for sign in (-1, 1))
+    into, out = np.clip(into, begin, end), np.clip(out, begin, end)
+    apart = empty | (least >= distance)
+    return at, np.where(empty, np.inf, least), np.where(apart, np.inf, into), np.where(apart, -np.inf, out)
