@@ -13,18 +13,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .collisions import DISTANCE, HEIGHT, Collision, collisions_of
+from .collisions import DISTANCE, HEIGHT, Collision, collisions, collisions_at, least_gaps
 from .detour import RISE, gentle_width
 from .follower import Change, Follower
 
-_SPARE = 0.004  # metres kept beyond the distance: bodies move in curves between the search's own times
-_RATE = 20.0  # times per second at which the search looks
-_KEPT = 4  # sets of changes gone on with
+_SPARE = 0.01  # metres kept beyond the distance: bodies move in curves between the search's own times
+_RATE, _FINER = 20.0, 3  # times per second at which the search looks; at the end so many times as often
+_KEPT, _MANY = (4, 2), 8  # sets of changes gone on with; fewer from so many collisions on
+_TRIED = 4  # ways to mend a collision, the cheapest of them
 _AROUND = 1.0  # seconds around a collision in which what mends it must be clear
-_DELAY_STEP, _FINE = 0.1, 0.005  # seconds and metres
+_AMOUNTS, _FINE = 16, 0.003  # how many amounts are tried at once; seconds and metres
 _EVEN, _LEFT = 0.05, 0.01  # two small detours are rather taken than a large one; people keep to the right
+_DETOURS = 2  # of one body in one place
 _TIGHT = 0.3  # a detour on the inside of a bend leaves at least this share of its length
+_BIN, _LAG = 0.5, 0.5  # seconds: how finely it is looked at first who may meet; what detours may cost
 _UNMENDED = 10.0  # what a collision that stays costs
+_SHARES = (0.0, 0.5, 0.75, 0.9)
 _TWICE = 3.0  # ways are tried for at most this many times as many collisions as there were, and some
 
 
@@ -78,13 +82,14 @@ def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None)
     search = _Search(followers, limits)
     state = search.begin(tuple(changes or (Change(),) * len(followers)))
     before, states, rounds = state.collisions, [state], int(_TWICE * len(state.collisions)) + 20
+    kept = _KEPT[len(before) >= _MANY]
     for _ in range(rounds):
         if states[0].open() is None:
             break
         found = {child.changes: child for state in states for child in search.children(state)}
-        states = sorted(found.values(), key=search.score)[:_KEPT]
-    best = search.smaller(states[0])
-    return Resolution(best.changes, before, best.collisions)
+        states = sorted(found.values(), key=search.score)[:kept]
+    best = search.smaller(states[0]).changes
+    return Resolution(best, before, search.left(best))
 
 
 class _Search:
@@ -96,7 +101,8 @@ class _Search:
         begin = min(follower.times[0] for follower in followers)
         end = max(follower.times[-1] for follower in followers) + limits.delay
         self.clock = np.linspace(begin, end, max(int(np.ceil((end - begin) * _RATE)), 1) + 1)
-        self.places, self.costs = {}, {}
+        self.places, self.costs, self.found, self.known = {}, {}, {}, {}
+        self.may_meet = _may_meet(self)
 
     def begin(self, changes) -> _State:
         """Where the search sets out."""
@@ -112,15 +118,32 @@ class _Search:
     def after(self, changes, collisions, changed):
         """All collisions, by time, where those of the `changed` bodies are to be found anew."""
         found = [collision for collision in collisions if not {collision.first, collision.second} & set(changed)]
-        tracks = np.stack([self.track(who, change) for who, change in enumerate(changes)])
         for rank, who in enumerate(changed):
-            others = [other for other in range(len(changes)) if other not in changed[:rank] and self.concerns(who, other)]
-            found += collisions_of(who, others, self.clock, tracks, self.wanted, self.limits.height)
+            found += self.met(who, changes, changed[:rank])
         return tuple(sorted(found, key=lambda collision: (collision.start, collision.first, collision.second)))
 
-    def concerns(self, one, other):
-        """Whether one of the two can give way."""
-        return self.followers[one].path is not None or self.followers[other].path is not None
+    def left(self, changes):
+        """The collisions that changes leave, looked at more finely than while searching."""
+        times = np.linspace(self.clock[0], self.clock[-1], _FINER * (len(self.clock) - 1) + 1)
+        places = np.stack([follower.at(times, change) for follower, change in zip(self.followers, changes)])
+        fixed = [follower.path is None for follower in self.followers]
+        found = collisions(times, places, self.limits.distance, self.limits.height)
+        return tuple(collision for collision in found if not (fixed[collision.first] and fixed[collision.second]))
+
+    def met(self, who, changes, without):
+        """The collisions of one body, but for those with the bodies `without`."""
+        known = self.known.setdefault((who, changes[who]), {})
+        others = [other for other in self.may_meet[who] if other not in without]
+        new = [other for other in others if (other, changes[other]) not in known]
+        if new:
+            rows = np.repeat(np.arange(1, len(new) + 1), [len(self.may_meet[who][other]) for other in new])
+            steps = np.concatenate([self.may_meet[who][other] for other in new])
+            tracks = np.stack([self.track(body, changes[body]) for body in (who, *new)])
+            hits = collisions_at(0, rows, steps, self.clock, tracks, self.wanted, self.limits.height)
+            for row, other in enumerate(new, start=1):
+                pair = {"first": min(who, other), "second": max(who, other)}
+                known[other, changes[other]] = [replace(hit, **pair) for hit in hits if hit.second == row]
+        return [hit for other in others for hit in known[other, changes[other]]]
 
     def score(self, state):
         """What a state costs, with what its collisions will cost at least."""
@@ -151,14 +174,16 @@ class _Search:
         collision = state.open()
         if collision is None:
             return [state]
-        children = []
-        for changed in self.ways(state, collision):
+        key, children = state.key(collision), []
+        if key not in self.found:
+            self.found[key] = self.ways(state, collision)
+        for changed in self.found[key]:
             changes = list(state.changes)
             for who, change in changed.items():
                 changes[who] = change
             left = self.after(tuple(changes), state.collisions, tuple(changed))
             children.append(_State(tuple(changes), left, state.given_up))
-        return children or [replace(state, given_up=state.given_up | {state.key(collision)})]
+        return children or [replace(state, given_up=state.given_up | {key})]
 
     def ways(self, state, collision):
         """Each way to mend a collision: number of a body -> its change."""
@@ -168,43 +193,83 @@ class _Search:
         if len(pair) == 2:
             found += [self.round(state, collision, dict(zip(pair, sides)))
                       for sides in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))]
-        return [way for way in found if way is not None]
+        found = [way for way in found if way is not None]
+        return sorted(found, key=lambda way: self.more(state, way))[:_TRIED]
+
+    def more(self, state, way):
+        """What a way costs beyond what is spent."""
+        return sum(self.cost(who, change) - self.cost(who, state.changes[who]) for who, change in way.items())
 
     def wait(self, state, collision, who):
         """The shortest wait of one body that mends a collision."""
         if collision.start <= self.clock[0]:
             return None  # where they begin they are too near
-        now = state.changes[who]
+        now, other = state.changes[who], collision.second if who == collision.first else collision.first
+        times = self.around(collision)
+        standing = self.followers[other].at(times, state.changes[other])
+
+        def gap(more):
+            later = self.followers[who].at((times - more[:, None]).ravel(), now).reshape(len(more), -1, 3)
+            return self.gap(later, standing[None])
 
         def way(more):
-            return {who: replace(now, delay=round(now.delay + more, 4))}
+            return {who: replace(now, delay=round(float(now.delay + more), 4))}
 
-        low = 0.0
-        for high in np.arange(_DELAY_STEP, self.limits.delay - now.delay + 1e-9, _DELAY_STEP):
-            if self.clear(state, collision, way(high)):
-                return way(self.bisected(state, collision, way, low, high))
-            low = high
-        return None
+        return self.least_way(state, collision, gap, way, self.limits.delay - now.delay)
 
     def round(self, state, collision, sides):
         """The smallest detour, to these sides and equal for all who make one, that mends a collision."""
         covers = {who: self.cover(state, collision, who) for who in sides}
+        if any(self.crowded(who, state.changes[who], covers[who]) for who in sides):
+            return None
+        times = self.around(collision)
+
+        def beside(who, amounts):
+            if who not in sides:
+                return self.followers[who].at(times, state.changes[who])[None]
+            train = self.train(who, covers[who], sides[who] * amounts[:, None])
+            return self.followers[who].with_more(times, state.changes[who], train)
+
+        def gap(amounts):
+            return self.gap(beside(collision.first, amounts), beside(collision.second, amounts))
 
         def way(amount):
-            return {who: self.aside(who, state.changes[who], covers[who], side * amount) for who, side in sides.items()}
+            return {who: replace(state.changes[who], detours=state.changes[who].detours
+                                 + _rounded(self.train(who, covers[who], side * amount))) for who, side in sides.items()}
 
-        most = self.limits.detour
-        if not self.clear(state, collision, way(most)):
-            return None
-        least = way(self.bisected(state, collision, way, 0.0, most))
-        return least if all(self.possible(who, change) for who, change in least.items()) else None
+        least = self.least_way(state, collision, gap, way, self.limits.detour)
+        return least if least and all(self.possible(who, change) for who, change in least.items()) else None
 
-    def bisected(self, state, collision, way, low, high):
-        """The least amount between one that does not mend and one that does."""
-        while high - low > _FINE:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if self.clear(state, collision, way(middle)) else (middle, high)
-        return high
+    def least_way(self, state, collision, gap, way, most):
+        """The way of the least amount that keeps both apart around a collision; gap(amounts (A,)) -> metres (A,)."""
+        low, high = 0.0, most
+        for _ in range(2):
+            amounts = low + (high - low) * np.arange(1, _AMOUNTS + 1) / _AMOUNTS
+            enough = np.flatnonzero(gap(amounts) >= self.wanted)
+            if not len(enough):
+                return None
+            low, high = low if enough[0] == 0 else amounts[enough[0] - 1], amounts[enough[0]]
+        for amount in (high, high + _FINE, high + 3 * _FINE, high + 8 * _FINE):
+            if amount <= most + 1e-9 and self.clear(state, collision, way(amount)):
+                return way(amount)
+        return None
+
+    def around(self, collision):
+        """Times (T,) around a collision in which what mends it must be clear."""
+        first = np.searchsorted(self.clock, collision.start - _AROUND)
+        last = np.searchsorted(self.clock, collision.end + _AROUND + self.limits.delay)
+        return self.clock[max(first - 1, 0) : last + 1]
+
+    def gap(self, first, second):
+        """Metres (A,) between bodies (A, T, 3) when they are nearest."""
+        return least_gaps(first, second, self.limits.distance, self.limits.height)
+
+    def clear(self, state, collision, changed):
+        """Whether the two are apart around the time of a collision, with these changes."""
+        times = self.around(collision)
+        first, second = (self.followers[who].at(times, changed.get(who, state.changes[who]))[None]
+                         for who in (collision.first, collision.second))
+        return self.gap(first, second)[0] >= self.wanted
 
     def cover(self, state, collision, who):
         """(first, last): metres along its path as it was between which a body has to be aside."""
@@ -214,15 +279,19 @@ class _Search:
             last += follower.way.length
         return first, max(first, last)
 
-    def aside(self, who, change, cover, offset):
-        """The change with a detour more: as many side by side as it takes to be aside all along, each begins where the
-        one before ends, and together they are one long one."""
+    def crowded(self, who, change, cover):
+        """Whether a body makes detours enough there."""
+        there = [detour for detour in change.detours if abs(detour[0] - 0.5 * sum(cover)) < 0.5 * detour[1]]
+        return len(there) >= 2 * _DETOURS
+
+    def train(self, who, cover, offset):
+        """Detours that keep a body aside all along: each begins to come back where the next begins to leave, and together
+        they are one long one. offset: a number or an array, and so are theirs."""
         first, last = cover
-        width = gentle_width(offset, self.followers[who].speed)
-        more = max(int(np.ceil((last - first - (1.0 - 2.0 * RISE) * width) / ((1.0 - RISE) * width))), 0)
-        middles = 0.5 * (first + last) + (1.0 - RISE) * width * (np.arange(more + 1) - 0.5 * more)
-        added = tuple((round(float(middle), 4), round(float(width), 4), round(offset, 4)) for middle in middles)
-        return replace(change, detours=change.detours + added)
+        width = np.maximum(gentle_width(offset, self.followers[who].speed), (last - first) / 3.0)
+        more = np.maximum(np.ceil((last - first - (1.0 - 2.0 * RISE) * width) / ((1.0 - RISE) * width)), 0.0)
+        begin, step = 0.5 * (first + last - (1.0 - RISE) * width * more), (1.0 - RISE) * width
+        return tuple((begin + number * step, width, offset * (number <= more)) for number in range(int(np.max(more)) + 1))
 
     def possible(self, who, change):
         """Whether a change keeps to the limits and leaves no loop in a bend."""
@@ -230,15 +299,6 @@ class _Search:
         aside = way.aside(way.arc, change.detours)
         tight = (1.0 + way.bend * aside < _TIGHT) & (np.abs(aside) > 0.05)
         return change.delay <= self.limits.delay + 1e-9 and np.abs(aside).max() <= self.limits.detour + 1e-3 and not tight.any()
-
-    def clear(self, state, collision, changed):
-        """Whether the two are apart around the time of a collision, with these changes."""
-        first = np.searchsorted(self.clock, collision.start - _AROUND)
-        last = np.searchsorted(self.clock, collision.end + _AROUND + self.limits.delay)
-        times = self.clock[max(first - 1, 0) : last + 1]
-        places = [self.followers[who].at(times, changed.get(who, state.changes[who]))
-                  for who in (collision.first, collision.second)]
-        return not collisions_of(0, (1,), times, np.stack(places), self.wanted, self.limits.height)
 
     def smaller(self, state):
         """The state with each change as small as the others allow: left out, or a part of it."""
@@ -251,20 +311,13 @@ class _Search:
 
     def scaled(self, state, who, shared):
         """The state with the least share of a part of one body's change that brings no collision."""
-        low, high, best, allowed = 0.0, 1.0, state, _trouble(state)
-        share = 0.0
-        while high - low > 0.05 or share == 0.0:
+        for share in _SHARES:
             changes = list(state.changes)
             changes[who] = shared(state.changes[who], share)
             tried = replace(state, changes=tuple(changes), collisions=self.after(tuple(changes), state.collisions, (who,)))
-            if _trouble(tried) <= allowed and self.possible(who, changes[who]):
-                high, best = share, tried
-            else:
-                low = share
-            if share == 0.0 and high == 0.0:
-                break
-            share = 0.5 * (low + high)
-        return best
+            if _trouble(tried) <= _trouble(state) and self.possible(who, changes[who]):
+                return tried
+        return state
 
 
 def _with_share(change, part, share):
@@ -274,6 +327,39 @@ def _with_share(change, part, share):
     return replace(change, detours=tuple(detour for detour in kept if detour[2] != 0.0))
 
 
+def _rounded(detours):
+    """Detours as plain numbers, to a tenth of a millimetre."""
+    return tuple(tuple(round(float(number), 4) for number in detour) for detour in detours)
+
+
 def _trouble(state):
     """How many collisions a state has, and how deep they are."""
     return len(state.collisions), -round(sum(collision.gap for collision in state.collisions), 6)
+
+
+def _may_meet(search):
+    """For each body the others with which changes within the limits could bring it together, each with the steps (M,) of
+    the clock in which they could; two of which neither can give way are nobody's concern."""
+    limits, followers = search.limits, search.followers
+    stride = max(int(round(_BIN * _RATE)), 1)
+    begins = np.arange(0, len(search.clock) - 1, stride)
+    tracks = np.stack([search.track(who, Change())[:, :2] for who in range(len(followers))])
+    middle = tracks[:, np.minimum(begins + stride // 2, len(search.clock) - 1)]
+    apart = [np.abs(tracks[:, np.minimum(begins + step, len(search.clock) - 1)] - middle) for step in range(stride + 1)]
+    around = np.linalg.norm(np.max(apart, axis=0), axis=2)
+    late = int(np.ceil((limits.delay + _LAG) / _BIN))
+    meet = np.zeros((len(followers), len(followers), len(begins)), dtype=bool)
+    for shift in range(min(late + 1, len(begins))):
+        rest = len(begins) - shift
+        off = middle[:, None, :rest] - middle[None, :, shift:]
+        reach = search.wanted + 2.0 * limits.detour + around[:, None, :rest] + around[None, :, shift:]
+        near = np.einsum("ijbk,ijbk->ijb", off, off) <= reach**2
+        for both in range(shift, late + 1):  # one waited by `both`, the other by both - shift
+            last = min(len(begins), rest + both)
+            meet[:, :, both:last] |= near[:, :, : last - both]
+    meet |= meet.transpose(1, 0, 2)
+    fixed = np.array([follower.path is None for follower in followers])
+    meet &= ~(fixed[:, None] & fixed[None])[:, :, None]
+    meet[np.arange(len(fixed)), np.arange(len(fixed))] = False
+    steps = np.repeat(meet, stride, axis=2)[:, :, : len(search.clock) - 1]
+    return [{int(other): np.flatnonzero(of[other]) for other in np.flatnonzero(of.any(axis=1))} for of in steps]

@@ -52,48 +52,44 @@ def collisions_of(one: int, others, times, places, distance: float = DISTANCE, h
     others = np.asarray([other for other in others if other != one], dtype=int)
     if len(times) < 2 or not len(others):
         return []
-    near, off, move = _near_steps(places[one], places[others], np.diff(times), distance)
+    rows, steps = np.indices((len(others), len(times) - 1)).reshape(2, -1)
+    return collisions_at(one, others[rows], steps, times, places, distance, height)
+
+
+def collisions_at(one: int, others, steps, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
+    """The collisions of body `one` with others (M,) within steps (M,), those of each other together and rising."""
+    off = places[others, steps] - places[one, steps]
+    move = places[others, steps + 1] - places[one, steps + 1] - off
+    reach = distance + np.sqrt(move[:, 0] ** 2 + move[:, 1] ** 2)
+    near = np.flatnonzero(off[:, 0] ** 2 + off[:, 1] ** 2 <= reach**2)
+    others, steps, off, move = others[near], steps[near], off[near], move[near]
+    goes = ~(_jumps(one, steps, times, places) | _jumps(others, steps, times, places))
+    enter, leave, nearest, gap = gaps(off, move, distance, max(height - distance, 0.0))
+    hit = goes & (gap < distance)
     found = []
-    for row in np.unique(near[0]):
-        steps = near[1][near[0] == row]
-        pair = min(one, others[row]), max(one, others[row])
-        found += _joined(pair, steps, off[row, steps], move[row, steps], times, places, distance, height)
+    for other in np.unique(others[hit]):
+        of = hit & (others == other)
+        pair = [min(one, other), max(one, other)]
+        found += _joined(pair, steps[of], enter[of], leave[of], nearest[of], gap[of], times, places)
     return found
 
 
-def _near_steps(place, places, seconds, distance):
-    """Which steps may matter: (rows, steps), and offsets (N, T, 3) and moves (N, T-1, 3) of the others against one."""
-    off = places - place
-    move = np.diff(off, axis=1)
-    reach = distance + np.hypot(move[..., 0], move[..., 1])
-    near = off[:, :-1, 0] ** 2 + off[:, :-1, 1] ** 2 <= reach**2
-    if not near.any():
-        return np.nonzero(near), off, move
-    jump = _jumps(place[None], seconds) | _jumps(places, seconds)
-    return np.nonzero(near & ~jump), off, move
+def _jumps(bodies, steps, times, places):
+    """Which steps (M,) of these bodies are no movement."""
+    step = places[bodies, steps + 1] - places[bodies, steps]
+    return np.einsum("mk,mk->m", step, step) > (_JUMP * (times[steps + 1] - times[steps])) ** 2
 
 
-def _jumps(places, seconds):
-    """Which steps (N, T-1) are no movement."""
-    step = np.diff(places, axis=1)
-    return np.einsum("ntk,ntk->nt", step, step) > (_JUMP * seconds) ** 2
-
-
-def _joined(pair, steps, off, move, times, places, distance, height):
+def _joined(pair, steps, enter, leave, nearest, gap, times, places):
     """The collisions of one pair: those of its steps joined where one goes on in the next."""
-    enter, leave, nearest, gap = gaps(off, move, distance, max(height - distance, 0.0))
-    hit = gap < distance
-    steps, enter, leave, nearest, gap = (values[hit] for values in (steps, enter, leave, nearest, gap))
     found = []
     breaks = np.flatnonzero((np.diff(steps) > 1) | (leave[:-1] < 1.0) | (enter[1:] > 0.0)) + 1
     for part in np.split(np.arange(len(steps)), breaks):
-        if not len(part):
-            continue
         best = part[np.argmin(gap[part])]
         span = [times[step] + share * (times[step + 1] - times[step])
                 for step, share in ((steps[part[0]], enter[part[0]]), (steps[part[-1]], leave[part[-1]]))]
         step, share = steps[best], nearest[best]
-        both = places[list(pair), step] * (1 - share) + places[list(pair), step + 1] * share
+        both = places[pair, step] * (1 - share) + places[pair, step + 1] * share
         when = times[step] + share * (times[step + 1] - times[step])
         found.append(Collision(int(pair[0]), int(pair[1]), float(span[0]), float(span[1]), float(when),
                                float(gap[best]), tuple(map(float, both.mean(axis=0)))))
@@ -106,6 +102,10 @@ def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
 
     off, move (M, 3): offset of one body against the other at the start, and its change. span: metres of the segments.
     """
+    if not len(off) or max(np.abs(off[:, 2]).max(), np.abs(off[:, 2] + move[:, 2]).max()) <= span:  # all on one level
+        level, always = np.array([1.0, 1.0, 0.0]), np.zeros(len(off))
+        nearest, gap, enter, leave = _quadratic(off * level, move * level, always, always + 1.0, distance)
+        return enter, leave, nearest, gap
     enter, leave = np.full(len(off), np.inf), np.full(len(off), -np.inf)
     nearest, gap = np.zeros(len(off)), np.full(len(off), np.inf)
     for low, high, shift in ((-span, span, None), (span, np.inf, span), (-np.inf, -span, -span)):
@@ -117,6 +117,14 @@ def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
         nearest, gap = np.where(better, at, nearest), np.where(better, least, gap)
         enter, leave = np.minimum(enter, into), np.maximum(leave, out)
     return enter, leave, nearest, gap
+
+
+def least_gaps(first, second, distance: float = DISTANCE, height: float = HEIGHT) -> np.ndarray:
+    """Metres (A,) between pairs of bodies (A, T, 3) when they are nearest; one side may have A = 1."""
+    off = second - first
+    move = np.diff(off, axis=1).reshape(-1, 3)
+    gap = gaps(off[:, :-1].reshape(-1, 3), move, distance, max(height - distance, 0.0))[3]
+    return gap.reshape(len(off), -1).min(axis=1, initial=np.inf)
 
 
 def _while_between(value, change, low, high):
@@ -135,12 +143,12 @@ def _quadratic(start, change, begin, end, distance):
     """Least length of start + share * change for shares in [begin, end], and where it is below `distance`."""
     a, b = np.einsum("mk,mk->m", change, change), np.einsum("mk,mk->m", start, change)
     empty = begin > end
-    at = np.clip(np.divide(-b, a, out=np.zeros_like(a), where=a > 0), begin, np.maximum(begin, end))
-    at = np.where(np.isfinite(at), at, 0.0)
+    at = np.divide(-b, a, out=np.zeros_like(a), where=a > 0)
+    at = np.where(empty, 0.0, np.minimum(np.maximum(at, begin), end))
     least = np.linalg.norm(start + at[:, None] * change, axis=1)
     room = b**2 - a * (np.einsum("mk,mk->m", start, start) - distance**2)
     root = np.sqrt(np.maximum(room, 0.0))
     into, out = (np.divide(-b + sign * root, a, out=np.full_like(a, sign * np.inf), where=a > 0) for sign in (-1, 1))
-    into, out = np.clip(into, begin, end), np.clip(out, begin, end)
+    into, out = (np.minimum(np.maximum(share, begin), end) for share in (into, out))
     apart = empty | (least >= distance)
     return at, np.where(empty, np.inf, least), np.where(apart, np.inf, into), np.where(apart, -np.inf, out)

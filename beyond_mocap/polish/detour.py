@@ -19,11 +19,11 @@ _STEADY = 0.3  # metres over which the way to the side is smoothed: an offset of
 
 
 def offsets(arc: np.ndarray, detours) -> np.ndarray:
-    """Metres (N,) to the right at these arc lengths (N,)."""
-    total = np.zeros(len(arc))
+    """Metres (..., N) to the right at these arc lengths (..., N); the numbers of a detour may be arrays (..., 1)."""
+    total = 0.0 * arc
     for middle, width, offset in detours:
-        rest = np.clip((0.5 * width - np.abs(arc - middle)) / (RISE * width), 0.0, 1.0)
-        total += offset * rest**3 * (10.0 + rest * (6.0 * rest - 15.0))
+        rest = np.minimum(np.maximum((0.5 * width - np.abs(arc - middle)) / (RISE * width), 0.0), 1.0)
+        total = total + offset * rest**3 * (10.0 + rest * (6.0 * rest - 15.0))
     return total
 
 
@@ -32,13 +32,13 @@ def round_offsets(arc: np.ndarray, detours, length: float) -> np.ndarray:
     return sum(offsets(arc + shift * length, detours) for shift in (-1.0, 0.0, 1.0))
 
 
-def gentle_width(offset: float, speed: float) -> float:
+def gentle_width(offset, speed: float):
     """Metres of path that a detour by `offset` needs for someone at `speed` m/s.
 
     Its bends are no tighter than a radius of 4 m, and push sideways by no more than 1.5 m/s^2.
     """
     bend = min(0.25, 1.5 / max(speed, 0.1) ** 2)
-    return max(1.5, np.sqrt(5.7735 * abs(offset) / bend) / RISE)  # 10/sqrt(3): the quintic step's largest bend
+    return np.maximum(1.5, np.sqrt(5.7735 * np.abs(offset) / bend) / RISE)  # 10/sqrt(3): the quintic step's largest bend
 
 
 def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.ndarray:
