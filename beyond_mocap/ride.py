@@ -20,6 +20,7 @@ from .motion.motion import Motion, forward_kinematics
 from .motion.path import Path
 from .motion.terrain import Terrain
 from .polish.cycle import cycled
+from .polish.detour import with_detours
 from .polish.foot_ride import Ground, follow
 from .polish.loops import Loop, find_loops
 from .polish.path_end import Ending, ending
@@ -158,6 +159,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the path
     has no length.
     """
+    path = with_detours(path, settings.detours)
     arc = source.arc if path is source.path else ArcLength(path)
     residuals, seams, timing, end = _timed(source, path, arc, settings)
     rows = shown(residuals, timing.at)

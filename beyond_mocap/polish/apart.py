@@ -164,7 +164,7 @@ class _Search:
                 aside = np.concatenate([[0.0], way.aside(way.arc, change.detours), [0.0]])
                 most = np.abs(aside).max() / limits.detour
                 gone = 0.5 * np.abs(np.diff(aside)).sum()
-                left = 0.5 * np.abs(np.diff(np.minimum(aside, 0.0))).sum()
+                left = 0.5 * np.abs(np.diff(np.maximum(aside, 0.0))).sum()
                 cost += limits.detour_cost * (gone + _LEFT * left + _EVEN * limits.detour * most**2)
             self.costs[who, change] = cost
         return self.costs[who, change]
@@ -189,10 +189,10 @@ class _Search:
         """Each way to mend a collision: number of a body -> its change."""
         pair = [who for who in (collision.first, collision.second) if self.followers[who].path is not None]
         found = [self.wait(state, collision, who) for who in pair]
-        found += [self.round(state, collision, {who: side}) for who in pair for side in (1.0, -1.0)]
+        found += [self.round(state, collision, {who: side}) for who in pair for side in (-1.0, 1.0)]
         if len(pair) == 2:
             found += [self.round(state, collision, dict(zip(pair, sides)))
-                      for sides in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))]
+                      for sides in ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0))]
         found = [way for way in found if way is not None]
         return sorted(found, key=lambda way: self.more(state, way))[:_TRIED]
 
@@ -297,7 +297,7 @@ class _Search:
         """Whether a change keeps to the limits and leaves no loop in a bend."""
         way = self.followers[who].way
         aside = way.aside(way.arc, change.detours)
-        tight = (1.0 + way.bend * aside < _TIGHT) & (np.abs(aside) > 0.05)
+        tight = (1.0 - way.bend * aside < _TIGHT) & (np.abs(aside) > 0.05)
         return change.delay <= self.limits.delay + 1e-9 and np.abs(aside).max() <= self.limits.detour + 1e-3 and not tight.any()
 
     def smaller(self, state):

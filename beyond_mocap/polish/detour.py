@@ -1,7 +1,7 @@
 """Small detours of a path: it leaves its way sideways, goes along beside it, and comes back.
 
 A detour is (arc, width, offset) in metres: where its middle is along the path as it was, how much of the path it takes,
-and how far to the right (left: negative) the path goes at its middle. It rises and falls by the quintic step
+and how far to the left (right: negative) the path goes at its middle. It rises and falls by the quintic step
 6 q^5 - 15 q^4 + 10 q^3, whose slope and bend vanish at both ends, so that the path stays C2. Detours add up.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import InputError
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path, SplinePath
 
@@ -19,7 +20,7 @@ _STEADY = 0.3  # metres over which the way to the side is smoothed: an offset of
 
 
 def offsets(arc: np.ndarray, detours) -> np.ndarray:
-    """Metres (..., N) to the right at these arc lengths (..., N); the numbers of a detour may be arrays (..., 1)."""
+    """Metres (..., N) to the left at these arc lengths (..., N); the numbers of a detour may be arrays (..., 1)."""
     total = 0.0 * arc
     for middle, width, offset in detours:
         rest = np.minimum(np.maximum((0.5 * width - np.abs(arc - middle)) / (RISE * width), 0.0), 1.0)
@@ -52,9 +53,9 @@ def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.nda
     return _steady(_heading(along, spacing), _STEADY / spacing, closed)
 
 
-def right_of(heading: np.ndarray) -> np.ndarray:
-    """Unit vectors (N, 3), level, to the right of yaw angles (N,)."""
-    return np.stack([np.sin(heading), -np.cos(heading), np.zeros_like(heading)], axis=-1)
+def left_of(heading: np.ndarray) -> np.ndarray:
+    """Unit vectors (N, 3), level, to the left of yaw angles (N,)."""
+    return np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=-1)
 
 
 def _heading(along, spacing):
@@ -83,9 +84,13 @@ def _steady(heading, sigma, closed):
 def with_detours(path: Path, detours) -> Path:
     """The path with these detours [(arc, width, offset)], C2 as before, under the same parameters; see above.
 
-    Its ends move where a detour takes them in. Without detours it is `path` itself.
+    Its ends move where a detour takes them in. Without detours it is `path` itself. InputError where a detour is not three
+    finite numbers, the second positive.
     """
-    detours = [detour for detour in detours if detour[2] != 0.0 and detour[1] > 0.0]
+    for detour in detours:
+        if len(detour) != 3 or not np.isfinite(detour).all() or detour[1] <= 0.0:
+            raise InputError("detour", str(tuple(detour)), "arc, width and offset in metres, the width above 0")
+    detours = [detour for detour in detours if detour[2] != 0.0]
     length = ArcLength(path)
     if not detours or not length.length:
         return path
@@ -94,7 +99,7 @@ def with_detours(path: Path, detours) -> Path:
     parameters = _parameters(path, length)
     arc = length.at(parameters)
     aside = round_offsets(arc, detours, length.length) if path.closed else offsets(arc, detours)
-    return _through(parameters, path.at(parameters) + aside[:, None] * right_of(_smooth(grid, heading, arc)), path.closed)
+    return _through(parameters, path.at(parameters) + aside[:, None] * left_of(_smooth(grid, heading, arc)), path.closed)
 
 
 def _parameters(path, length):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path
-from .detour import headings, offsets, right_of, round_offsets
+from .detour import headings, offsets, left_of, round_offsets
 
 _SPACING = 0.1  # metres between the places at which the path is taken
 _PIECES = 24  # of a detour, when its length is taken
@@ -78,7 +78,7 @@ class Follower:
             arc = arc - way.extra(arc[0], aside) + way.extra(arc[0], old)
             aside = way.aside(arc, (*change.detours, *train))
         arc, shape = np.broadcast_to(arc, aside.shape).ravel(), (*aside.shape, 3)
-        places = _sampled(arc, way.arc, way.places) + aside.reshape(-1, 1) * _sampled(arc, way.arc, way.right)
+        places = _sampled(arc, way.arc, way.places) + aside.reshape(-1, 1) * _sampled(arc, way.arc, way.left)
         return places.reshape(shape) + _sampled(times, self.times, self.beside)
 
     def arc_at(self, time: float, change: Change = Change()) -> float:
@@ -97,7 +97,7 @@ class Way:
         self.arc = np.linspace(0.0, self.length, count + 1) if self.length else np.zeros(1)
         self.places = path.at(length.parameter(self.arc))
         heading = headings(self.places, self.arc[1], self.closed) if self.length else np.zeros(1)
-        self.right = right_of(heading)
+        self.left = left_of(heading)
         self.bend = np.gradient(heading, self.arc) if self.length else np.zeros(1)
 
     def places_at(self, arc: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ class Way:
     def with_detours_at(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
         """Places (N, 3) on the path with detours; arc as in `on_it`."""
         arc = self.on_it(arc, detours, by_arc)
-        aside = _sampled(arc, self.arc, self.right) * self.aside(arc, detours)[:, None]
+        aside = _sampled(arc, self.arc, self.left) * self.aside(arc, detours)[:, None]
         return _sampled(arc, self.arc, self.places) + aside
 
     def on_it(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
@@ -126,7 +126,7 @@ class Way:
         at = (low + wide * np.linspace(0.0, 1.0, _PIECES + 1)).ravel()
         at = np.unique(np.concatenate([[0.0, self.length], self._within(at, self.length)]))
         aside = self.aside(at, detours)
-        along = 1.0 + 0.5 * (aside[1:] + aside[:-1]) * np.interp(0.5 * (at[1:] + at[:-1]), self.arc, self.bend)
+        along = 1.0 - 0.5 * (aside[1:] + aside[:-1]) * np.interp(0.5 * (at[1:] + at[:-1]), self.arc, self.bend)
         step = np.hypot(np.diff(at) * along, np.diff(aside))
         return at, np.concatenate([[0.0], np.cumsum(step)])
 
@@ -134,12 +134,12 @@ class Way:
         """Metres (A, N) gone beyond those of the path at arc lengths (N,), since the first of them; aside: (A, N)."""
         step = np.diff(arc)
         bend = np.interp(0.5 * (arc[1:] + arc[:-1]), self.arc, self.bend)
-        along = step * (1.0 + 0.5 * (aside[:, 1:] + aside[:, :-1]) * bend)
+        along = step * (1.0 - 0.5 * (aside[:, 1:] + aside[:, :-1]) * bend)
         more = np.where(step > 0.0, np.hypot(along, np.diff(aside, axis=1)) - step, 0.0)
         return np.concatenate([np.zeros((len(aside), 1)), np.cumsum(more, axis=1)], axis=1)
 
     def aside(self, arc: np.ndarray, detours) -> np.ndarray:
-        """Metres (N,) to the right."""
+        """Metres (N,) to the left."""
         return round_offsets(arc, detours, self.length) if self.closed else offsets(arc, detours)
 
     def _within(self, arc, length):

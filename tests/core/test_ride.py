@@ -115,3 +115,12 @@ def test_settings_that_make_no_sense_are_refused(wrong):
 def test_one_frame_is_no_motion(walk):
     with pytest.raises(InputError):
         prepare(walk.frames(0, 1), RideSettings())
+
+
+def test_a_detour_takes_it_aside_and_back(source):
+    settings = RideSettings(plant=False, lean=False, detours=((2.5, 3.0, 0.4),))
+    around, ahead = (ride(source, straight(20.0), wanted) for wanted in (settings, RIGID))
+    assert around.origin[:, 1].max() == pytest.approx(0.4, abs=1e-3)
+    assert np.abs(around.origin[[0, -1], 1]).max() < 1e-4
+    assert np.allclose(around.arc, ahead.arc)
+    assert around.origin[-1, 0] < ahead.origin[-1, 0] - 0.05  # as fast as before, and a longer way
