@@ -20,7 +20,7 @@ SHORTEST = 0.2
 
 _SAMPLE = 1 / 4  # of the rounding, between samples of the line
 _PIECE = 1 / 2  # of the rounding, a piece of the spline
-_MOST_PIECES = 4000
+_LONGEST = 5000  # roundings: longer lines are rounded more
 _HAIRPIN = 5.0  # roundings from where a line turns back to where it begins to swing out
 _LARGEST = (6 / 7) ** 3 / np.sqrt(7)  # value of x (1 - x^2)^3
 _ORDER = 3  # the change of the bend is what costs, so that a bend that stays is kept to the line's very ends
@@ -36,10 +36,10 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     """
     line = _checked(line, name, closed)
     length = _along(line)[-1]
-    rounding = min(rounding, length / 12)
+    rounding = max(min(rounding, length / 12), length / _LONGEST)
     sampled, along = _resampled(_thinned(line, rounding * _SAMPLE), rounding * _SAMPLE)
     sampled = _with_hairpins(sampled, along, rounding, closed)
-    pieces = int(np.clip(np.ceil(along[-1] / (rounding * _PIECE)), 8, _MOST_PIECES))
+    pieces = max(int(np.ceil(along[-1] / (rounding * _PIECE))), 8)
     if closed:
         spline = smoothing_spline(
             sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True, domain=(0.0, along[-1])
@@ -208,6 +208,5 @@ def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
 def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Even samples (M, 3) of a polyline about `step` metres apart, and metres (M,) along it."""
     along = _along(line)
-    count = min(int(np.ceil(along[-1] / step)) + 1, 3 * _MOST_PIECES)
-    even = np.linspace(0.0, along[-1], max(count, 16))
+    even = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step)) + 1, 16))
     return np.stack([np.interp(even, along, column) for column in line.T], axis=1), even

@@ -142,7 +142,7 @@ def test_the_seam_of_a_closed_line_may_be_a_turn():
 
 
 def test_noise_on_a_dense_line_is_no_way():
-    x = np.linspace(0.0, 10.0, 10_000)
+    x = np.linspace(0.0, 10.0, 10_001)
     line = np.stack([x, 2 * np.sin(0.7 * x), 0 * x], axis=1)
     noisy = line + np.random.default_rng(1).normal(size=line.shape) * 1e-3
     noisy[[0, -1]] = line[[0, -1]]
