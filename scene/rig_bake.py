@@ -31,7 +31,7 @@ LEGS_ALIKE = (0.8, 1.25)
 _FLOOR = (-0.01, 0.05)  # heights of standing toe joints, metres, whose soles are on the scene's own ground
 _MOST_LEAN = np.radians(30.0)
 _MISS, _OFF = 0.005, 1e-3  # metres that are told
-_IK_FOLLOWERS = (
+IK_FOLLOWERS = (
     (re.compile(r"(?i)^(.*:)?(ik_foot|foot_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "foot"),
     (re.compile(r"(?i)^(.*:)?(ik_hand|hand_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "hand"),
     (re.compile(r"(?i)^(.*:)?toe_ik(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "toe"),
@@ -145,7 +145,7 @@ class Driven:
             if constraint.pole_target == self.rig and constraint.pole_subtarget:
                 found[constraint.pole_subtarget] = f"{side} {upper}"
         for bone in self.rig.data.bones:
-            for pattern, part in _IK_FOLLOWERS:
+            for pattern, part in IK_FOLLOWERS:
                 if pattern.match(bone.name):
                     side = "left" if re.search(r"(?i)(l|left)$", bone.name) else "right"
                     found.setdefault(bone.name, f"{side} {part}")
@@ -437,7 +437,7 @@ def _shifted_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.nd
 def placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How the armature object lies in the scene at each frame: turns (F, 4) and origins (F, 3) metres."""
     still = armature.placement(rig, scene)
-    if not _is_carried(rig):
+    if not is_carried(rig):
         return np.repeat(still.rotation[None], len(frames), axis=0), np.repeat(still.origin[None], len(frames), axis=0)
     now, subframe, rows = scene.frame_current, scene.frame_subframe, []
     for frame in frames:
@@ -449,7 +449,7 @@ def placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray
     return quaternion.continuous(table[:, :4]), table[:, 4:] / units_per_metre(scene)
 
 
-def _is_carried(rig: bpy.types.Object) -> bool:
+def is_carried(rig: bpy.types.Object) -> bool:
     """Whether something moves the object: its own constraints, or anything about one of its parents."""
     if len(rig.constraints):
         return True
@@ -474,13 +474,13 @@ def _curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.ndarr
                 rotation = -rotation
             found[f"{path}.rotation_quaternion"] = (name, rotation)
         elif mode == "AXIS_ANGLE":
-            found[f"{path}.rotation_axis_angle"] = (name, _axis_angles(rotation))
+            found[f"{path}.rotation_axis_angle"] = (name, axis_angles(rotation))
         else:
             found[f"{path}.rotation_euler"] = (name, euler_curves(rotation, mode))
     return found
 
 
-def _axis_angles(rotation: np.ndarray) -> np.ndarray:
+def axis_angles(rotation: np.ndarray) -> np.ndarray:
     """Angle and axis (F, 4) of sign-continuous rotations (F, 4)."""
     length = np.linalg.norm(rotation[:, 1:], axis=1)
     axis = np.where(length[:, None] > 1e-9, rotation[:, 1:] / np.maximum(length, 1e-9)[:, None], [0.0, 1.0, 0.0])

@@ -194,7 +194,7 @@ class Controls:
     @contextmanager
     def _still(self):
         """The rig without its animation, its switches on FK, overrides silent; all as it was afterwards."""
-        before = _Kept(self.rig, self.bones, self.overrides)
+        before = Kept(self.rig, self.bones, self.overrides)
         try:
             before.silence()
             for switch in self.switches:
@@ -207,7 +207,7 @@ class Controls:
             before.bring_back()
 
 
-class _Kept:
+class Kept:
     """Animation, channels and influences of a rig, kept to be brought back."""
 
     def __init__(self, rig: bpy.types.Object, bones: list[str], overrides: list[Override]):

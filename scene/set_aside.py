@@ -15,7 +15,7 @@ STANDS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_an
 def put_aside(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
     """Keep what `target` plays and let it play nothing: its action comes off, its NLA tracks fall silent."""
     before.kept, before.made = True, False
-    before.stance = json.dumps(_stance(target))
+    before.stance = json.dumps(stance_of(target))
     data = target.animation_data
     before.animated = data is not None
     if data is None:
@@ -44,7 +44,7 @@ def bring_back(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -
             data.action_slot = next((s for s in before.action.slots if s.identifier == before.slot), None)
         play_as_before(before, data)
     if before.stance:
-        _stand(target, json.loads(before.stance))
+        stand(target, json.loads(before.stance))
     clear(before)
 
 
@@ -79,7 +79,8 @@ def purge_action(action: bpy.types.Action, mark: str) -> None:
         action.use_fake_user = True
 
 
-def _stance(target: bpy.types.Object) -> dict:
+def stance_of(target: bpy.types.Object) -> dict:
+    """How an object and its bones stand: name ("" for the object) -> rotation mode and STANDS."""
     bones = target.pose.bones if target.pose is not None else ()
     return {"": _stands(target), **{f"{bone.name}": _stands(bone) for bone in bones}}
 
@@ -88,7 +89,8 @@ def _stands(thing) -> list:
     return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
 
 
-def _stand(target: bpy.types.Object, stance: dict) -> None:
+def stand(target: bpy.types.Object, stance: dict) -> None:
+    """Let object and bones stand as `stance_of` said."""
     for name, (mode, *values) in stance.items():
         thing = target if not name else target.pose.bones.get(name)
         if thing is None:

@@ -27,11 +27,12 @@ MARK = "beyond_mocap_ride"
 @dataclass(frozen=True, eq=False)
 class Read:
     """A motion in metres of the scene's world at the scene's rate, its first frame on scene frame `first`; standing
-    (T, 2, 2) bool, left and right, heel and toe, where it is known."""
+    (T, 2, 2) bool, left and right, heel and toe, where it is known; told: lines for the user."""
 
     motion: Motion
     first: int
     standing: np.ndarray | None = None
+    told: tuple[str, ...] = ()
 
 
 class Carrier(ABC):
@@ -189,7 +190,9 @@ class PlainCarrier(Carrier):
 
 def carrier_of(body: bpy.types.Object) -> Carrier:
     """What carries this armature's motion."""
-    return PlainCarrier(body)
+    from .rigs import RigCarrier, rides_as_rig  # which build on what is above
+
+    return RigCarrier(body) if rides_as_rig(body) else PlainCarrier(body)
 
 
 def _path(bone: bpy.types.PoseBone, what: str) -> str:

@@ -90,7 +90,7 @@ def lay(sheet: Sheet, first: int, wanted: dict[Place, np.ndarray], now: str, dig
     for place in (held if sure else sheet.curves):
         if place not in wanted and place in sheet.sources:
             _restore(sheet, place)
-    count = len(next(iter(wanted.values())))
+    count = len(next(iter(wanted.values()), ()))
     keys = np.empty((count, 2), np.float32)
     keys[:, 0] = first + np.arange(count)
     for place, values in wanted.items():

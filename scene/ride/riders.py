@@ -97,7 +97,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
         carrier.write(scene, known.read, ridden, digest)
     _counted += 1
     _shown[body.session_uid] = digest, Shown(known.read.first, known.read.motion.fps, known.core, path, ridden, _counted)
-    _tell(ridden_by, "\n".join((*drawn.notes, *ridden.warnings)), _figures(known.core, ridden))
+    _tell(ridden_by, "\n".join((*drawn.notes, *known.read.told, *ridden.warnings)), _figures(known.core, ridden))
     return True
 
 

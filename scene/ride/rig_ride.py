@@ -1,0 +1,262 @@
+"""A rig of any kind carried along: what its controls have to be so that it shows a motion that has been ridden.
+
+Every part of the body has moved by some rigid motion D(t) from where it was in the source; so has the rig as a whole. A
+control that goes with part o and rides on parts b (its turn) and q (its place) gets, with B its frame at rest and M its
+pose in the source, turn B'^-1 D_o M where B' = D_b B, and place likewise. Where o, b and q are moved alike its channels
+stay as they are, to the last bit: which is why a rig that hangs on one root needs that root alone, and its own path
+changes nothing. No frame is asked of Blender again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics
+from ..rig_bake import axis_angles, euler_curves
+from .rig_look import Look
+from .rig_parts import Parts, in_world, rotations
+from .rig_study import STATIC, Rides
+
+WHOLE, OBJECT = "whole", "object"
+_SAME = 1e-6
+_STAYS, _LEAST_WAY = 0.5, 1.0  # of the body's way, metres: what falls behind by more does not travel with it
+
+
+@dataclass(frozen=True)
+class Control:
+    """One control. own, turn, place, axes: the groups with which it goes, on which its turn and its place ride, and along
+    which its location is counted; slides: whether its location is written."""
+
+    name: str
+    own: str
+    turn: str
+    place: str
+    axes: str
+    slides: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """For each group of a rig what carries it from the source to where it is now: x -> turn (x - before) + after, arrays
+    (N, 4), (N, 3), (N, 3) metres."""
+
+    turn: dict[str, np.ndarray]
+    before: dict[str, np.ndarray]
+    after: dict[str, np.ndarray]
+    known: dict = field(default_factory=dict)
+
+    def point(self, group: str, points: np.ndarray) -> np.ndarray:
+        """Points (N, 3) that go with a group."""
+        return quaternion.rotate(self.turn[group], points - self.before[group]) + self.after[group]
+
+    def alike(self, one: str, other: str) -> bool:
+        """Whether two groups are carried alike: to a ten-thousandth of a degree and of a millimetre."""
+        if one == other:
+            return True
+        if (known := self.known.get((one, other))) is None:
+            same = np.abs(np.abs(self.between(one, other)[:, 0]) - 1.0).max() <= 1e-12
+            same = same and np.abs(self.point(one, self.before[other]) - self.after[other]).max() < 1e-7
+            known = self.known[one, other] = bool(same)
+        return known
+
+    def between(self, one: str, other: str) -> np.ndarray:
+        """How a group turns (N, 4) within another: what is left of its turn where that of `one` is taken off."""
+        if (known := self.known.get((one, other, "turn"))) is None:
+            known = quaternion.multiply(quaternion.inverse(self.turn[one]), self.turn[other])
+            self.known[one, other, "turn"] = known
+        return known
+
+
+class Rows:
+    """Source frames (N,) of the frames shown, in general fractional, counted from the first that was seen."""
+
+    def __init__(self, at: np.ndarray, count: int):
+        at = np.clip(at, 0.0, count - 1.0)
+        near = np.round(at)
+        self.at, self.whole = at, bool(np.abs(at - near).max(initial=0.0) < 1e-6)
+        self.low = near.astype(int) if self.whole else np.minimum(np.floor(at).astype(int), max(count - 2, 0))
+        self.weight = np.zeros(len(at)) if self.whole else at - self.low
+        self.same = self.whole and len(at) == count and np.array_equal(self.low, np.arange(count))
+
+    def numbers(self, table: np.ndarray) -> np.ndarray:
+        """A table (F, ...) of numbers there."""
+        if self.whole:
+            return table[self.low]
+        weight = self.weight.reshape(-1, *[1] * (table.ndim - 1))
+        return (1.0 - weight) * table[self.low] + weight * table[np.minimum(self.low + 1, len(table) - 1)]
+
+    def turns(self, table: np.ndarray) -> np.ndarray:
+        """A table (F, 4) of rotations there."""
+        if self.whole:
+            return table[self.low]
+        return quaternion.slerp(table[self.low], table[np.minimum(self.low + 1, len(table) - 1)], self.weight)
+
+
+class Carried:
+    """A rig that has been looked at: what its controls are, and what they have to be."""
+
+    def __init__(self, rig: bpy.types.Object, parts: Parts, seen: Look, rides: Rides, object_keyed: bool, motion: Motion,
+                 units: float):
+        """motion: what the parts show. object_keyed: whether the object itself is animated."""
+        self.seen, self.parts, self.motion, self.units = seen, parts, motion, units
+        self.joint = {part: number for number, part in enumerate(parts.shown)}
+        self.places, self.world = forward_kinematics(motion)
+        self.lie = rotations(seen.lies), seen.lies[:, :3, 3] / units
+        self.object_goes = object_keyed and self._travels(self.lie[1])
+        self.group: dict[str, str] = {bone: part for table in (parts.shown, parts.controls) for part, bone in table.items()}
+        self.controls = self._sorted(rig, rides)
+        self.tables = {control.name: self._table(rig, control) for control in self.controls}
+
+    def _travels(self, places: np.ndarray) -> bool:
+        """Whether something at places (F, 3) goes where the body goes."""
+        way = self.motion.root_positions[:, :2]
+        behind = np.ptp(places[:, :2] - way, axis=0).max()
+        return bool(behind <= max(_STAYS * np.ptp(way, axis=0).max(), _LEAST_WAY))
+
+    def _sorted(self, rig: bpy.types.Object, rides: Rides) -> list[Control]:
+        """All firm controls with their groups."""
+        known = dict(self.group)
+        places, _ = in_world(self.seen, [self.seen.number(name) for name in rides.controls], self.units)
+
+        def group(number: int, trail: tuple = ()) -> str:
+            """The group of a carrier."""
+            if number == STATIC or number in trail:
+                return OBJECT
+            name = rides.carriers[number]
+            if name in known:
+                return known[name]
+            found = group(int(rides.turn_of[number]), (*trail, number))
+            goes = self.parts.follows.get(name)
+            if goes is not None and (goes.endswith("toe") or goes.partition(" ")[0] != found.partition(" ")[0]):
+                found = goes
+            elif found == OBJECT and not self.object_goes and self._travels(places[:, number]):
+                found = WHOLE
+            known[name] = found
+            return found
+
+        found = []
+        for number, name in enumerate(rides.controls):
+            if not rides.firm[number]:
+                continue
+            own, turn, place, axes = group(number), *(group(int(table[number])) for table in (
+                rides.turn_of, rides.place_of, rides.parent_of))
+            limb = name in self.parts.controls.values() and name != self.parts.controls.get("hips")
+            slides = own != place and not limb and not rig.data.bones[name].use_connect
+            if {turn, place} != {own}:
+                found.append(Control(name, own, turn, place, axes, slides))
+        return [*found, *self._bent(rig)]
+
+    def _bent(self, rig: bpy.types.Object) -> list[Control]:
+        """Bones of legs and arms that inverse kinematics without a pole bends: the solver starts from the bones' own turns,
+        so that the pose that is wanted is set as where it starts."""
+        found = []
+        for bone in rig.pose.bones:
+            for one in bone.constraints:
+                if one.type == "IK" and not one.mute and one.influence > 0.0 and one.pole_target is None:
+                    chain = [bone, *bone.parent_recursive][: one.chain_count or None]
+                    for held in reversed(chain):
+                        above = self.group.get(held.parent.name) if held.parent is not None else None
+                        if held.name in self.parts.shown.values() and above is not None:
+                            found.append(Control(held.name, self.group[held.name], above, above, above, False))
+        self.held = {control.name for control in found}
+        return found
+
+    def _table(self, rig: bpy.types.Object, control: Control) -> dict[str, np.ndarray]:
+        """Over the source's frames: turn of the control's base and its own (F, 4), its place and its base's (F, 3) m, the
+        directions of its location's axes (F, 3, 3) m a unit, its location (F, 3)."""
+        number = self.seen.number(control.name)
+        places, turn = in_world(self.seen, [number], self.units)
+        own, location = self.seen.own(number), self.seen.channels["location"][:, number]
+        if control.name in self.held:
+            bone = rig.data.bones[control.name]
+            rest = quaternion.from_matrix(np.array((bone.parent.matrix_local.inverted() @ bone.matrix_local).to_3x3()))
+            _, above = in_world(self.seen, [self.seen.number(bone.parent.name)], self.units)
+            own = quaternion.multiply(quaternion.inverse(quaternion.multiply(above[:, 0], rest)), turn[:, 0])
+        base = quaternion.multiply(turn[:, 0], quaternion.inverse(own))
+        axes = self.seen.lies[:, :3, :3] @ self._axes(rig, control.name, base) / self.units
+        rests = places[:, 0] - np.einsum("fij,fj->fi", axes, location)
+        return {"base": quaternion.continuous(base), "own": quaternion.continuous(own), "place": places[:, 0],
+                "rests": rests, "axes": axes, "location": location}  # fmt: skip
+
+    def _axes(self, rig: bpy.types.Object, name: str, base: np.ndarray) -> np.ndarray:
+        """The directions (F, 3, 3) of a bone's location in the armature's space, as Blender composes poses."""
+        bone = rig.data.bones[name]
+        if len(rig.pose.bones[name].constraints):
+            return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(self.lie[0]), base))
+        own = np.array(bone.matrix_local.to_3x3()) if bone.use_local_location else np.eye(3)
+        if bone.parent is None:
+            return np.broadcast_to(own, (len(base), 3, 3))
+        above = self.seen.poses[:, self.seen.number(bone.parent.name), :3, :3]
+        if not bone.use_local_location:
+            return above
+        return above @ np.linalg.inv(np.array(bone.parent.matrix_local.to_3x3())) @ own
+
+    def moves(self, motion: Motion, rigid: Motion, rows: Rows, lies: np.ndarray | None) -> Moves:
+        """What carries each group. motion: as ridden; rigid: the same before leaning and planting; lies (N, 4, 4): the
+        object in the world on the frames shown, None where it stays as in the source's frames."""
+        places, world = forward_kinematics(motion)
+        was, had = self.places, self.world
+        if rows.whole:
+            was, had = was[rows.low], had[rows.low]
+        else:
+            root, local = at_frames(self.motion, rows.at)
+            was, had = forward_kinematics(Motion(self.motion.skeleton, root, local, self.motion.fps))
+        used = {group for one in self.controls for group in (one.own, one.turn, one.place, one.axes)}
+        turn, before, after = {}, {}, {}
+        for part in used & set(self.joint):
+            joint = self.joint[part]
+            turn[part] = quaternion.multiply(world[:, joint], quaternion.inverse(had[:, joint]))
+            before[part], after[part] = was[:, joint], places[:, joint]
+        turn[WHOLE] = quaternion.multiply(rigid.rotations[:, 0], quaternion.inverse(had[:, 0]))
+        before[WHOLE], after[WHOLE] = was[:, 0], rigid.root_positions
+        if self.object_goes:
+            turn[OBJECT], before[OBJECT], after[OBJECT] = turn[WHOLE], before[WHOLE], after[WHOLE]
+        else:
+            then, origin = rows.turns(self.lie[0]), rows.numbers(self.lie[1])
+            now = then if lies is None else rotations(lies)
+            turn[OBJECT] = quaternion.multiply(now, quaternion.inverse(then))
+            before[OBJECT], after[OBJECT] = origin, origin if lies is None else lies[:, :3, 3] / self.units
+        return Moves(turn, before, after)
+
+    def changed(self, moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
+        """Of each control what has to be other than in the source: (bone, "turn") -> rotations (N, 4) of its own
+        channels, (bone, "location") -> (N, 3)."""
+        found = {}
+        for one in self.controls:
+            if all(moves.alike(one.own, other) for other in (one.turn, one.place)):
+                continue
+            table = self.tables[one.name]
+            base, own = rows.turns(table["base"]), rows.turns(table["own"])
+            pose = quaternion.multiply(moves.between(one.turn, one.own), quaternion.multiply(base, own))
+            turned = quaternion.multiply(quaternion.inverse(base), pose)
+            if one.name in self.held or np.abs(np.abs(np.sum(turned * own, axis=1)) - 1.0).max() > 1e-14:
+                found[one.name, "turn"] = turned
+            if one.slides:
+                rests = moves.point(one.place, rows.numbers(table["rests"]))
+                away = moves.point(one.own, rows.numbers(table["place"])) - rests
+                back = quaternion.inverse(moves.turn[one.axes])
+                location = _solved(rows.numbers(table["axes"]), quaternion.rotate(back, away))
+                if np.abs(location - rows.numbers(table["location"])).max() > _SAME:
+                    found[one.name, "location"] = location
+        return found
+
+
+def _solved(axes: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """What makes ways (N, 3) along axes (N, 3, 3)."""
+    return np.linalg.solve(axes, way[..., None])[..., 0]
+
+
+def channel_values(mode: str, turned: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """Values of a bone's rotation channel in its own mode; like (N, n): the source's, whose signs and turns are kept."""
+    if mode == "QUATERNION":
+        turned = quaternion.continuous(turned)
+        return turned if np.sum(turned[0] * like[0]) >= 0.0 else -turned
+    if mode == "AXIS_ANGLE":
+        return axis_angles(quaternion.continuous(turned))
+    angles = euler_curves(turned, mode)
+    return angles + 2.0 * np.pi * np.round((like[0] - angles[0]) / (2.0 * np.pi))
+
