@@ -120,3 +120,314 @@ def test_the_body_goes_where_the_curve_is(scene, part):
         assert body.beyond_mocap_ride.told == ""
         assert max(to_path(riders, body, frame) for frame in (1, 15, 30)) < 0.12
     assert pelvis(body, 10)[2] > 1.5
+
+
+def test_keys_are_plain_and_only_of_what_moves_otherwise(scene, part):
+    """A hand is not touched by the path: its few keys stay."""
+    channels, riders = part("channels"), part("ride.riders")
+    body = walker()
+    bone = next(bone for bone in body.pose.bones if "hand" in bone.name.lower())
+    action, slot = channels.playing(body)
+    curve = channels.curves(action, slot)[f'pose.bones["{bone.name}"].rotation_quaternion', 1]
+    while len(curve.keyframe_points) > 3:
+        curve.keyframe_points.remove(curve.keyframe_points[1], fast=True)
+    curve.update()
+    before = channels.keys_of(curve)
+    bpy.ops.beyond_mocap.edit_path()
+    bpy.context.object.location.y = 2.0
+    bpy.context.view_layer.update()
+    riders.renew(scene, body)
+    mine = channels.curves(*channels.playing(body))
+    now = channels.keys_of(mine[f'pose.bones["{bone.name}"].rotation_quaternion', 1])
+    assert all(np.array_equal(before[name], now[name]) for name in before)
+    keys = channels.keys_of(mine[f'pose.bones["{body.pose.bones[0].name}"].location', 1])
+    assert np.all(keys["interpolation"] == channels.LINEAR) and np.all(np.diff(keys["co"][:, 0]) == 1)
+    assert np.all(np.isfinite(keys["handle_left"])) and np.abs(keys["handle_left"] - keys["co"]).max() < 2.0
+
+
+def test_other_channels_are_shown_at_the_frames_that_are_shown(scene, part):
+    """A switch, a slider, and a bone that is not of the body, at twice the speed; and as they were at the old speed."""
+    channels, live = part("channels"), part("ride.live")
+    body = walker()
+    body["switch"], body["slider"] = 0, 0.0
+    for frame, switch, slider in ((1, 0, 0.0), (21, 1, 2.0), (41, 0, 4.0)):
+        body["switch"], body["slider"] = switch, slider
+        body.keyframe_insert('["switch"]', frame=frame)
+        body.keyframe_insert('["slider"]', frame=frame)
+    slot = channels.playing(body)[1]
+    was = channels.curves(channels.playing(body)[0], slot)
+    slider, steps = (channels.sample(was[f'["{name}"]', 0], np.arange(1.0, 42.0)) for name in ("slider", "switch"))
+    before = {place: channels.keys_of(curve)["co"].tobytes() for place, curve in was.items()}
+    bpy.ops.beyond_mocap.edit_path()
+    ride = body.beyond_mocap_ride
+    last = lambda: channels.keyed_range({k: c for k, c in mine().items() if "pose" in k[0]})[1]
+    mine = lambda: channels.curves(*channels.playing(body))
+    whole = last()
+    ride.speed = 2.0
+    live.follow(scene)
+    assert last() == pytest.approx(whole / 2, abs=1) and ride.told == ""
+    found = channels.sample(mine()['["slider"]', 0], np.arange(1.0, 20.0))
+    np.testing.assert_allclose(found, slider[0:37:2], atol=1e-4)
+    switch = channels.sample(mine()['["switch"]', 0], np.arange(1.0, 20.0))
+    assert set(switch) == {0.0, 1.0} and np.array_equal(switch, steps[0:37:2])
+    ride.speed = 1.0
+    live.follow(scene)
+    now = {place: channels.keys_of(curve)["co"].tobytes() for place, curve in mine().items()}
+    same = [place for place in now if now[place] == before.get(place)]
+    assert ('["slider"]', 0) in same and ('["switch"]', 0) in same and len(same) > 0.5 * len(now)
+    assert last() == whole
+
+
+@pytest.mark.parametrize("mode", ["NATIVE", "XYZ", "ZYX", "QUATERNION"])
+def test_the_rotation_mode_stays(scene, part, mode):
+    """Blender's own import, Euler angles of any order; no channel jumps, none is no number."""
+    channels, riders = part("channels"), part("ride.riders")
+    bpy.ops.import_anim.bvh(filepath=str(SAMPLE / "walking_1_2.bvh"), global_scale=0.01, rotate_mode=mode,
+                            axis_forward="-Z", axis_up="Y", use_fps_scale=False)
+    body = bpy.context.object
+    modes = [bone.rotation_mode for bone in body.pose.bones]
+    scene.frame_set(1)
+    before = bits(part, body)
+    round_about = circle()
+    choose(body, round_about)
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    assert body.beyond_mocap_ride.curve == round_about and body.beyond_mocap_ride.told == ""
+    assert [bone.rotation_mode for bone in body.pose.bones] == modes
+    steps = [np.abs(np.diff(channels.keys_of(curve)["co"][:, 1])).max()
+             for (path, _), curve in channels.curves(*channels.playing(body)).items() if "rotation" in path]
+    assert max(steps) < 1.0
+    assert max(to_path(riders, body, frame) for frame in (40, 20, 1)) < 0.12
+    choose(body)
+    bpy.ops.beyond_mocap.leave_path()
+    assert bits(part, body) == before
+
+
+def test_metres_and_seconds_are_the_scene_s(scene, part):
+    """A film's frame rate, centimetres, an armature that is turned, scaled and far away: the body is on the curve."""
+    riders = part("ride.riders")
+    scene.render.fps, scene.render.fps_base = 24, 1.001
+    scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.01
+    body = walker()
+    body.location, body.rotation_euler, body.scale = (500.0, -200.0, 30.0), (0.0, 0.0, 2.0), (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    place = pelvis(body, 10)
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    np.testing.assert_allclose(pelvis(body, 10), place, atol=6.0)
+    drawn = bpy.context.object
+    drawn.matrix_world = drawn.matrix_world.copy()
+    drawn.location.y += 300.0
+    drawn.rotation_euler[2] = 1.0
+    assert bpy.ops.beyond_mocap.update_path() == {"FINISHED"}
+    line = riders.shown(body).line
+    assert np.linalg.norm(line[:, :2] - pelvis(body, 10)[:2] / 100, axis=1).min() < 0.12
+    figures = riders.shown(body).ridden
+    assert figures.motion.fps == pytest.approx(24 / 1.001)
+
+
+def test_two_riders_each_on_his_own_or_both_on_one(scene, part):
+    live, riders = part("ride.live"), part("ride.riders")
+    first, second = walker(), walker("jogging_2_9")
+    choose(first, second)
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    curves = [body.beyond_mocap_ride.curve for body in (first, second)]
+    assert curves[0] != curves[1] and bpy.context.object == curves[0]
+    curves[1].location.y += 1.0
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 1
+    choose(first, second)
+    assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
+    shared = circle()
+    choose(first, second, shared)
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    assert first.beyond_mocap_ride.curve == second.beyond_mocap_ride.curve == shared
+    shared.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 2
+    second.beyond_mocap_ride.delay = 2.0
+    assert live.follow(scene) == 1
+    assert max(to_path(riders, body, frame) for body in (first, second) for frame in (1, 30)) < 0.15
+    choose(shared)
+    assert bpy.ops.beyond_mocap.bake_path() == {"FINISHED"}
+    assert not first.beyond_mocap_ride.on and not second.beyond_mocap_ride.on and bpy.context.object in (first, second)
+
+
+BAD = {"one point": ([(0, 0, 0)], "no line"), "repeated": ([(1, 1, 0)] * 4, "all its points are one"),
+       "short": ([(0, 0, 0), (0.01, 0, 0)], "0.01 m long")}
+ODD = {"repeated points": [(0, 0, 0), (0, 0, 0), (2, 0, 0), (2, 0, 0), (4, 1, 0)],
+       "cusp": [(0, 0, 0), (4, 0, 0), (0, 0.0, 0)],
+       "tiny loop": [(0, 0, 0), (2, 0, 0), (2.1, 0.1, 0), (2, 0.2, 0), (1.9, 0.1, 0), (2, 0, 0), (4, 0, 0)],
+       "vertical": [(0, 0, 0), (0, 0, 2), (0, 0, 5)],
+       "wall in the way": [(0, 0, 0), (2, 0, 0), (2, 0, 3), (4, 0, 3)]}
+
+
+def drawn(points, kind="POLY"):
+    data = bpy.data.curves.new("Odd", "CURVE")
+    data.dimensions = "3D"
+    spline = data.splines.new(kind)
+    spline.points.add(len(points) - 1)
+    for point, place in zip(spline.points, points):
+        point.co = (*place, 1.0)
+    thing = bpy.data.objects.new("Odd", data)
+    bpy.context.scene.collection.objects.link(thing)
+    bpy.context.view_layer.update()
+    return thing
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_curve_that_is_no_path_is_told_and_the_last_good_motion_stays(scene, part, name):
+    live = part("ride.live")
+    points, line = BAD[name]
+    body = walker()
+    before, odd = bits(part, body), drawn(points)
+    choose(body, odd)
+    with pytest.raises(RuntimeError, match=line):
+        bpy.ops.beyond_mocap.edit_path()
+    assert bits(part, body) == before and not body.beyond_mocap_ride.on and body.beyond_mocap_ride.curve is None
+    choose(body)
+    bpy.ops.beyond_mocap.edit_path()
+    before = bits(part, body)
+    body.beyond_mocap_ride.curve = odd
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 0
+    assert line in body.beyond_mocap_ride.told and "\n" not in body.beyond_mocap_ride.told
+    assert bits(part, body) == before
+    bpy.data.objects.remove(odd)
+    assert live.follow(scene) == 0 and "its curve is gone" in body.beyond_mocap_ride.told
+    assert bits(part, body) == before
+
+
+@pytest.mark.parametrize("kind", ["POLY", "NURBS"])
+@pytest.mark.parametrize("name", ODD)
+def test_an_odd_curve_gives_numbers(scene, part, name, kind):
+    channels = part("channels")
+    body = walker()
+    choose(body, drawn(ODD[name], kind))
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    for curve in channels.curves(*channels.playing(body)).values():
+        assert np.isfinite(channels.keys_of(curve)["co"]).all()
+
+
+def test_saved_riders_are_alive_again(scene, part, tmp_path):
+    live, riders = part("ride.live"), part("ride.riders")
+    body = walker()
+    before = bits(part, body)
+    bpy.ops.beyond_mocap.edit_path()
+    bpy.context.object.location.y += 1.0
+    bpy.ops.beyond_mocap.update_path()
+    name, after = body.name, bits(part, body)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ridden.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "ridden.blend"))
+    scene, body = bpy.context.scene, bpy.data.objects[name]
+    assert riders.shown(body) is None
+    assert live.follow(scene) == 1 and bits(part, body) == after and riders.shown(body) is not None
+    body.beyond_mocap_ride.curve.location.y += 1.0
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 1 and bits(part, body) != after
+    choose(body)
+    bpy.ops.beyond_mocap.leave_path()
+    assert bits(part, body) == before
+
+
+def test_a_rider_appended_to_another_file_rides_there(scene, part, tmp_path):
+    live = part("ride.live")
+    body = walker()
+    before = bits(part, body)
+    bpy.ops.beyond_mocap.edit_path()
+    name = body.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ridden.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.context.scene.render.fps = 30
+    with bpy.data.libraries.load(str(tmp_path / "ridden.blend")) as (_, wanted):
+        wanted.objects = [name, f"{name} path"]
+    for thing in wanted.objects:
+        bpy.context.scene.collection.objects.link(thing)
+    body, drawn = wanted.objects
+    drawn.location.y += 1.0
+    bpy.context.view_layer.update()
+    assert live.follow(bpy.context.scene) == 1 and body.beyond_mocap_ride.told == ""
+    choose(body)
+    bpy.ops.beyond_mocap.leave_path()
+    assert bits(part, body) == before
+
+
+def test_undo_brings_curve_and_motion_back_together(scene, part):
+    """A point pulled, followed by hand as the timer does, then a step: undo, redo, and the rider is up to date each time."""
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    name = body.name
+    states = []
+    bpy.ops.ed.undo_push(message="begun")
+    for move in (1.0, 2.0):
+        bpy.data.objects[name].beyond_mocap_ride.curve.data.splines[0].bezier_points[1].co.y += move
+        bpy.context.view_layer.update()
+        assert live.follow(bpy.context.scene) == 1
+        bpy.ops.ed.undo_push(message=f"moved {move}")
+        states.append(bits(part, bpy.data.objects[name])[:3])
+    bpy.ops.ed.undo()
+    live.follow(bpy.context.scene)
+    assert bits(part, bpy.data.objects[name])[:3] == states[0]
+    bpy.ops.ed.redo()
+    live.follow(bpy.context.scene)
+    assert bits(part, bpy.data.objects[name])[:3] == states[1]
+    bpy.ops.ed.undo()
+    bpy.data.objects[name].beyond_mocap_ride.curve.data.splines[0].bezier_points[1].co.y += 2.0
+    bpy.context.view_layer.update()
+    live.follow(bpy.context.scene)
+    assert bits(part, bpy.data.objects[name])[:3] == states[1]
+
+
+def test_kept_is_an_ordinary_action_and_the_original_stays_in_the_file(scene, part, tmp_path):
+    body = walker()
+    original = body.animation_data.action.name
+    bpy.ops.beyond_mocap.edit_path()
+    bpy.context.object.location.y += 2.0
+    bpy.ops.beyond_mocap.update_path()
+    bpy.ops.beyond_mocap.bake_path()
+    kept = body.animation_data.action
+    assert not body.beyond_mocap_ride.on and not [name for name in kept.keys() if "ride" in name]
+    assert bpy.data.actions[original].use_fake_user and bpy.context.object == body
+    name, after = body.name, bits(part, body)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
+    assert bits(part, bpy.data.objects[name]) == after and original in bpy.data.actions
+
+
+def test_button_and_function_give_the_same(scene, part, core):
+    """What is written is what the core says, for the motion and the curve as they are read."""
+    action, curve = part("action"), part("ride.curve")
+    body, round_about = walker(), circle()
+    motion = action.read(body, scene)
+    recipe = core("ride")
+    settings = recipe.RideSettings(speed=1.25, lean=False, cycle=True)
+    wanted = recipe.ride(recipe.prepare(motion, settings), curve.read(scene, round_about).path(), settings).motion
+    body.beyond_mocap_ride.speed, body.beyond_mocap_ride.lean, body.beyond_mocap_ride.cycle = 1.25, False, True
+    choose(body, round_about)
+    bpy.ops.beyond_mocap.edit_path()
+    found = action.read(body, scene)
+    assert len(found) == len(wanted)
+    np.testing.assert_allclose(found.root_positions, wanted.root_positions, atol=1e-5)
+    dots = np.abs(np.sum(found.rotations * wanted.rotations, axis=2))
+    assert dots.min() > 1 - 1e-9
+
+
+def test_feet_follow_a_mesh(scene, part):
+    """A ramp as the ground: the body climbs it, though the curve lies flat."""
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    mesh = bpy.data.meshes.new("Ramp")
+    mesh.from_pydata([(-50, -50, -10), (50, -50, 10), (50, 50, 10), (-50, 50, -10)], [], [(0, 1, 2, 3)])
+    ramp = bpy.data.objects.new("Ramp", mesh)
+    scene.collection.objects.link(ramp)
+    bpy.context.view_layer.update()
+    body.beyond_mocap_ride.ground = ramp
+    was = pelvis(body, 1), pelvis(body, 40)
+    assert live.follow(scene) == 1 and live.follow(scene) == 0
+    now = pelvis(body, 1), pelvis(body, 40)
+    climb = 0.2 * (now[1][0] - now[0][0])
+    assert (now[1][2] - now[0][2]) - (was[1][2] - was[0][2]) == pytest.approx(climb, abs=0.06)
+    mesh.vertices[1].co.z += 1.0
+    mesh.update()
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 1
