@@ -34,6 +34,9 @@ MOST_FRAMES = 108_000
 SAME_LENGTH = 1e-3
 """Metres that path and motion may differ and count as of one length."""
 
+SEEN = 0.35
+"""How unlike a loop's ends may be without being told."""
+
 _OWN_SHARE = 0.98  # a sole that stands in one stretch alone stands while that one has at least this share
 _FURTHER = 0.08  # seconds after which a difference that is carried on no longer grows
 _SLOPE_SECONDS = 0.03
@@ -70,7 +73,7 @@ def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None =
     if not np.isfinite(length) or length <= 0.0:
         raise InputError("path", f"{length:g} m long", "a length above 0", "draw a longer path")
     own = float(residuals.step.sum())
-    if own >= length - SAME_LENGTH:
+    if own >= length - SAME_LENGTH or length <= (1.0 + MOST_SCALE) * own:
         return _stretched(residuals, length, own)
     found = _good(find_loops(residuals) if loops is None else loops)
     if not found:
@@ -78,10 +81,10 @@ def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None =
     wanted, length = length, min(length, _longest(residuals, found[0], own))
     plan = _exact_end(found, own, length) or _steady(residuals, found, own, length)
     shown, seams = _jumped(residuals, plan.jumps)
-    told = ()
+    told = _seen(plan.jumps)
     if length < wanted:
         minutes = len(shown) / residuals.fps / 60.0
-        told = (f"the path is {wanted:.0f} m long: the motion ends after {minutes:.0f} minutes and {length:.0f} m of it",)
+        told += (f"the path is {wanted:.0f} m long: the motion ends after {minutes:.0f} minutes and {length:.0f} m of it",)
     if plan.ends:
         scale = length / float(shown.step.sum())
         return Cycled(shown.changed(step=shown.step * scale), seams, scale, told)
@@ -95,9 +98,9 @@ _NEXT_STEP = "switch cycling off, take a clip that walks or runs for two strides
 
 
 def _stretched(residuals: Residuals, length: float, own: float) -> Cycled:
-    """A motion longer than the path: its strides shortened where that lets its end fall on the path's."""
+    """A motion about as long as the path, or longer: its strides scaled where that lets its end fall on the path's."""
     scale = length / own if own > 0.0 else 1.0
-    if own - length <= SAME_LENGTH or scale < 1.0 - MOST_SCALE:
+    if abs(own - length) <= SAME_LENGTH or scale < 1.0 - MOST_SCALE:
         return Cycled(residuals, np.zeros(0, int))
     return Cycled(residuals.changed(step=residuals.step * scale), np.zeros(0, int), scale)
 
@@ -107,6 +110,13 @@ def _why_not(residuals: Residuals) -> str:
     if metres < 0.3 or not (smooth_speed(residuals) > 0.2).any():
         return f"the motion stays where it is ({metres:.2f} m in {seconds:.1f} s)"
     return f"no stretch of the motion ({metres:.2f} m, {seconds:.1f} s) can be repeated"
+
+
+def _seen(jumps: tuple[Loop, ...]) -> tuple[str, ...]:
+    unlike = max(loop.unlike for loop in jumps)
+    if unlike <= SEEN:
+        return ()
+    return (f"no two strides of the motion are alike: where it is repeated, poses are {100 * unlike:.0f} % apart",)
 
 
 def _good(loops: tuple[Loop, ...]) -> tuple[Loop, ...]:

@@ -29,7 +29,7 @@ _SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below whi
 _LABEL = 0.06  # metres that a wrong sole costs
 _CROWDED = 0.05  # metres that it costs to have no frames to fade over
 _VARIETY = 0.3  # how much better one more stride makes a loop of one stride
-_MOST = 0.42  # how far apart a loop's ends are at most, as a share of how far apart any two moments of the motion are
+_MOST = 0.6  # how unlike a loop's ends are at most
 _EACH_FOOT = 0.08  # of a loop's time that each foot stands alone at least: who jumps with both feet has no stride
 _JOINTS = 16  # compared at most, of a body that is not a human one
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.35, 2.5  # seconds
@@ -40,13 +40,14 @@ class Loop:
     """Frames `start` .. `end` - 1 shown again and again: at `end` the body does what it does at `start`.
 
     apart: metres by which both differ (root mean square over joints, places and velocities, in a window around them);
-    cost: the same with what else speaks against the loop; metres: arc length of once round; strides: how many strides
+    unlike: the same as a share of how far apart any two moments of the motion are; cost: the same with what else speaks against the loop; metres: arc length of once round; strides: how many strides
     that is, about.
     """
 
     start: int
     end: int
     apart: float
+    unlike: float
     cost: float
     metres: float
     strides: float
@@ -74,9 +75,9 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
         return ()
     free = pace >= max(_SLOWEST, _SLOW_SHARE * float(np.median(pace[moving])))
     tried = _rough(features, residuals, free, least, stride)
-    found = [_exact(features, residuals, pair, free, least, stride) for pair in tried]
-    most = _MOST * float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
-    found = [loop for loop in found if loop and loop.apart <= most and _strides(residuals.standing, loop)]
+    usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
+    found = [_exact(features, residuals, pair, free, least, stride, usual) for pair in tried]
+    found = [loop for loop in found if loop and loop.unlike <= _MOST and _strides(residuals.standing, loop)]
     best: dict[int, Loop] = {}
     for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):
         best.setdefault(max(int(round(loop.strides)), 1), loop)
@@ -204,9 +205,11 @@ def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
 
 
 def _exact(
-    features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int, stride: float
+    features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int, stride: float,
+    usual: float,
 ) -> Loop | None:
-    """The best loop around a rough pair, compared over windows at the full rate."""
+    """The best loop around a rough pair, compared over windows at the full rate; usual: metres that any two moments are
+    apart."""
     count, fps = len(features), residuals.fps
     reach, window = int(np.ceil(fps / 12.0)), int(round(WINDOW_SECONDS * fps))
     start, end = (at + np.arange(-reach - window, reach + window + 1) for at in pair)
@@ -232,7 +235,8 @@ def _exact(
         return None
     first, last = int(start[at[0], 0]), int(end[0, at[1]])
     metres = float(residuals.step[first + 1 : last + 1].sum())
-    return Loop(first, last, float(apart[at]), float(cost[at]), metres, (last - first) / stride)
+    off = float(apart[at])
+    return Loop(first, last, off, off / max(usual, 1e-9), float(cost[at]), metres, (last - first) / stride)
 
 
 def _along_diagonals(values: np.ndarray, window: int) -> np.ndarray:
