@@ -7,6 +7,7 @@ from bpy.props import EnumProperty
 
 from ..beyond_mocap.errors import InputError
 from ..scene import areas, path_cameras
+from ..scene.ride.settings import meant, riders
 from .verb import Verb
 
 WHICH = (
@@ -51,6 +52,8 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
         if camera is None:
             raise InputError("path cameras", f"no camera {path_cameras.NAMES[kind]}", "all four",
                              "press Path Cameras in the panel Path Editing")
+        if kind == "BEHIND" and riders(scene):
+            path_cameras.follow(scene, path_cameras.route(scene, next(iter(meant(context)), None)))
         scene.camera = camera
         if area is not None:
             _look_through(area, camera)

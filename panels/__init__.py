@@ -6,7 +6,7 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, library, menus, players, preferences, presets, quality, result, rig, synthesis, timeline, video, view,
+    annotate, library, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline, video, view,
 )
 
 CLASSES = (
@@ -22,6 +22,7 @@ CLASSES = (
     synthesis.BEYOND_MOCAP_PT_synthesis,
     result.BEYOND_MOCAP_PT_result,
     quality.BEYOND_MOCAP_PT_quality,
+    path.BEYOND_MOCAP_PT_path,
     view.BEYOND_MOCAP_PT_view,
     timeline.BEYOND_MOCAP_MT_choose_player,
     timeline.BEYOND_MOCAP_PT_timeline,

@@ -5,9 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.settings import active_player
-from .tab import Step, paragraph, wrapped
-
-MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
+from .tab import Step, figures, paragraph, wrapped
 
 
 class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
@@ -47,7 +45,7 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         header, body = layout.panel("beyond_mocap_quality_figures")
         header.label(text="Figures")
         if body:
-            self.figures(body, player.quality)
+            figures(body, player.quality)
 
     def jump(self, layout, player, text: str, seconds: str, icon: str) -> None:
         """A line over as many rows as it takes; the first is a button where the line has times."""
@@ -70,18 +68,3 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         column.scale_y = 0.85
         for number, line in enumerate(text.splitlines() or ("No take of this session here",)):
             column.label(text=line, icon="SEQUENCE" if number == 0 and text else "BLANK1")
-
-    def figures(self, layout, text: str) -> None:
-        """Name, value, target, and whether it is met."""
-        column = layout.column(align=True)
-        column.scale_y = 0.85
-        for line in text.splitlines():
-            told, target, status = (*line.split("\t"), "", "")[:3]
-            name, _, value = told.partition(": ")
-            row = column.split(factor=0.54)
-            row.label(text=name, icon=MARKS.get(status, "BLANK1"))
-            right = row.split(factor=0.54)
-            right.label(text=value)
-            aim = right.row()
-            aim.active = False
-            aim.label(text=target)

@@ -7,6 +7,7 @@ import textwrap
 import bpy
 
 LETTER = 5.7  # pixels that a letter of the interface takes on the average, at a scale of 1
+MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
 EDGES = 70  # pixels of a sidebar that are no text: tabs, the box and its icon
 
 
@@ -30,6 +31,22 @@ def paragraph(layout, text: str, icon: str) -> None:
     column.scale_y = 0.85
     for number, line in enumerate(wrapped(text)):
         column.label(text=line, icon="BLANK1" if number else icon)
+
+
+def figures(layout, text: str) -> None:
+    """Lines "name: value", target and status with tabs between: whether it is met as a mark."""
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for line in text.splitlines():
+        told, target, status = (*line.split("\t"), "", "")[:3]
+        name, _, value = told.partition(": ")
+        row = column.split(factor=0.54)
+        row.label(text=name, icon=MARKS.get(status, "BLANK1"))
+        right = row.split(factor=0.54)
+        right.label(text=value)
+        aim = right.row()
+        aim.active = False
+        aim.label(text=target)
 
 
 def wrapped(text: str) -> list[str]:

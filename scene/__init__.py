@@ -36,6 +36,7 @@ from . import (
     session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
 from .ride import live as ride_live
+from .ride import measure as ride_measure
 from .ride.settings import BeyondMocapRide
 
 CLASSES = (
@@ -88,10 +89,12 @@ def register():
     drawn_labels.register()
     live.register()
     ride_live.register()
+    ride_measure.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    ride_measure.unregister()
     ride_live.unregister()
     live.unregister()
     drawn_labels.unregister()

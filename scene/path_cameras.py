@@ -14,8 +14,11 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
+from ..beyond_mocap.errors import InputError
 from . import channels
 from .measure import frames_per_second, units_per_metre
+from .ride import riders as rides
+from .ride.settings import riders
 
 KINDS = ("ABOVE", "SIDE", "QUARTER", "BEHIND")
 NAMES = {"ABOVE": "Path Above", "SIDE": "Path Side", "QUARTER": "Path Quarter", "BEHIND": "Path Behind"}
@@ -43,6 +46,20 @@ class Route:
     frames: np.ndarray
     origin: np.ndarray
     heading: np.ndarray
+
+
+def route(scene: bpy.types.Scene, first: bpy.types.Object | None = None) -> Route:
+    """Of all riders of a scene; `first` is followed, where he rides. InputError where nobody does."""
+    known = {body: rides.shown(body) for body in riders(scene)}
+    for body in [body for body, shown in known.items() if shown is None]:
+        rides.renew(scene, body)
+        known[body] = rides.shown(body)
+    if not known:
+        raise InputError("path cameras", "nobody rides a path", "an armature that does", "select one and press Edit Path")
+    places = np.concatenate([part for shown in known.values() for part in (shown.line, shown.ridden.origin)])
+    shown = known.get(first) or next(iter(known.values()))
+    frames = shown.first + np.arange(len(shown.ridden.origin), dtype=float)
+    return Route(places, frames, shown.ridden.origin, shown.ridden.heading)
 
 
 def set_up(scene: bpy.types.Scene, route: Route) -> list[str]:

@@ -36,6 +36,10 @@ def is_armature(_settings, candidate: bpy.types.Object) -> bool:
     return candidate.type == "ARMATURE"
 
 
+CURVES = (
+    ("BEZIER", "Bezier", "Points on the path, with handles"),
+    ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"),
+)
 FEET = (
     ("any", "Any", "Both feet alike"),
     ("left", "Left", "Key moments that name no side take clips of the left foot"),
@@ -243,6 +247,15 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
     shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
     view: PointerProperty(type=BeyondMocapView, description="What is drawn over the 3D view")
+    curve_points: IntProperty(
+        name="Points", default=0, min=0, max=200,
+        description="Control points of a new curve to ride on; 0: as many as it needs to lie within 3 cm",
+    )
+    curve_degree: IntProperty(
+        name="Curve Degree", default=3, min=2, max=5,
+        description="Of a NURBS curve: how smooth it is, and how far each control point reaches",
+    )
+    curve_kind: EnumProperty(name="Kind", items=CURVES, default="BEZIER", description="Kind of a new curve to ride on")
     nudge_step: FloatProperty(
         name="Nudge Step", default=0.1, min=0.001, max=10.0, precision=3, step=1,
         description="Metres that control points go at each nudge",

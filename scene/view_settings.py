@@ -8,6 +8,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
 """The overlays, in the order in which they are drawn and listed."""
 
+PATH_OVERLAYS = ("path_source", "path_new", "path_trackers", "path_residuals", "path_ghost")
+"""The overlays about riders, likewise; they are about every armature that rides a path."""
+
 WHOSE = (
     ("ACTIVE", "Active Player", "Draw what is switched on of the active player"),
     ("TICKED", "Ticked Players", "Draw what is switched on of all ticked players"),
@@ -27,8 +30,8 @@ def _changed(_settings, context):
         store.redraw()
 
 
-def _switch(name: str, description: str) -> BoolProperty:
-    return BoolProperty(name=name, description=description, default=False, update=_changed)
+def _switch(name: str, description: str, default: bool = False) -> BoolProperty:
+    return BoolProperty(name=name, description=description, default=default, update=_changed)
 
 
 class BeyondMocapView(bpy.types.PropertyGroup):
@@ -45,6 +48,11 @@ class BeyondMocapView(bpy.types.PropertyGroup):
     moments: _switch("Key Moments", "Where body and ball meet, the ball's way there, and the gap between the two")
     speed: _switch("Speed", "The asked speed as a curtain over the track, and the body's own as a line")
     ghosts: _switch("Ghosts", "Stick figures of the body before and behind the current frame")
+    path_source: _switch("Original Path", "The path that the original motion goes, as it was fitted", True)
+    path_new: _switch("New Path", "The path that is ridden, as the curve is understood: without corners", True)
+    path_trackers: _switch("Trackers", "At the current frame, where the body is on either path and where it heads", True)
+    path_residuals: _switch("Residuals", "Lines from either path to the pelvis: what of the motion is not the path's")
+    path_ghost: _switch("Original Motion", "The original as a stick figure at the current frame")
     ghosts_at: EnumProperty(name="Ghosts", items=GHOSTS, update=_changed, description="Where the figures stand")
     ghost_step: FloatProperty(
         name="Seconds", default=0.5, min=0.05, max=10.0, precision=2, unit="TIME_ABSOLUTE", update=_changed,
@@ -61,6 +69,10 @@ class BeyondMocapView(bpy.types.PropertyGroup):
     def on(self) -> list[str]:
         """The names of the overlays that are to be drawn."""
         return [name for name in OVERLAYS if getattr(self, name)] if self.show else []
+
+    def on_path(self) -> list[str]:
+        """The names of the overlays about riders that are to be drawn."""
+        return [name for name in PATH_OVERLAYS if getattr(self, name)] if self.show else []
 
 
 class BeyondMocapPlayhead(bpy.types.PropertyGroup):

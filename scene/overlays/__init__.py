@@ -5,6 +5,7 @@
 - `prepare`   a take as vertex arrays and lines of text; knows neither bpy nor gpu
 - `store`     which takes are prepared: in a thread, once per take, forgotten when no player shows them
 - `place`     where a take lies in the scene now, and its clock
+- `rides`     paths, trackers, residuals and the original motion of what rides a path
 - `draw`      the handlers of the view: they only look up
 """
 

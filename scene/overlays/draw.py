@@ -15,7 +15,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ..settings import active_player
-from . import colours, legend, place, shapes, store
+from . import colours, legend, place, rides, shapes, store
 from .prepare import Mesh, Prepared
 
 BIAS = 1e-5
@@ -80,10 +80,19 @@ def _forget(now: dict[str, Prepared]) -> None:
     _owners.update(now)
 
 
+def _riding(context) -> list[rides.Item]:
+    """What there is to draw of riders in this view; the batches of what is drawn no more are freed."""
+    items = rides.items(context.scene) if context.space_data.overlay.show_overlays else []
+    now = {item.key for item in items}
+    for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
+        del _batches[key]
+    return items
+
+
 def _draw_shapes():
     context = bpy.context
-    found = _shown(context)
-    if not found:
+    found, riding = _shown(context), _riding(context)
+    if not found and not riding:
         return
     view = context.scene.beyond_mocap.view
     with gpu.matrix.push_pop_projection():
@@ -99,6 +108,10 @@ def _draw_shapes():
                     gpu.matrix.multiply_matrix(shown.world)
                     for name in view.on():
                         _draw_overlay(context, view, name, shown)
+            for item in riding:
+                with gpu.matrix.push_pop():
+                    gpu.matrix.multiply_matrix(item.world)
+                    _draw_batches(context, _made(item.key, item.meshes))
         finally:
             gpu.state.depth_mask_set(True)
             gpu.state.depth_test_set("NONE")
@@ -175,8 +188,8 @@ def _disc() -> list[Mesh]:
 
 def _draw_texts():
     context = bpy.context
-    found = _shown(context)
-    if not found:
+    found, riding = _shown(context), _rides(context)
+    if not found and not riding:
         return
     view = context.scene.beyond_mocap.view
     on = view.on()
@@ -187,9 +200,14 @@ def _draw_texts():
                 _near_labels(context, view, shown)
             if "seams" in on:
                 _why(context, view, shown)
-        legend.draw(context, on)
+        legend.draw(context, [*(on if found else ()), *(["rides"] if riding else ())])
     finally:
         gpu.state.blend_set("NONE")
+
+
+def _rides(context) -> bool:
+    """Whether anything of riders is drawn in this view."""
+    return context.space_data.overlay.show_overlays and bool(rides.seen(context.scene))
 
 
 def _near_labels(context, view, shown: Shown) -> None:

@@ -114,5 +114,6 @@ ROWS = {
     "footprints": _scale("Standing foot slides", colours.SLIDE_STOPS, 1000.0, "mm"),
     "speed": _keys(("asked speed", colours.ASKED), ("the body's", colours.PLAYED), ("1 m high: 5 m/s", colours.GREY)),
     "contacts": _keys(*_SIDES),
+    "rides": _keys(("original", colours.SKY), ("new path", colours.ORANGE), ("a tick: 1 s", colours.GREY)),
     "moments": _keys(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),
 }

@@ -185,6 +185,7 @@ ROWS = {
     "move_video": Row("video", lambda places: {"frames": 3}),
     "nudge_points": Row("imported", lambda places: {"direction": "UP", "step": 0.3}, edit_points),
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
+    "path_cameras": Row("accepted", prepare=ride),
     "path_curve": Row("accepted", lambda places: {"count": 7}, ride),
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),

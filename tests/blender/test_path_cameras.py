@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 import pytest
 from bpy_extras.object_utils import world_to_camera_view
-from conftest import EXTENSION
+from conftest import EXTENSION, SOURCE
 from mathutils import Vector
+from undo import assert_one_step
 
 
 @pytest.fixture
@@ -142,3 +143,37 @@ def test_flicking_goes_through_all_four(cameras):
     bpy.data.objects.remove(cameras.found(scene, "SIDE"))
     with pytest.raises(RuntimeError, match="no camera Path Side"):
         bpy.ops.beyond_mocap.path_camera(which="SIDE")
+
+
+def test_all_riders_are_in_view_and_the_active_one_is_followed(cameras):
+    """Two walks, on curves of their own, ten metres apart."""
+    scene, clip = bpy.context.scene, str(SOURCE / "sample_blend" / "library" / "walking_1_2.bvh")
+    bodies = []
+    for number in range(2):
+        bpy.ops.beyond_mocap.import_clips(filepath=clip)
+        bodies.append(bpy.context.object)
+        bpy.ops.beyond_mocap.edit_path()
+        bpy.context.object.location.y = 10.0 * number
+        bpy.ops.beyond_mocap.update_path()
+    bpy.context.view_layer.objects.active = bodies[1]
+    bodies[1].select_set(True)
+    assert_one_step(bpy.ops.beyond_mocap.path_cameras)
+    scene = bpy.context.scene
+    ends = np.array([(0.0, 0.0, 0.0), (6.0, 0.0, 0.0), (0.0, 10.0, 0.0), (6.0, 10.0, 1.8)])
+    for kind in cameras.KINDS[:3]:
+        picture = seen(cameras.found(scene, kind), ends)
+        assert (picture[:, :2] > 0.0).all() and (picture[:, :2] < 1.0).all(), kind
+    scene.frame_set(scene.frame_start + 60)
+    assert abs(cameras.found(scene, "BEHIND").matrix_world.translation.y - 10.0) < 1.0
+
+
+def test_looking_from_behind_goes_along_with_a_path_that_was_bent(cameras):
+    clip = str(SOURCE / "sample_blend" / "library" / "walking_1_2.bvh")
+    bpy.ops.beyond_mocap.import_clips(filepath=clip)
+    bpy.ops.beyond_mocap.edit_path()
+    bpy.ops.beyond_mocap.path_cameras()
+    bpy.context.object.location.y += 5.0
+    bpy.ops.beyond_mocap.update_path()
+    bpy.ops.beyond_mocap.path_camera(which="BEHIND")
+    bpy.context.scene.frame_set(40)
+    assert abs(bpy.context.scene.camera.matrix_world.translation.y - 5.0) < 1.0

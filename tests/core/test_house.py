@@ -47,7 +47,7 @@ LAZY = {
 EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
-    "panels": ["panels", "scene.settings", "scene.preferences"],
+    "panels": ["panels", "scene.settings", "scene.preferences", "scene.ride.settings", "scene.ride.figure_lines"],
 }
 
 

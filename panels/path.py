@@ -1,0 +1,152 @@
+"""Path editing: a motion rides a curve. What rides what, how it follows, what it is worth, how it is looked at."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.ride.figure_lines import lines
+from ..scene.ride.settings import meant
+from ..scene.settings import active_player
+from .tab import Step, figures, paragraph
+
+OVERLAYS = {
+    "path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
+    "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED",
+}
+CAMERAS = (("ABOVE", "Above"), ("SIDE", "Side"), ("QUARTER", "Quarter"), ("BEHIND", "Behind"))
+NUDGES = (
+    ("LEFT", "TRIA_LEFT"), ("RIGHT", "TRIA_RIGHT"), ("FORTH", "TRIA_UP"), ("BACK", "TRIA_DOWN"), ("UP", "SORT_DESC"),
+    ("DOWN", "SORT_ASC"),
+)
+WORSE = {  # what each frame does
+    "path": "What the body is off its path turns with the path, seen from above: what one wants",
+    "tangent": "The whole tangent: a hill tips the body over, and where the path is steep it lies down",
+    "absolute": "Offsets are not turned with the path: in a bend the sway of the steps points the wrong way",
+}
+
+
+class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
+    """The armature that is meant, its curve, and how the one follows the other."""
+
+    bl_label = "Path Editing"
+    bl_order = 7
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """From what rides what down to how it is looked at."""
+        layout, body = self.layout, subject(context)
+        if body is None:
+            paragraph(layout, "Select an armature with a motion", "INFO")
+        else:
+            ride = body.beyond_mocap_ride
+            who(layout, body, ride)
+            if ride.on:
+                section(layout, "curve", "New Curve", lambda opened: new_curve(opened, context.scene.beyond_mocap))
+                section(layout, "following", "How It Follows", lambda opened: following(opened, ride))
+                section(layout, "body", "Body", lambda opened: own_body(opened, ride))
+                if told := lines(ride.figures):
+                    section(layout, "figures", "Figures", lambda opened: figures(opened, told))
+        section(layout, "cameras", "Cameras & Nudging", lambda opened: looking(opened, context.scene.beyond_mocap), closed=False)
+        section(layout, "overlays", "Overlays", lambda opened: overlays(opened, context.scene.beyond_mocap.view))
+
+
+def subject(context) -> bpy.types.Object | None:
+    """The active armature; who rides the active curve; else the active player's body."""
+    active = context.view_layer.objects.active
+    if active is not None and active.type == "ARMATURE":
+        return active
+    if active is not None and active.type == "CURVE" and (ridden := meant(context)):
+        return ridden[0]
+    player = active_player(context.scene.beyond_mocap)
+    body = player.body if player is not None else None
+    return body if body is not None and body.type == "ARMATURE" else None
+
+
+def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
+    """A part that can be folded."""
+    header, body = layout.panel(f"beyond_mocap_path_{name}", default_closed=closed)
+    header.label(text=title)
+    if body:
+        draw(body)
+
+
+def split(layout):
+    """A column of named values."""
+    column = layout.column()
+    column.use_property_split, column.use_property_decorate = True, False
+    return column
+
+
+def who(layout, body, ride) -> None:
+    """What rides what, and the way in and out."""
+    layout.label(text=f"{body.name} rides" if ride.on else body.name, icon="ARMATURE_DATA")
+    layout.prop(ride, "curve", text="", placeholder="A curve fitted to its motion")
+    row = layout.row(align=True)
+    row.scale_y = 1.3
+    if not ride.on:
+        row.operator("beyond_mocap.edit_path", icon="CURVE_BEZCURVE")
+    else:
+        row.operator("beyond_mocap.bake_path", text="Keep", icon="CHECKMARK")
+        row.operator("beyond_mocap.leave_path", text="Leave", icon="X")
+        row = layout.row(align=True)
+        row.prop(ride, "live", toggle=True, icon="PLAY")
+        row.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
+    for line in ride.told.splitlines():
+        paragraph(layout, line, "INFO")
+
+
+def new_curve(layout, settings) -> None:
+    """A new curve, and of what kind."""
+    column = split(layout)
+    for name in ("curve_kind", "curve_points", "curve_degree"):
+        if name != "curve_degree" or settings.curve_kind == "NURBS":
+            column.prop(settings, name)
+    row = layout.row(align=True)
+    for shape, text in (("FITTED", "Original"), ("STRAIGHT", "Straight"), ("PRESENT", "As It Is")):
+        button = row.operator("beyond_mocap.path_curve", text=text)
+        button.shape, button.kind = shape, settings.curve_kind
+        button.count, button.degree = settings.curve_points, settings.curve_degree
+
+
+def following(layout, ride) -> None:
+    """How the motion follows its path."""
+    column = split(layout)
+    column.prop(ride, "fit")
+    if ride.fit == "polynomial":
+        column.prop(ride, "degree")
+    for name in ("by_arc_length", "speed", "delay", "end", "cycle", "bends", "climbs"):
+        column.prop(ride, name)
+
+
+def own_body(layout, ride) -> None:
+    """What the body does about it."""
+    column = split(layout)
+    for name in ("plant", "lean", "slopes", "ground"):
+        column.prop(ride, name)
+    section(layout, "paper", "As in the Paper", lambda opened: paper(opened, ride))
+
+
+def paper(layout, ride) -> None:
+    """The other ways to keep what the body is off its path, and why one does not want them."""
+    split(layout).prop(ride, "frame")
+    paragraph(layout, WORSE[ride.frame], "INFO")
+
+
+def looking(layout, settings) -> None:
+    """Four cameras; the step by which control points go, and the ways."""
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.path_cameras", text="", icon="VIEW_CAMERA")
+    for kind, text in CAMERAS:
+        row.operator("beyond_mocap.path_camera", text=text).which = kind
+    row = layout.row(align=True)
+    row.prop(settings, "nudge_step", text="Nudge")
+    for direction, icon in NUDGES:
+        row.operator("beyond_mocap.nudge_points", text="", icon=icon).direction = direction
+
+
+def overlays(layout, view) -> None:
+    """What is drawn of riders."""
+    grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+    grid.active = view.show
+    for name, icon in OVERLAYS.items():
+        grid.prop(view, name, icon=icon, toggle=True)

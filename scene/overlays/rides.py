@@ -1,0 +1,141 @@
+"""What is drawn of riders: their own path and the new one, where they are on both, the original motion beside.
+
+Every shape hangs on the very motion or source that it was made of, so that one that is dragged is made anew only when it
+has been laid anew. Knows neither gpu nor how to draw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..measure import units_per_metre
+from ..ride import riders
+from ..ride.settings import riders as riding
+from . import colours, shapes
+from .prepare import Mesh
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.ride import Ridden, RideSource
+
+LIFT = 0.012  # metres above the ground
+EVERY = 0.2  # seconds from one faint residual to the next
+HALF_TICK, RING, ARROW = 0.09, 0.16, 0.5  # metres
+WIDE, THIN = 3.5, 1.5  # pixels
+ORIGINAL, NEW = colours.SKY, colours.ORANGE
+
+
+class Item(NamedTuple):
+    """One thing to draw. key: the same as long as it looks the same; meshes: makes it, in metres; world: where it goes."""
+
+    key: tuple
+    meshes: Callable[[], list[Mesh]]
+    world: Matrix
+
+
+def items(scene: bpy.types.Scene) -> list[Item]:
+    """All that is to be drawn of the riders that are seen, at the current frame."""
+    on, world = scene.beyond_mocap.view.on_path(), Matrix.Scale(units_per_metre(scene), 4)
+    return [item for shown in seen(scene) for item in _items(on, shown, scene.frame_current_final, world)]
+
+
+def seen(scene: bpy.types.Scene) -> list[riders.Shown]:
+    """The riders of which anything is to be drawn."""
+    if not scene.beyond_mocap.view.on_path():
+        return []
+    found = [riders.shown(body) for body in riding(scene) if body.visible_get()]
+    return [shown for shown in found if shown is not None]
+
+
+def _items(on: list[str], shown: riders.Shown, frame: float, world: Matrix) -> list[Item]:
+    source, ridden, found = shown.source, shown.ridden, []
+    row, was = shown.frames(frame)  # of the ridden motion, and of the original
+    if "path_source" in on:
+        found.append(Item((source, "path"), lambda: source_path(source, shown.source_line), world))
+    if "path_new" in on:
+        found.append(Item((ridden, "path"), lambda: new_path(ridden, shown.line), world))
+    if "path_residuals" in on:
+        found.append(Item((source, "residuals"), lambda: residuals(source.motion, source.moving.origin, ORIGINAL), world))
+        found.append(Item((ridden, "residuals"), lambda: residuals(ridden.motion, ridden.origin, NEW), world))
+        found.append(Item((source, "residual", was), lambda: residual(source.motion, source.moving.origin, was, ORIGINAL), world))
+        found.append(Item((ridden, "residual", row), lambda: residual(ridden.motion, ridden.origin, row, NEW), world))
+    if "path_ghost" in on:
+        found.append(Item((source, "ghost", was), lambda: figure(source, was), world))
+    if "path_trackers" in on:
+        for name, colour, origin, heading in (
+            ("original", ORIGINAL, source.moving.origin[was], source.moving.heading[was]),
+            ("new", NEW, ridden.origin[row], ridden.heading[row]),
+        ):
+            there = world @ Matrix.Translation(origin.tolist()) @ Matrix.Rotation(float(heading), 4, "Z")
+            found.append(Item(("", "tracker", name), lambda colour=colour: tracker(colour), there))
+    return found
+
+
+def source_path(source: "RideSource", line: np.ndarray) -> list[Mesh]:
+    """The original motion's own path, line (N, 3) m, with a tick every second."""
+    return [_line(line, ORIGINAL, WIDE, 0.9),
+            _ticks(source.moving.origin, source.moving.heading, source.motion.fps, ORIGINAL)]
+
+
+def new_path(ridden: "Ridden", line: np.ndarray) -> list[Mesh]:
+    """The new path, line (N, 3) m, thin, the part that is ridden wide, with a tick every second."""
+    return [_line(line, NEW, THIN, 0.6), *_ridden(ridden), _ticks(ridden.origin, ridden.heading, ridden.motion.fps, NEW)]
+
+
+def residuals(motion, origin: np.ndarray, colour) -> list[Mesh]:
+    """Faint lines from the path up to the pelvis, some in every second."""
+    step = max(1, round(EVERY * motion.fps))
+    return [_strokes(origin[::step], motion.root_positions[: len(origin) : step], colour, THIN, 0.4)]
+
+
+def residual(motion, origin: np.ndarray, row: int, colour) -> list[Mesh]:
+    """The same at one frame, strong."""
+    return [_strokes(origin[row : row + 1], motion.root_positions[row : row + 1], colour, WIDE, 1.0)]
+
+
+def figure(source: "RideSource", row: int) -> list[Mesh]:
+    """The original motion at one frame, as a stick figure."""
+    from ...beyond_mocap.motion.motion import pose_kinematics
+
+    motion = source.motion
+    places, _ = pose_kinematics(motion.skeleton, motion.root_positions[row : row + 1], motion.rotations[row : row + 1])
+    points = places[0][shapes.figure_pairs(motion.skeleton.parents)].reshape(-1, 3).astype(np.float32)
+    return [Mesh("LINES", points, colours.repeated(ORIGINAL, len(points), 0.8), 2.5)]
+
+
+def tracker(colour) -> list[Mesh]:
+    """A ring with an arrow along X."""
+    tip, back = ARROW, ARROW - 0.14
+    arrow = [(RING, 0.0, LIFT), (tip, 0.0, LIFT), (tip, 0.0, LIFT), (back, 0.08, LIFT), (tip, 0.0, LIFT), (back, -0.08, LIFT)]
+    points = np.concatenate([shapes.circle((0.0, 0.0, LIFT), RING), np.array(arrow, np.float32)])
+    return [Mesh("LINES", points, colours.repeated(colour, len(points)), WIDE)]
+
+
+def _ridden(ridden: "Ridden") -> list[Mesh]:
+    """The way of the tracker, piece by piece where it starts again."""
+    step = np.linalg.norm(np.diff(ridden.origin, axis=0), axis=1)
+    starts = np.flatnonzero(step > 0.5) + 1
+    return [_line(piece, NEW, WIDE, 0.9) for piece in np.split(ridden.origin, starts) if len(piece) > 1]
+
+
+def _line(points: np.ndarray, colour, width: float, alpha: float) -> Mesh:
+    lines = shapes.along(points + [0.0, 0.0, LIFT])
+    return Mesh("LINES", lines, colours.repeated(colour, len(lines), alpha), width)
+
+
+def _strokes(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: float) -> Mesh:
+    points = np.stack([start + [0.0, 0.0, LIFT], end], axis=1).reshape(-1, 3).astype(np.float32)
+    return Mesh("LINES", points, colours.repeated(colour, len(points), alpha), width)
+
+
+def _ticks(origin: np.ndarray, heading: np.ndarray, fps: float, colour) -> Mesh:
+    """A short bar across the path at every whole second."""
+    rows = np.round(np.arange(0.0, len(origin), fps)).astype(int)
+    rows = rows[rows < len(origin)]
+    aside = HALF_TICK * np.stack([-np.sin(heading[rows]), np.cos(heading[rows]), np.zeros(len(rows))], axis=1)
+    points = np.stack([origin[rows] - aside, origin[rows] + aside], axis=1).reshape(-1, 3) + [0.0, 0.0, LIFT]
+    return Mesh("LINES", points.astype(np.float32), colours.repeated(colour, len(points)), 2.0)
