@@ -11,27 +11,51 @@ from functools import cached_property
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, TimedLine
 from .motion import contacts, quaternion
 from .motion.arc_length import ArcLength
 from .motion.humanoid import heading as facing
 from .motion.humanoid import identify
 from .motion.motion import Motion, forward_kinematics
 from .motion.path import Path
+from .motion.runs import runs
 from .motion.terrain import Terrain
+from .motion.track import zero_phase_hann
+from .polish.banking import banked, bent_forward, missing_lean
 from .polish.cycle import cycled
 from .polish.detour import with_detours
-from .polish.foot_ride import Ground, follow
+from .polish.foot_ride import LONGEST, Ground, Steps, follow
 from .polish.loops import Loop, find_loops
 from .polish.path_end import Ending, ending
 from .polish.path_fit import fit, fit_polynomial, fit_spline
 from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
-from .polish.path_time import Timing, by_arc_length, by_time, parameter_at, shown
+from .polish.path_time import (
+    Timing,
+    Way,
+    Wishes,
+    asked_length,
+    by_arc_length,
+    by_time,
+    by_way,
+    parameter_at,
+    shown,
+    stretched,
+    way_at,
+    way_of,
+)
 from .polish.underfoot import footing, is_level, mesh_surface, path_surface
 
 ENDS = ("stop", "repeat")
 FITS = ("spline", "polynomial")
 SPEEDS = (0.05, 20.0)
+LEANS_FROM = (0.7, 1.5)
+"""m/s below which nobody leans into a bend, and from which on all of it counts: walkers lean too, on a path that is as
+smooth as these."""
+
+INTO_SLOPE, MOST_FORWARD, SLOPE_SECONDS = 0.45, 0.2, 0.6
+"""Share of a slope by which the trunk leans into it, and radians of that at most (Leroux, Fung and Barbeau 2002: some
+3 degrees forward at a rise of 10 %, backward going down); seconds over which a slope is felt."""
+
 STILL = 0.05
 """Metres of path below which a motion stands still."""
 
@@ -96,6 +120,11 @@ class RideSource:
     def loops(self) -> tuple[Loop, ...]:
         """Where the motion can be repeated, the best first; looked for when it is first asked."""
         return find_loops(self.residuals)
+
+    @cached_property
+    def way(self) -> Way:
+        """The slopes and bends of its own path."""
+        return way_of(self.path, self.arc)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,10 +198,14 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     moving = moving_frame(origin, tangent, timing.arc, residuals.fps, own)
     root, rotations = placed(source.frame, moving, rows.place, rows.rotations)
     rigid = Motion(residuals.skeleton, root, rotations, residuals.fps)
+    if settings.lean and source.humanoid:
+        rotations = _leaned(source, rows, moving, timing, rotations, seams)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     if settings.plant and source.humanoid:
         under = _ground(path, arc, settings, ground, moving, timing, rows)
-        held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under)
+        steps, more = _steps(source, rows, moving, timing)
+        held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, steps)
+        end = replace(end, told=end.told + more)
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
     ridden = Ridden(
@@ -188,14 +221,21 @@ def _timed(
     """The residuals as they are shown, once through, cut or cycled; the cycles' seams; when each is shown where; and what
     happens at the path's end."""
     residuals, seams, told = source.residuals, np.zeros(0, dtype=int), ()
+    wishes = Wishes(settings.slopes and settings.plant and source.humanoid, settings.climbs, settings.bends)
+    way = None if wishes.none or path is source.path or not settings.by_arc_length else way_of(path, arc)
+    if way is not None and way.plain(wishes) and source.way.plain(wishes):
+        way = None
     if settings.cycle and settings.by_arc_length:
-        around = cycled(residuals, arc.length, source.loops)
+        around = cycled(residuals, arc.length if way is None else asked_length(way, wishes), source.loops)
         residuals, seams, told = around.residuals, around.seams, around.told
     elif settings.cycle:
         told = ("by time the motion fills every path: it is not cycled",)
     if source.still:
         told += ("the motion stands still: it is placed at the path's beginning",)
-    if settings.by_arc_length or source.still:
+    if way is not None and not source.still:
+        own = way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
+        timing = by_way(residuals, own, way, wishes, settings.speed, settings.delay, path.closed)
+    elif settings.by_arc_length or source.still:
         timing = by_arc_length(residuals, settings.speed, settings.delay)
     else:
         timing = by_time(residuals, path, arc, settings.speed, settings.delay)
@@ -224,6 +264,44 @@ def _parameters(
     if not settings.by_arc_length:
         return parameter_at(path, timing.at / max(len(source.residuals) - 1, 1))
     return arc.parameter(timing.arc % arc.length if path.closed and arc.length > 0.0 else timing.arc)
+
+
+def _leaned(
+    source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing, rotations: np.ndarray, seams: np.ndarray
+) -> np.ndarray:
+    """The body leant into bends, and its trunk into slopes, as far as the motion did not do so on its own path."""
+    fps = rows.fps
+    since = np.diff(timing.arc, prepend=timing.arc[:1])
+    own_slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
+    own_speed = np.column_stack([rows.step * np.cos(own_slope) * fps, np.zeros(len(rows))])
+    lean = missing_lean(
+        since * np.cos(moving.slope) * fps, moving.heading, own_speed, rows.turn, seams, fps, LEANS_FROM
+    )
+    if np.abs(lean).max(initial=0.0) > 1e-9:
+        rotations = banked(rows.skeleton, rotations, moving.heading, lean)
+    steeper = zero_phase_hann((moving.slope - own_slope)[:, None], fps, SLOPE_SECONDS)[:, 0]
+    if np.abs(steeper).max(initial=0.0) > 1e-6:
+        forward = np.clip(INTO_SLOPE * steeper, -MOST_FORWARD, MOST_FORWARD)
+        rotations = bent_forward(rows.skeleton, rotations, moving.heading, forward)
+    return rotations
+
+
+def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing) -> tuple[Steps | None, tuple[str, ...]]:
+    """How long steps are on the new path, against their own, and what of that legs cannot do."""
+    slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
+    own = rows.step * np.cos(slope)
+    times = stretched(np.diff(timing.arc, prepend=timing.arc[:1]) * np.cos(moving.slope), own, rows.fps)
+    if times is None:
+        return None, ()
+    worst = np.maximum(times / LONGEST[1], LONGEST[0] / np.maximum(times, 1e-3)) > 1.05
+    told = []
+    for first, end in runs(worst):
+        span = first / rows.fps, (end - 1) / rows.fps
+        much = times[first:end][np.argmax(np.abs(np.log(np.maximum(times[first:end], 1e-3))))]
+        told.append(
+            TimedLine(f"{span[0]:.1f} s: the path asks for steps {much:.1f} times as long as they were; feet slide", span)
+        )
+    return Steps(moving.heading, times), tuple(told)
 
 
 def _ground(

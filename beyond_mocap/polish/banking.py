@@ -29,24 +29,39 @@ _SECONDS = 0.6
 
 
 def missing_lean(
-    speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, seams: np.ndarray, fps: float
+    speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, seams: np.ndarray, fps: float,
+    slow: tuple[float, float] = SLOW,
 ) -> np.ndarray:
     """(T,) a / g, to the left, that the track asks for beyond what the recording had; softly limited so that legs get
     at most MOST_LEAN, and nothing below SLOW.
 
     speed (T,) m/s and direction (T,) in radians of travel on the track; velocity (T, 2) m/s of the recording in its
     facing frame and turn (T,) radians since the frame before; seams (S,): frames across which a recording's direction
-    says nothing.
+    says nothing; slow: as SLOW.
     """
     own_speed = np.linalg.norm(velocity, axis=1)
     own_turn = turn + np.diff(np.arctan2(velocity[:, 1], velocity[:, 0]), prepend=np.arctan2(*velocity[:1, ::-1].T))
     own_turn[seams] = own_turn[np.minimum(seams + 1, len(turn) - 1)]
     asked = speed * quaternion.wrapped(np.diff(direction, prepend=direction[:1]))
-    fast = np.clip((np.minimum(speed, own_speed) - SLOW[0]) / (SLOW[1] - SLOW[0]), 0.0, 1.0)
+    fast = np.clip((np.minimum(speed, own_speed) - slow[0]) / (slow[1] - slow[0]), 0.0, 1.0)
     turns = asked - own_speed * quaternion.wrapped(own_turn)
     lean = zero_phase_hann((fast * np.clip(turns * fps / GRAVITY, -1.0, 1.0))[:, None], fps, _SECONDS)[:, 0]
     most = MOST_LEAN / LEGS
     return most * np.tanh(lean / most)
+
+
+def bent_forward(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Local rotations (T, J, 4) of a body whose trunk leans forward, in its direction of travel (T,), by angle (T,)."""
+    spine = identify(skeleton).spine
+    if not spine:
+        return rotations
+    out = rotations.copy()
+    left = np.stack([-np.sin(direction), np.cos(direction), np.zeros(len(direction))], axis=1)
+    above = world_rotation(skeleton, rotations, skeleton.parents[spine[0]])
+    turn = quaternion.about_axis(quaternion.rotate(quaternion.inverse(above), left), angle)
+    out[:, spine[0]] = quaternion.multiply(turn, rotations[:, spine[0]])
+    return out
+
 
 def banked(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, lean: np.ndarray) -> np.ndarray:
     """Local rotations (T, J, 4) of a body that leans to the left of its direction of travel (T,) by lean (T,) as a / g.

@@ -40,6 +40,9 @@ DROP_BY_SLOPE = 0.15
 SPARE = 0.008
 """Metres below full length within which a leg that was bent more eases towards it."""
 
+LONGEST = (0.3, 1.3)
+"""How many times as long as it was a step is made at least and at most."""
+
 BENT_ALOFT, STRAIGHT_ALOFT, STIFF = 0.2, 0.01, 0.05
 """Weights of what the goals ask of a leg in the air, bent more or straighter than it was, against 1 on the ground, and
 of a smooth course."""
@@ -63,6 +66,14 @@ class Ground:
     surface: Surface
 
 
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """How long steps are: direction (T,) radians of travel and times (T,) as long as the motion was laid out with."""
+
+    direction: np.ndarray
+    times: np.ndarray
+
+
 def follow(
     skeleton: Skeleton,
     root: np.ndarray,
@@ -70,12 +81,12 @@ def follow(
     standing: np.ndarray,
     fps: float,
     ground: Ground | None = None,
-    moves: np.ndarray | None = None,
+    steps: Steps | None = None,
 ) -> Planted:
     """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. ground: None where feet keep their heights. moves
-    (T, 2, 2) m over the ground by which each foot is moved before that.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. ground: None where feet keep their heights; steps: None
+    where they are as long as they were.
     """
     body = identify(skeleton)
     limbs = (body.left, body.right)
@@ -83,8 +94,8 @@ def follow(
     places, world = pose_kinematics(skeleton, root, rotations, chain)
     scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
     feet = [laid_foot(places, world, limb, standing[:, side]) for side, limb in enumerate(limbs)]
-    if moves is not None:
-        feet = [foot.moved(np.pad(moves[:, side], ((0, 0), (0, 1)))) for side, foot in enumerate(feet)]
+    if steps is not None:
+        feet = [_stretched(foot, root, steps) for foot in feet]
     feet = [turned_flat(foot, scale) for foot in feet]
     firm, sunk, most = [foot.weight for foot in feet], np.zeros(len(root)), MOST_DROP
     for turn in range(_ROUNDS + 1):
@@ -111,6 +122,14 @@ def follow(
         miss[:, side] = np.where(foot.carries > 0.0, np.linalg.norm(target - goal, axis=1), 0.0)
         correction[:, side] = np.linalg.norm((target - places[:, foot.limb.foot])[:, :2], axis=1)
     return Planted(root - down, out, correction, miss)
+
+
+def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
+    """The foot further before or behind the body, as far as LONGEST allows."""
+    along = np.stack([np.cos(steps.direction), np.sin(steps.direction)], axis=1)
+    ahead = np.sum((0.5 * (foot.heel + foot.toe) - root)[:, :2] * along, axis=1)
+    much = np.clip(steps.times, *LONGEST) - 1.0
+    return foot.moved(np.pad((much * ahead)[:, None] * along, ((0, 0), (0, 1))))
 
 
 def _frames(seconds: float, fps: float) -> int:
