@@ -37,6 +37,9 @@ from .underfoot import Footing, Surface, footing
 DROP_BY_SLOPE = 0.15
 """Metres more that the pelvis is lowered at most, times the slope of the ground: downhill the other foot is low."""
 
+SINK_BY_SLOPE = 0.15
+"""Metres by which the pelvis is lower, times the slope: knees bend more on slopes, up and down."""
+
 SPARE = 0.008
 """Metres below full length within which a leg that was bent more eases towards it."""
 
@@ -93,7 +96,7 @@ def follow(
     chain = [joint for limb in limbs for joint in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot)]
     places, world = pose_kinematics(skeleton, root, rotations, chain)
     scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
-    feet = [laid_foot(places, world, limb, standing[:, side]) for side, limb in enumerate(limbs)]
+    feet = [_steady(laid_foot(places, world, limb, standing[:, side])) for side, limb in enumerate(limbs)]
     if steps is not None:
         feet = [_stretched(foot, root, steps) for foot in feet]
     feet = [turned_flat(foot, scale) for foot in feet]
@@ -124,6 +127,16 @@ def follow(
     return Planted(root - down, out, correction, miss)
 
 
+def _steady(foot: Foot) -> Foot:
+    """The foot with its left as it is in the mean of the frames where it lies level: seen from above a foot that stands
+    on its toes points nowhere."""
+    level = np.linalg.norm((foot.toe - foot.heel)[:, :2], axis=1, keepdims=True)
+    own = np.sum(quaternion.rotate(quaternion.inverse(foot.rotation), foot.left) * level**2, axis=0)
+    left = quaternion.rotate(foot.rotation, own / max(np.linalg.norm(own), 1e-9)) * [1.0, 1.0, 0.0]
+    size = np.linalg.norm(left, axis=1, keepdims=True)
+    return replace(foot, left=np.where(size > 0.1, left / np.maximum(size, 1e-9), foot.left))
+
+
 def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
     """The foot further before or behind the body, as far as LONGEST allows."""
     along = np.stack([np.cos(steps.direction), np.sin(steps.direction)], axis=1)
@@ -142,7 +155,8 @@ def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Groun
     clear = over[..., 2].min(axis=2) - ground.own
     under = footing(over[..., :2], standing, clear, fps, ground.surface)
     rise = under.height - ground.own
-    up = zero_phase_hann(rise.mean(axis=1)[:, None], fps, _PELVIS_SECONDS)[:, 0]
+    steep = np.linalg.norm(under.slope, axis=2).mean(axis=1)
+    up = zero_phase_hann((rise.mean(axis=1) - SINK_BY_SLOPE * steep)[:, None], fps, _PELVIS_SECONDS)[:, 0]
     tip = quaternion.between(ground.up, under.normal)
     put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
     return put, -up, MOST_DROP + DROP_BY_SLOPE * float(np.abs(under.slope).max(initial=0.0))

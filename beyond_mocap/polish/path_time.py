@@ -173,8 +173,9 @@ def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None
 
 
 def shown(residuals: Residuals, at: np.ndarray) -> Residuals:
-    """The residuals at rows `at` (N,), fractional: places linear, rotations slerped; what is of one frame alone, feet
-    that stand, from the nearest. Steps and turns are those from one output frame to the next."""
+    """The residuals at rows `at` (N,), fractional: cubics through the four rows around (Catmull and Rom 1974), since
+    straight lines between rows shake what moves quickly; feet that stand are those of the nearest row. Steps and turns are
+    those from one output frame to the next."""
     count = len(residuals)
     low = np.clip(np.floor(at + 1e-9).astype(int), 0, count - 1)
     share = np.clip(at - low, 0.0, 1.0)
@@ -182,17 +183,20 @@ def shown(residuals: Residuals, at: np.ndarray) -> Residuals:
     if not share.any():
         whole = residuals.rows(low)
         return whole if np.all(np.diff(low) == 1) else _stepped(residuals, whole, at)
-    high = np.minimum(low + 1, count - 1)
-    first, second = residuals.rows(low), residuals.rows(high)
-    near = residuals.rows(np.where(share < 0.5, low, high))
+    around = np.clip(low + np.arange(-1, 3)[:, None], 0, count - 1)
+    x = share
+    weights = 0.5 * np.stack(
+        [x * (-1.0 + x * (2.0 - x)), 2.0 + x * x * (3.0 * x - 5.0), x * (1.0 + x * (4.0 - 3.0 * x)), x * x * (x - 1.0)]
+    )
 
-    def mixed(name: str) -> np.ndarray:
-        a, b = getattr(first, name), getattr(second, name)
-        return a + (b - a) * share.reshape(-1, *[1] * (a.ndim - 1))
+    def mixed(values: np.ndarray) -> np.ndarray:
+        return sum(w.reshape(-1, *[1] * (values.ndim - 1)) * values[row] for w, row in zip(weights, around))
 
-    rotations = quaternion.slerp(first.rotations, second.rotations, share[:, None])
-    out = {name: mixed(name) for name in ("place", "frames", "under", "up")}
-    return _stepped(residuals, near.changed(rotations=rotations, **out), at)
+    near = residuals.rows(np.where(share < 0.5, low, np.minimum(low + 1, count - 1)))
+    out = {name: mixed(getattr(residuals, name)) for name in ("place", "under", "up")}
+    rotations = quaternion.normalized(mixed(residuals.rotations))
+    frames = residuals.frames[low] + share * (residuals.frames[np.minimum(low + 1, count - 1)] - residuals.frames[low])
+    return _stepped(residuals, near.changed(rotations=rotations, frames=frames, **out), at)
 
 
 def _stepped(residuals: Residuals, rows: Residuals, at: np.ndarray) -> Residuals:

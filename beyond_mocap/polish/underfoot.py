@@ -29,6 +29,7 @@ ABOVE = 1.0
 _EVERY = 0.03  # metres between the places at which a path's height is looked up
 _BEYOND = 1.5  # metres by which its ends are continued
 _ROUNDS = 4
+_EDGE, _SHORT_STEP = 0.2, 0.3  # share of a swing, and metres
 _LONGEST_SWING = 1.5  # seconds; a foot that is longer in the air follows the ground below it
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -126,12 +127,23 @@ def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, s
     after = np.minimum(before + 1, len(spans) - 1)
     way = (np.arange(len(feet)) - ends[before] + 1) / np.maximum(firsts[after] - ends[before] + 1, 1)
     way = np.clip(np.where(after == before, 0.0, way), 0.0, 1.0)
-    share = way**3 * (10.0 - 15.0 * way + 6.0 * way**2)
     toe = feet[:, 1]
+    share = _gone(toe, mean[before, 1], mean[after, 1], way)
     a, b = (height[at] + np.sum(slope[at] * (toe - mean[at, 1]), axis=1) for at in (before, after))
     found = a + (b - a) * share
     tilt = slope[before] + (slope[after] - slope[before]) * share[:, None]
     return found, tilt, _clearing(feet, found, tilt, clear, way, before, surface)
+
+
+def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """How much of its way from stance to stance (T, 2) a foot has gone, from 0 to 1: over the ground, but by time, `way`
+    (T,), where it leaves and arrives and where it stays about where it is."""
+    by_time = way**3 * (10.0 - 15.0 * way + 6.0 * way**2)
+    step = there - here
+    length = np.sum(step * step, axis=1)
+    by_place = np.clip(np.sum((toe - here) * step, axis=1) / np.maximum(length, 1e-9), 0.0, 1.0)
+    x = np.clip(np.minimum(way, 1.0 - way) / _EDGE, 0.0, 1.0) * np.clip(length / _SHORT_STEP**2, 0.0, 1.0)
+    return by_time + (by_place - by_time) * x * x * (3.0 - 2.0 * x)
 
 
 def _stances(stands: np.ndarray, fps: float) -> list[tuple[int, int]]:
