@@ -222,7 +222,8 @@ def _timed(
     happens at the path's end."""
     residuals, seams, told = source.residuals, np.zeros(0, dtype=int), ()
     wishes = Wishes(settings.slopes and settings.plant and source.humanoid, settings.climbs, settings.bends)
-    way = None if wishes.none or path is source.path or not settings.by_arc_length else way_of(path, arc)
+    plain = wishes.none or source.still or path is source.path or not settings.by_arc_length
+    way = None if plain else way_of(path, arc)
     if way is not None and way.plain(wishes) and source.way.plain(wishes):
         way = None
     if settings.cycle and settings.by_arc_length:
@@ -232,7 +233,7 @@ def _timed(
         told = ("by time the motion fills every path: it is not cycled",)
     if source.still:
         told += ("the motion stands still: it is placed at the path's beginning",)
-    if way is not None and not source.still:
+    if way is not None:
         own = way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
         timing = by_way(residuals, own, way, wishes, settings.speed, settings.delay, path.closed)
     elif settings.by_arc_length or source.still:

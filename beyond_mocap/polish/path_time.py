@@ -128,7 +128,7 @@ def way_of(path: Path, arc: ArcLength) -> Way:
     turn = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     slope = np.clip(first[:, 2] / np.maximum(level, 1e-9), -3.0, 3.0)
     bend = np.minimum(turn / np.maximum(level, 1e-9) ** 3, 20.0)
-    width = max(int(round(_SMOOTH / max(s[1], 1e-9))), 1)
+    width = int(np.clip(_SMOOTH / max(s[1], 1e-9), 1, count))
     mode = "wrap" if path.closed else "nearest"
     return Way(s, *(uniform_filter1d(uniform_filter1d(v, width, mode=mode), width, mode=mode) for v in (slope, bend)))
 
