@@ -47,6 +47,7 @@ from . import (
     move_moment,
     move_video,
     nudge_points,
+    path_apart,
     path_camera,
     path_cameras,
     path_curve,
@@ -151,6 +152,7 @@ CLASSES = (
     edit_path.BEYOND_MOCAP_OT_edit_path,
     path_curve.BEYOND_MOCAP_OT_path_curve,
     update_path.BEYOND_MOCAP_OT_update_path,
+    path_apart.BEYOND_MOCAP_OT_path_apart,
     bake_path.BEYOND_MOCAP_OT_bake_path,
     leave_path.BEYOND_MOCAP_OT_leave_path,
 )

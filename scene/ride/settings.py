@@ -77,6 +77,7 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
         name="Delay", default=0.0, min=0.0, max=86399.0, soft_max=10.0, precision=2, unit="TIME_ABSOLUTE",
         description="Seconds that the motion begins later",
     )
+    added: FloatProperty(name="Added", options={"HIDDEN"}, description="Seconds of the delay that keep it apart from others")
     detours: StringProperty(
         name="Detours", default="[]",
         description="Lateral detours as JSON: [arc in metres, width in metres, offset in metres to the left] each",

@@ -112,6 +112,13 @@ def ride_elsewhere():
     bpy.context.object.location.y += 1.0
 
 
+def ride_asked():
+    """The same, and it has been asked to wait, though nobody is in the way."""
+    ride()
+    rider = next(thing for thing in bpy.data.objects if thing.type == "ARMATURE" and thing.beyond_mocap_ride.on).beyond_mocap_ride
+    rider.delay = rider.added = 1.0
+
+
 def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
@@ -184,6 +191,7 @@ ROWS = {
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
     "move_video": Row("video", lambda places: {"frames": 3}),
     "nudge_points": Row("imported", lambda places: {"direction": "UP", "step": 0.3}, edit_points),
+    "path_apart": Row("accepted", prepare=ride_asked),
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "path_cameras": Row("accepted", prepare=ride),
     "path_curve": Row("accepted", lambda places: {"count": 7}, ride),

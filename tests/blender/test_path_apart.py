@@ -1,0 +1,135 @@
+"""Riders keep apart: found, resolved, told, taken back, and worked out anew from what the user drew."""
+
+import importlib
+import json
+
+import bpy
+import numpy as np
+import pytest
+from test_ride import choose, part, pelvis, scene, walker  # noqa: F401
+from undo import assert_one_step
+
+
+def straight(start, end, name="Line"):
+    """A curve of two points with handles along it."""
+    data = bpy.data.curves.new(name, "CURVE")
+    data.dimensions = "3D"
+    spline = data.splines.new("BEZIER")
+    spline.bezier_points.add(1)
+    for point, place in zip(spline.bezier_points, (start, end)):
+        point.co = place
+        point.handle_left_type = point.handle_right_type = "VECTOR"
+    thing = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(thing)
+    bpy.context.view_layer.update()
+    return thing
+
+
+def rider(start, end, **wishes):
+    """A walker on a straight line."""
+    body, drawn = walker(), straight(start, end)
+    choose(body, drawn)
+    for name, value in wishes.items():
+        setattr(body.beyond_mocap_ride, name, value)
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    return body
+
+
+def two(distance=3.0):
+    """Two who walk into each other, head on."""
+    return rider((0, 0, 0), (distance, 0, 0)), rider((distance, 0, 0), (0, 0, 0))
+
+
+def nearest(first, second):
+    """Metres between two pelvises over the ground, at the least."""
+    frames = range(bpy.context.scene.frame_start, 120)
+    return min(np.linalg.norm((pelvis(first, frame) - pelvis(second, frame))[:2]) for frame in frames)
+
+
+def asked(body):
+    ride = body.beyond_mocap_ride
+    return round(ride.delay, 4), json.loads(ride.detours)
+
+
+@pytest.fixture
+def said(extension, monkeypatch):
+    """What the operator reports."""
+    lines = []
+    kind = importlib.import_module(f"{extension.__name__}.operators.path_apart").BEYOND_MOCAP_OT_path_apart
+    monkeypatch.setattr(kind, "tell", lambda self, kept, tell=kind.tell: (lines.append(kept), tell(self, kept)))
+    return lines
+
+
+def test_head_on_they_pass_each_other_and_clear_takes_it_back(scene, said):  # noqa: F811
+    bodies = two()
+    assert nearest(*bodies) < 0.3
+    assert bpy.ops.beyond_mocap.path_apart() == {"FINISHED"}
+    assert said[0].before == 1 and said[0].left == ()
+    assert nearest(*bodies) > 0.59
+    sides = [offset for body in bodies for _, _, offset in asked(body)[1]]
+    assert sides and all(offset < 0 for offset in sides)
+    assert bpy.ops.beyond_mocap.path_apart(clear=True) == {"FINISHED"}
+    assert [asked(body) for body in bodies] == [(0.0, [])] * 2
+    assert nearest(*bodies) < 0.3
+
+
+def test_it_is_one_step_of_undo(scene):  # noqa: F811
+    two()
+    assert_one_step(bpy.ops.beyond_mocap.path_apart)
+    assert_one_step(bpy.ops.beyond_mocap.path_apart, clear=True)
+
+
+def test_pressed_again_it_asks_for_the_same_and_after_an_edit_for_nothing(scene):  # noqa: F811
+    bodies = two()
+    bpy.ops.beyond_mocap.path_apart()
+    once = [asked(body) for body in bodies]
+    bpy.ops.beyond_mocap.path_apart()
+    assert [asked(body) for body in bodies] == once
+    bodies[1].beyond_mocap_ride.curve.location.y += 3.0
+    bpy.context.view_layer.update()
+    bpy.ops.beyond_mocap.path_apart()
+    assert [asked(body) for body in bodies] == [(0.0, [])] * 2
+
+
+def test_a_delay_of_the_users_stays(scene):  # noqa: F811
+    across = rider((0, 0, 0), (4, 0, 0)), rider((1.5, -1.5, 0), (1.5, 3, 0), delay=0.5)
+    limits = {"detour": 0.0, "delay": 3.0}
+    bpy.ops.beyond_mocap.path_apart(**limits)
+    waits = [body.beyond_mocap_ride.delay for body in across]
+    assert waits[1] >= 0.5 - 1e-6 and sum(waits) > 0.6
+    bpy.ops.beyond_mocap.path_apart(**limits)
+    assert [body.beyond_mocap_ride.delay for body in across] == pytest.approx(waits)
+    assert nearest(*across) > 0.59
+    bpy.ops.beyond_mocap.path_apart(clear=True)
+    assert [body.beyond_mocap_ride.delay for body in across] == pytest.approx([0.0, 0.5], abs=1e-6)
+
+
+def test_of_three_the_two_selected_give_way(scene):  # noqa: F811
+    bodies = two()
+    third = rider((0, 0.1, 0), (3, 0.1, 0))
+    choose(*bodies)
+    bpy.ops.beyond_mocap.path_apart()
+    assert asked(third) == (0.0, [])
+    assert any(asked(body) != (0.0, []) for body in bodies)
+
+
+def test_what_cannot_be_resolved_is_told_with_names_and_time(scene, said):  # noqa: F811
+    bodies = two()
+    bpy.ops.beyond_mocap.path_apart(detour=0.1, delay=0.2)
+    [line] = said[0].left
+    assert all(body.name in line for body in bodies) and "frames" in line and " s " in line
+
+
+def test_without_a_rider_it_says_what_is_missing(scene):  # noqa: F811
+    walker()
+    with pytest.raises(RuntimeError, match="Edit Path"):
+        bpy.ops.beyond_mocap.path_apart()
+
+
+def test_a_curve_that_is_gone_is_one_line_and_nothing_changes(scene):  # noqa: F811
+    bodies = two()
+    before = [asked(body) for body in bodies]
+    bpy.data.objects.remove(bodies[0].beyond_mocap_ride.curve)
+    with pytest.raises(RuntimeError, match="curve"):
+        bpy.ops.beyond_mocap.path_apart()
+    assert [asked(body) for body in bodies] == before
