@@ -116,6 +116,9 @@ def following(layout, ride) -> None:
         column.prop(ride, "degree")
     for name in ("by_arc_length", "speed", "delay", "end", "cycle", "bends", "climbs"):
         column.prop(ride, name)
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.path_apart", icon="MOD_PHYSICS")
+    row.operator("beyond_mocap.path_apart", text="", icon="X").clear = True
 
 
 def own_body(layout, ride) -> None:
