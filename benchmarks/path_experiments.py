@@ -18,12 +18,15 @@ from pathlib import Path
 import numpy as np
 
 from beyond_mocap.annotation import Timeline
+from beyond_mocap.evaluation import jerk
 from beyond_mocap.evaluation.path_ride import figures
 from beyond_mocap.files import bvh
 from beyond_mocap.library.library import build
-from beyond_mocap.motion.motion import Motion
+from beyond_mocap.motion.arc_length import ArcLength
+from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.plan import Plan
+from beyond_mocap.polish.path_frame import moving_frame, placed
 from beyond_mocap.polish.path_line import through
 from beyond_mocap.ride import Ridden, RideSettings, RideSource, prepare, ride
 from beyond_mocap.synthesize import synthesize
@@ -195,6 +198,46 @@ def ends():
     return figure
 
 
+def cycling():
+    """Figure 5.6: the walk over and over, by jumping back to its first frame (eq. 4.5), and by our loop."""
+    figure, axes = plots.canvas(2, 2, tall=2.6, sharex="row", sharey="row")
+    line = path_shapes.straight(9.0)
+    ours = tried(SIMPLE, line, cycle=True)
+    crude, seams = _jumped(ours.source, ours.told["path"], len(ours.ridden.motion))
+    kinds = (("as in the paper", crude, seams, RIGID), ("ours", ours.ridden.motion, ours.ridden.seams, NEW))
+    for number, (title, motion, seams, colour) in enumerate(kinds):
+        values = jerk.jerk(forward_kinematics(motion)[0], motion.fps)
+        plots.sticks(axes[0, number], _at_home(motion, int(seams[0])), int(seams[0]) + np.arange(-4, 5, 2), colour)
+        axes[0, number].set_title(f"{title}: five moments over the first seam, 17 ms apart", fontsize=9)
+        plots.from_the_side(axes[0, number])
+        axes[1, number].plot(np.arange(len(values)) / motion.fps, values, color=colour, linewidth=0.8)
+        axes[1, number].set_yscale("log")
+        axes[1, number].set_xlabel("s", fontsize=8)
+        axes[1, number].tick_params(labelsize=7)
+        at = [int(seam) for seam in seams if seam < len(values) - 8]
+        most = max(values[seam - 8 : seam + 8].max() for seam in at)
+        print(f"  {title}: largest jerk at a seam {most:.0f} m/s^3")
+    axes[1, 0].set_ylabel("largest jerk of a joint, m/s^3", fontsize=8)
+    say("ours", ours)
+    return figure
+
+
+def _at_home(motion: Motion, frame: int) -> Motion:
+    """The motion with the pelvis of one frame over 0."""
+    return replace(motion, root_positions=motion.root_positions - motion.root_positions[frame] * [1.0, 1.0, 0.0])
+
+
+def _jumped(source: RideSource, path, count: int) -> tuple[Motion, np.ndarray]:
+    """`count` frames of a motion that jumps back to its first frame after its last, and the frames where it does."""
+    at = np.arange(count) % len(source.motion)
+    own = np.cumsum(source.residuals.step)
+    arc = own[at] + own[-1] * (np.arange(count) // len(source.motion))
+    u = ArcLength(path).parameter(arc)
+    moving = moving_frame(path.at(u), path.at(u, 1), arc, source.motion.fps)
+    root, rotations = placed(source.frame, moving, source.residuals.place[at], source.residuals.rotations[at])
+    return replace(source.motion, root_positions=root, rotations=rotations), np.flatnonzero(at == 0)[1:]
+
+
 def complexes():
     """Figures 5.12 to 5.16: the simple walk in a circle, a zigzag, an eight, and walkabout."""
     figure, axes = plots.canvas(2, 2, tall=4.2)
@@ -321,7 +364,8 @@ def _standing_frames(trial: Trial) -> np.ndarray:
 
 
 EXPERIMENTS: dict[str, Callable] = {
-    "degrees": degrees, "residuals": residuals, "lengths": lengths, "ends": ends, "complex": complexes, "walkers": walkers,
+    "degrees": degrees, "residuals": residuals, "lengths": lengths, "ends": ends, "cycling": cycling,
+    "complex": complexes, "walkers": walkers,
     "footprints": footprint, "bends": bends,
     "straightened": straightened, "rerouted": rerouted, "hills": hills,
 }  # fmt: skip

@@ -140,6 +140,7 @@ def _prepared(motion, options):
 def _ridden(source, path, settings, ground, options):
     """What was ridden, and the same as a take."""
     from ..annotation import Timeline
+    from ..evaluation.path_ride import carried
     from ..ride import ride
     from ..take import Take
 
@@ -151,7 +152,7 @@ def _ridden(source, path, settings, ground, options):
     take = Take(
         motion=ridden.motion, start_time=0.0, clips=(options.input.name,), clip=np.zeros(count, int),
         clip_frame=ridden.frames, mirrored=np.zeros(count, bool), words=((),) * count,
-        contacts=ridden.standing.all(axis=2), seams=np.asarray(ridden.seams, int), timeline=Timeline(), keys=(),
+        contacts=carried(ridden).all(axis=2), seams=np.asarray(ridden.seams, int), timeline=Timeline(), keys=(),
         ball=None, method="ride", seed=0, warnings=tuple(ridden.warnings), correction=ridden.correction,
         ik_miss=ridden.miss,
     )  # fmt: skip

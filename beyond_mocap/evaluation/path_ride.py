@@ -113,7 +113,7 @@ def _seams(source, ridden, own: np.ndarray, pelvis: np.ndarray) -> dict:
 
 def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
     """Skate on carried contacts in the recording, before planting and after; stances, the ground, what planting did."""
-    points, own_points = ridden.standing, source.standing
+    points, own_points = carried(ridden), source.standing
     own, mine = _foot_places(source.motion), _foot_places(ridden.motion)
     used = np.unique(frames)
     skate = {
@@ -133,6 +133,14 @@ def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
         "foot_correction_m": None if correction is None or not len(correction) else _spread(correction),
         "ik_miss_share": miss,
     }
+
+
+def carried(ridden) -> np.ndarray:
+    """(T, 2, 2) bool: which points of the feet stand, without the frames in which the ride begins again at the path's
+    beginning: nobody stands while he is set elsewhere."""
+    points = ridden.standing.copy()
+    points[1:][np.diff(ridden.arc) < 0.0] = False
+    return points
 
 
 def _foot_places(motion: Motion) -> np.ndarray:
