@@ -2,7 +2,7 @@
 
 Everything of one run is measured in one process on one core; seconds are the best of three. Written to
 benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
-`--compare` measures instead what is decided once and writes that section anew. A Blender measures with the numpy that
+`--compare` measures instead what is decided once, `--paths` recordings on other paths, and writes that section anew. A Blender measures with the numpy that
 it has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
 """
 
@@ -27,7 +27,7 @@ from beyond_mocap.library.library import Library, build  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesize import synthesize  # noqa: E402
 
-from benchmarks import compare, effort, markdown, misses, paper  # noqa: E402
+from benchmarks import compare, effort, markdown, misses, paper, path_editing  # noqa: E402
 from benchmarks.edit_time import edit_times  # noqa: E402
 from benchmarks.places import DATA, LIBRARIES, ROOT, library_folder, scenario  # noqa: E402
 
@@ -37,7 +37,7 @@ METHODS = {
     "distance": {"method": "distance"},
     "path": {"method": "path"},
 }
-COMPARED = "## Compared once"
+COMPARED, PATHS = "## Compared once", "## Path editing"
 KEY_COLUMNS = (
     "time_s", "labels", "clip", "time_error_s", "position_error_m", "contact_gap_m", "ball_shift_m", "used_instead",
 )
@@ -136,11 +136,12 @@ def bench(scenarios: list[int], libraries: list[str], command: str) -> list[str]
     return lines
 
 
-def sections(path: Path) -> tuple[list[str], list[str]]:
-    """The lines of results written before: what bench writes, and what was compared once."""
+def sections(path: Path) -> list[list[str]]:
+    """The lines of results written before: scenarios, recordings on other paths, what was compared once."""
     lines = path.read_text().splitlines() if path.is_file() else []
-    cut = lines.index(COMPARED) if COMPARED in lines else len(lines)
-    return lines[:cut], lines[cut:]
+    third = lines.index(COMPARED) if COMPARED in lines else len(lines)
+    second = lines.index(PATHS) if PATHS in lines else third
+    return [lines[:second], lines[second:third], lines[third:]]
 
 
 def main() -> int:
@@ -149,6 +150,7 @@ def main() -> int:
     options.add_argument("--scenarios", type=int, nargs="+", default=[1, 2, 3, 4, 5])
     options.add_argument("--library", choices=tuple(LIBRARIES), nargs="+", default=list(LIBRARIES))
     options.add_argument("--compare", action="store_true", help="what is decided once, instead of the methods")
+    options.add_argument("--paths", action="store_true", help="recordings on other paths, instead of the scenarios")
     options.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
     chosen = options.parse_args(arguments)
@@ -157,14 +159,15 @@ def main() -> int:
         return 0
     effort.on_one_core()
     command = " ".join(["python -m benchmarks", *arguments])
-    before, compared = sections(chosen.out)
+    parts = sections(chosen.out)
     if chosen.compare:
-        told = [COMPARED, "", f"`{command}`", "", *compare.all_of(chosen.scenarios, chosen.library)]
-        lines = [*before, *told]
+        parts[2] = told = [COMPARED, "", f"`{command}`", "", *compare.all_of(chosen.scenarios, chosen.library)]
     else:
-        told = bench(chosen.scenarios, chosen.library, command)
-        lines = [*told, *compared]
-    chosen.out.write_text("\n".join(lines).rstrip() + "\n")
+        told = parts[1] = [PATHS, "", f"`{command}`", "", *path_editing.section(), ""]
+        if not chosen.paths:
+            parts[0] = bench(chosen.scenarios, chosen.library, command)
+            told = [*parts[0], *parts[1]]
+    chosen.out.write_text("\n".join(line for part in parts for line in part).rstrip() + "\n")
     print("\n".join(told))
     return 0
 

@@ -37,6 +37,10 @@ from benchmarks.places import CMU_UNIT, DATA, ROOT
 
 PICTURES = ROOT / "docs" / "pictures"
 DEGREES = (2, 4, 13, 45)
+SHAPES = {
+    "circle, radius 2 m": path_shapes.circle(2.0), "zigzag": path_shapes.zigzag(legs=5),
+    "figure of eight": path_shapes.eight(2.8, 1.0), "walkabout": path_shapes.walkabout(16.0, seed=8, tightest=1.0),
+}  # fmt: skip
 SIMPLE, RUN = "train_walking_3", "train_running_1"
 WALK_SPEED = 1.15
 AS_PAPER = {"plant": False, "lean": False, "slopes": False}
@@ -75,11 +79,14 @@ class Trial:
     source: RideSource
     ridden: Ridden
     told: dict
+    planted: bool
 
     @property
     def feet(self) -> str:
         """What is written under its picture."""
         skate = self.told["skate"]
+        if not self.planted:
+            return f"feet slide {skate['contact_cm_s']:.1f}, {skate['source_contact_cm_s']:.1f} cm/s recorded"
         return (
             f"feet slide {skate['before_contact_cm_s']:.1f} rigid, {skate['contact_cm_s']:.1f} planted, "
             f"{skate['source_contact_cm_s']:.1f} cm/s recorded"
@@ -92,7 +99,7 @@ def tried(name: str, line: np.ndarray | None, ground=None, **settings) -> Trial:
     source = source_of(name, chosen)
     path = source.path if line is None else through(line, "line")
     ridden = ride(source, path, chosen, ground)
-    return Trial(source, ridden, {**figures(source, ridden, path, ground), "path": path})
+    return Trial(source, ridden, {**figures(source, ridden, path, ground), "path": path}, chosen.plant)
 
 
 def say(name: str, trial: Trial) -> None:
@@ -207,7 +214,8 @@ def cycling():
     kinds = (("as in the paper", crude, seams, RIGID), ("ours", ours.ridden.motion, ours.ridden.seams, NEW))
     for number, (title, motion, seams, colour) in enumerate(kinds):
         values = jerk.jerk(forward_kinematics(motion)[0], motion.fps)
-        plots.sticks(axes[0, number], _at_home(motion, int(seams[0])), int(seams[0]) + np.arange(-4, 5, 2), colour)
+        moments = int(seams[0]) + np.arange(-4, 5, 2)
+        plots.sticks(axes[0, number], _at_home(motion, int(seams[0])), moments, colour, spread=0.55)
         axes[0, number].set_title(f"{title}: five moments over the first seam, 17 ms apart", fontsize=9)
         plots.from_the_side(axes[0, number])
         axes[1, number].plot(np.arange(len(values)) / motion.fps, values, color=colour, linewidth=0.8)
@@ -241,8 +249,7 @@ def _jumped(source: RideSource, path, count: int) -> tuple[Motion, np.ndarray]:
 def complexes():
     """Figures 5.12 to 5.16: the simple walk in a circle, a zigzag, an eight, and walkabout."""
     figure, axes = plots.canvas(2, 2, tall=4.2)
-    for ax, name in zip(axes.ravel(), ("circle 2 m", "zigzag", "eight", "walkabout")):
-        line = _cut(path_shapes.ALL[name], 12.5)
+    for ax, (name, line) in zip(axes.ravel(), SHAPES.items()):
         trial = tried(SIMPLE, line, cycle=True)
         _prints(ax, trial)
         plots.from_above(ax, name, trial.feet)
@@ -254,9 +261,9 @@ def complexes():
 def walkers():
     """The same rides as bodies."""
     figure, axes = plots.canvas(1, 4, tall=2.9)
-    for ax, name in zip(axes[0], ("circle 2 m", "zigzag", "eight", "walkabout")):
-        ridden = tried(SIMPLE, _cut(path_shapes.ALL[name], 12.5), cycle=True).ridden
-        frames = np.searchsorted(ridden.arc, np.arange(0.0, ridden.arc[-1], 0.9))
+    for ax, (name, line) in zip(axes[0], SHAPES.items()):
+        ridden = tried(SIMPLE, line, cycle=True).ridden
+        frames = np.searchsorted(ridden.arc, np.arange(0.0, ridden.arc[-1], 1.05))
         plots.photo(ax, plots.bodies(ridden.motion, frames, -70.0, size=300, tilt=1.2), name)
     return figure
 
@@ -264,7 +271,7 @@ def walkers():
 def footprint():
     """A piece of the circle from near by: standing feet, rigid and planted."""
     figure, axes = plots.canvas(1, 3, tall=3.6)
-    trial = tried(SIMPLE, _cut(path_shapes.ALL["circle 2 m"], 12.5), cycle=True)
+    trial = tried(SIMPLE, path_shapes.circle(2.0), cycle=True)
     shown = (
         ("recorded", trial.source.motion, trial.source.standing, OLD),
         ("ridden rigidly", trial.ridden.rigid, trial.ridden.standing, RIGID),
@@ -322,12 +329,13 @@ def straightened():
 def rerouted():
     """Figures 5.19 and 5.20: the complex motion on other complex paths."""
     figure, axes = plots.canvas(1, 2, tall=4.6)
-    for ax, name in zip(axes[0], ("eight", "winding")):
-        trial = tried("complex", _cut(path_shapes.ALL[name], 13.0))
+    lines = {"figure of eight": path_shapes.eight(2.8, 1.0), "one bend after the other": path_shapes.winding(length=20.0)}
+    for ax, (name, line) in zip(axes[0], lines.items()):
+        trial = tried("complex", line)
         _prints(ax, trial)
         plots.from_above(ax, name, trial.feet)
         say(name, trial)
-    plots.legend(axes[0, 0], loc="center")
+    plots.legend(axes[0, 1], loc="upper left")
     return figure
 
 

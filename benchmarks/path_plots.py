@@ -111,7 +111,7 @@ def bodies(motion: Motion, frames: np.ndarray, side: float, size: int = 640, til
     body = low_poly_body(motion.skeleton, example=motion)
     skins = deformed(body, motion.skeleton, *pose_kinematics(motion.skeleton, root, local))
     middle = 0.5 * (root[:, :2].max(axis=0) + root[:, :2].min(axis=0))
-    across = wide or max(float(np.ptp(root[:, :2], axis=0).max()) + 1.6, 2.4)
+    across = wide or max(1.2 * float(np.ptp(root[:, :2], axis=0).max()) + 1.4, 2.4)
     at = np.array([*middle, 0.7])
     away = np.array([np.cos(np.radians(side)), np.sin(np.radians(side)), tilt])
     view = look.View(at + 2.5 * across * away, at, 2 * size, across)
