@@ -133,7 +133,7 @@ class Ridden:
     carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,): first
     frames after a jump from a cycle's end to its start, faded over; again (R,): first frames where motion and path begin
     anew, a cut; correction (N, 2) m by which each foot was moved, miss (N, 2) m that it is short of
-    where it should be; rigid: the motion before leaning and planting."""
+    where it should be; laid: root (N, 3) m and local rotations (N, J, 4) before leaning and planting."""
 
     motion: Motion
     frames: np.ndarray
@@ -144,10 +144,15 @@ class Ridden:
     seams: np.ndarray
     correction: np.ndarray
     miss: np.ndarray
-    rigid: Motion
+    laid: tuple[np.ndarray, np.ndarray]
     source: RideSource
     warnings: tuple[str, ...] = field(default=())
     again: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    @cached_property
+    def rigid(self) -> Motion:
+        """The motion before leaning and planting."""
+        return Motion(self.motion.skeleton, *self.laid, self.motion.fps)
 
 
 def prepare(
@@ -197,7 +202,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     own = _faces(source.motion, source.humanoid) if source.still and path is source.path else None
     moving = moving_frame(origin, tangent, timing.arc, residuals.fps, own)
     root, rotations = placed(source.frame, moving, rows.place, rows.rotations)
-    rigid = Motion(residuals.skeleton, root, rotations, residuals.fps)
+    laid = root, rotations
     if settings.lean and source.humanoid:
         rotations = _leaned(source, rows, moving, timing, rotations, seams)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
@@ -209,7 +214,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
     ridden = Ridden(
-        motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, rigid, source,
+        motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, laid, source,
         (*source.warnings, *end.told), end.again,
     )  # fmt: skip
     return _begun_again(ridden, end.shown) if len(end.again) else ridden
@@ -249,11 +254,9 @@ def _timed(
 def _begun_again(ridden: Ridden, shown: np.ndarray) -> Ridden:
     """The frames `shown` (N,) of a motion that begins again: each time it is laid out alike."""
     rows = ("frames", "standing", "arc", "origin", "heading", "correction", "miss")
-    motions = {
-        name: replace(motion, root_positions=motion.root_positions[shown], rotations=motion.rotations[shown])
-        for name, motion in (("motion", ridden.motion), ("rigid", ridden.rigid))
-    }
-    return replace(ridden, **{name: getattr(ridden, name)[shown] for name in rows}, **motions)
+    motion, laid = ridden.motion, tuple(values[shown] for values in ridden.laid)
+    motion = replace(motion, root_positions=motion.root_positions[shown], rotations=motion.rotations[shown])
+    return replace(ridden, **{name: getattr(ridden, name)[shown] for name in rows}, motion=motion, laid=laid)
 
 
 def _parameters(

@@ -37,7 +37,7 @@ def bend(
     nearest = np.abs(upper - lower) + 0.02 * (upper + lower)
     reach = np.maximum(soft_distance(asked, upper + lower, soft), nearest)
     across = pole - np.sum(pole * direction, axis=-1, keepdims=True) * direction
-    across = unit(across, _any_normal(direction))
+    across = _unit_across(across, direction)
     along = (upper**2 - lower**2 + reach**2) / (2.0 * reach)
     height = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     middle = top + along[..., None] * direction + height[..., None] * across
@@ -48,6 +48,12 @@ def unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) at length one; `otherwise` (..., 3) where they have none."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     return np.where(length > 1e-9, v / np.maximum(length, 1e-9), otherwise)
+
+
+def _unit_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) at length one; any square to `direction` (..., 3) where they have none."""
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    return v / length if np.all(length > 1e-9) else unit(v, _any_normal(direction))
 
 
 def _any_normal(direction: np.ndarray) -> np.ndarray:
@@ -62,6 +68,6 @@ def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     A leg that hangs straight down with its knee pointing along +X has direction -Z and hinge -Y: the identity.
     """
     left = -(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
-    left = unit(left, _any_normal(direction))
+    left = _unit_across(left, direction)
     forward = quaternion.cross(left, -direction)
     return quaternion.from_matrix(np.stack([forward, left, -direction], axis=-1))

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,22 +64,17 @@ def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     return pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
 
 
-def pose_kinematics(
-    skeleton: Skeleton, root: np.ndarray, local: np.ndarray, joints: Collection[int] | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """World positions (..., J, 3) and rotations (..., J, 4) from root positions (..., 3) and local rotations
-    (..., J, 4). joints: those that are wanted, by default all; of others than these and those above them there is NaN.
+    (..., J, 4).
 
     Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
     """
     lead = local.shape[:-2]
     flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
-    world = np.empty_like(flat) if joints is None else np.full_like(flat, np.nan)
-    places = np.full((len(skeleton), 3, flat.shape[2]), np.nan)
-    wanted = None if joints is None else skeleton.with_ancestors(joints)
+    world = np.empty_like(flat)
+    places = np.empty((len(skeleton), 3, flat.shape[2]))
     for joint, parent in enumerate(skeleton.parents):
-        if wanted is not None and joint not in wanted:
-            continue
         if parent < 0:
             world[joint] = flat[joint]
             places[joint] = root.reshape(-1, 3).T

@@ -157,17 +157,14 @@ def from_matrix(m: np.ndarray) -> np.ndarray:
     a = [m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]]
     s = {(i, j): m[..., i, j] + m[..., j, i] for i, j in ((0, 1), (0, 2), (1, 2))}
     one = 1.0 + squares
-    candidates = np.stack(
-        [
-            np.stack([one[..., 0], a[0], a[1], a[2]], axis=-1),
-            np.stack([a[0], one[..., 1], s[0, 1], s[0, 2]], axis=-1),
-            np.stack([a[1], s[0, 1], one[..., 2], s[1, 2]], axis=-1),
-            np.stack([a[2], s[0, 2], s[1, 2], one[..., 3]], axis=-1),
-        ],
-        axis=-2,
+    candidates = (
+        (one[..., 0], a[0], a[1], a[2]),
+        (a[0], one[..., 1], s[0, 1], s[0, 2]),
+        (a[1], s[0, 1], one[..., 2], s[1, 2]),
+        (a[2], s[0, 2], s[1, 2], one[..., 3]),
     )
     best = np.argmax(squares, axis=-1)
-    q = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
+    q = np.stack([np.choose(best, component) for component in zip(*candidates)], axis=-1)
     q = normalized(q)
     return np.where(q[..., :1] < 0.0, -q, q)
 

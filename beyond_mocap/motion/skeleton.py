@@ -61,14 +61,16 @@ class Skeleton:
         """Indices of the joints that hang on `joint`."""
         return tuple(i for i, p in enumerate(self.parents) if p == joint)
 
-    def with_ancestors(self, joints: Collection[int]) -> frozenset[int]:
-        """These joints and all above them."""
+    def part(self, joints: Collection[int]) -> tuple["Skeleton", list[int]]:
+        """These joints and all above them as a skeleton without tips, and their indices in this one."""
         found: set[int] = set()
         for joint in joints:
-            while joint >= 0 and joint not in found:
+            while joint >= 0:
                 found.add(joint)
                 joint = self.parents[joint]
-        return frozenset(found)
+        kept = sorted(found)
+        parents = [-1 if joint == 0 else kept.index(self.parents[joint]) for joint in kept]
+        return Skeleton([self.names[joint] for joint in kept], parents, self.offsets[kept]), kept
 
     def scaled(self, size: float) -> "Skeleton":
         """The skeleton of a body `size` times as large."""

@@ -9,11 +9,12 @@ knee pops when a foot arrives. And only the joints of the legs are looked at, si
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from ..motion import quaternion
-from ..motion.humanoid import identify
+from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
@@ -91,10 +92,8 @@ def follow(
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. ground: None where feet keep their heights; steps: None
     where they are as long as they were.
     """
-    body = identify(skeleton)
-    limbs = (body.left, body.right)
-    chain = [joint for limb in limbs for joint in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot)]
-    places, world = pose_kinematics(skeleton, root, rotations, chain)
+    legs, kept, limbs = _legs(skeleton)
+    places, world = pose_kinematics(legs, root, rotations[:, kept])
     scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
     feet = [_steady(laid_foot(places, world, limb, standing[:, side])) for side, limb in enumerate(limbs)]
     if steps is not None:
@@ -119,12 +118,25 @@ def follow(
         hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
         target = _eased(foot, goal, hip, scale)
         joints = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        found, _ = bent_limb(skeleton, places, world, joints, target, end_rotation=turned, soft=1e-4)
+        found, _ = bent_limb(legs, places, world, joints, target, end_rotation=turned, soft=1e-4)
         for joint, local in found.items():
-            out[:, joint] = local
+            out[:, kept[joint]] = local
         miss[:, side] = np.where(foot.carries > 0.0, np.linalg.norm(target - goal, axis=1), 0.0)
         correction[:, side] = np.linalg.norm((target - places[:, foot.limb.foot])[:, :2], axis=1)
     return Planted(root - down, out, correction, miss)
+
+
+@lru_cache(maxsize=32)
+def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, Limb]]:
+    """A skeleton's legs and what they hang on, their joints in the whole one, and the limbs by the joints of the part."""
+    body = identify(skeleton)
+    named = [[limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
+    legs, kept = skeleton.part([joint for side in named for joint in side])
+    found = []
+    for limb, joints in zip((body.left, body.right), named):
+        upper, lower, foot, toe = (kept.index(joint) for joint in joints)
+        found.append(replace(limb, upper_leg=upper, lower_leg=lower, foot=foot, toe=None if limb.toe is None else toe))
+    return legs, kept, tuple(found)
 
 
 def _steady(foot: Foot) -> Foot:
