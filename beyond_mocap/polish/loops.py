@@ -41,7 +41,7 @@ class Loop:
 
     apart: metres by which both differ (root mean square over joints, places and velocities, in a window around them);
     unlike: the same as a share of how far apart any two moments of the motion are; cost: the same with what else speaks against the loop; metres: arc length of once round; strides: how many strides
-    that is, about.
+    that is, about; ending: how unlike anything in the loop the motion's last moment is, on the scale of `unlike`.
     """
 
     start: int
@@ -51,6 +51,7 @@ class Loop:
     cost: float
     metres: float
     strides: float
+    ending: float
 
     def __len__(self) -> int:
         return self.end - self.start
@@ -236,7 +237,9 @@ def _exact(
     first, last = int(start[at[0], 0]), int(end[0, at[1]])
     metres = float(residuals.step[first + 1 : last + 1].sum())
     off = float(apart[at])
-    return Loop(first, last, off, off / max(usual, 1e-9), float(cost[at]), metres, (last - first) / stride)
+    ending = float(np.linalg.norm(features[first:last] - features[-1], axis=1).min())
+    usual = max(usual, 1e-9)
+    return Loop(first, last, off, off / usual, float(cost[at]), metres, (last - first) / stride, ending / usual)
 
 
 def _along_diagonals(values: np.ndarray, window: int) -> np.ndarray:

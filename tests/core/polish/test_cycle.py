@@ -13,7 +13,7 @@ from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.polish import cycle
-from beyond_mocap.polish.cycle import MOST_SCALE, SAME_LENGTH, cycled
+from beyond_mocap.polish.cycle import KEPT_SCALE, MOST_SCALE, SAME_LENGTH, cycled
 from beyond_mocap.polish.loops import find_loop, find_loops, stride_frames
 from beyond_mocap.polish.path_frame import Residuals
 from beyond_mocap.ride import RideSettings, prepare
@@ -55,6 +55,13 @@ def walk():
     return prepare(gait(1.4, 4.0, 60.0, seed=3), RideSettings()).residuals
 
 
+@pytest.fixture(scope="module")
+def stop():
+    """A made walk that stops after three and a half seconds."""
+    seconds = np.arange(300) / 60.0
+    return prepare(gait(1.4 * np.clip((4.2 - seconds) / 0.7, 0.0, 1.0), fps=60.0, seed=3), RideSettings()).residuals
+
+
 @pytest.mark.parametrize("period", [24, 36, 41])
 def test_the_planted_period_is_found_and_costs_nothing(period):
     residuals = planted(int(3.6 * period), period)
@@ -86,33 +93,40 @@ def test_the_same_input_gives_the_same_bits(walk):
     assert np.array_equal(first.seams, second.seams)
 
 
-def test_the_recorded_end_comes_where_the_path_ends(walk):
-    own = walk.step.sum()
+def test_the_recorded_end_comes_where_the_path_ends(stop):
+    own = stop.step.sum()
     for length in own * np.array([2.0, 2.5, 3.1, 4.0, 5.3]):
-        out = cycled(walk, length)
+        out = cycled(stop, length)
         shown = out.residuals
         assert shown.step.sum() == pytest.approx(length, abs=1e-6)
-        assert np.array_equal(shown.frames[-20:], walk.frames[-20:]) and np.array_equal(shown.frames[:20], walk.frames[:20])
-        assert abs(out.scale - 1.0) <= MOST_SCALE + 0.01
+        assert np.array_equal(shown.frames[-20:], stop.frames[-20:]) and np.array_equal(shown.frames[:20], stop.frames[:20])
+        assert abs(out.scale - 1.0) <= MOST_SCALE + 1e-6
 
 
-def test_where_the_end_cannot_be_met_the_motion_is_long_enough_and_cut_while_it_goes_on(walk):
-    loop = find_loop(walk)
-    own = walk.step.sum()
-    length = own + 0.5 * loop.metres
-    out = cycled(walk, length, (loop,))
-    assert out.scale == 1.0 and length - 0.03 < out.residuals.step.sum() <= length + SAME_LENGTH
+def test_who_ends_as_he_goes_keeps_his_speed(walk):
+    for length in walk.step.sum() * np.linspace(1.2, 4.0, 8):
+        out = cycled(walk, length)
+        assert abs(out.scale - 1.0) <= KEPT_SCALE + 1e-6 and not out.told
+        assert out.residuals.step.sum() == pytest.approx(length, abs=SAME_LENGTH)
+
+
+def test_where_the_end_cannot_be_met_the_motion_is_cut_while_it_goes_on(stop):
+    loop = find_loop(stop)
+    length = stop.step.sum() + 0.5 * loop.metres
+    out = cycled(stop, length, (loop,))
+    assert out.residuals.step.sum() == pytest.approx(length, abs=SAME_LENGTH) and abs(out.scale - 1.0) < 0.002
     assert "cut there" in out.told[0]
-    assert out.residuals.frames[-1] < loop.end  # not in the middle of what the motion ends with
+    assert out.residuals.frames[-1] < loop.end  # not in the middle of stopping
 
 
-def test_a_motion_of_the_path_s_length_gets_no_lap_more(walk):
+def test_a_motion_of_the_path_s_length_gets_no_lap_more(walk, stop):
     own = float(walk.step.sum())
     for length in (own, own - 9e-4, own + 9e-4, 0.5 * own):
         out = cycled(walk, length)
         assert out.residuals is walk and not len(out.seams)
-    almost = cycled(walk, 0.97 * own)
-    assert len(almost.residuals) == len(walk) and almost.residuals.step.sum() == pytest.approx(0.97 * own)
+    for share in (0.97, 1.03):
+        almost = cycled(stop, share * stop.step.sum())
+        assert len(almost.residuals) == len(stop) and almost.scale == pytest.approx(share)
 
 
 def test_a_seam_neither_jumps_nor_lets_a_moved_foot_stand(walk):
