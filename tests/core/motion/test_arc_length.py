@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.arc_length import ArcLength
-from beyond_mocap.motion.path import PolynomialPath, SplinePath
+from beyond_mocap.motion.path import Path, PolynomialPath, SplinePath
 
 LEGENDRE = np.polynomial.legendre
 
@@ -86,3 +86,44 @@ def test_large_coordinates_are_no_reason_to_halve_for_ever():
     near, far = (ArcLength(SplinePath(knots, coefficients + move)) for move in (0.0, 1e5))
     assert far.length == pytest.approx(near.length, abs=1e-6)
     assert back_and_forth(far) < 1e-9
+
+
+class Helix(Path):
+    """Radius 2 m, 0.5 m up a radian, told by an angle that speeds up: its length has a closed form."""
+
+    domain, closed = (0.0, 3.0), False
+    breaks = np.array([0.0, 3.0])
+
+    def at(self, u, derivative=0):
+        u = np.asarray(u, dtype=float)
+        angle = u**2
+        if derivative == 0:
+            return np.stack([2 * np.cos(angle), 2 * np.sin(angle), 0.5 * angle], axis=1)
+        return 2 * u[:, None] * np.stack([-2 * np.sin(angle), 2 * np.cos(angle), np.full(len(u), 0.5)], axis=1)
+
+
+def test_a_helix_that_sets_out_from_a_stand():
+    arc, u = ArcLength(Helix()), np.linspace(0.0, 3.0, 50)
+    assert arc.at(u) == pytest.approx(np.sqrt(4.25) * u**2, abs=1e-7)
+    assert arc.parameter(np.sqrt(4.25) * u**2) == pytest.approx(u, abs=1e-6)
+
+
+def test_a_circle_drawn_as_a_closed_spline():
+    from scipy.interpolate import make_interp_spline
+
+    angle = np.linspace(0.0, 2 * np.pi, 65)
+    spline = make_interp_spline(angle, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), bc_type="periodic")
+    path = SplinePath(spline.t, spline.c, 3, closed=True)
+    assert ArcLength(path).length == pytest.approx(2 * np.pi, abs=1e-5)  # what the cubic is off the circle
+    assert path.at(np.array([-0.5, 7.0])) == pytest.approx(path.at(np.array([2 * np.pi - 0.5, 7.0 - 2 * np.pi])), abs=1e-12)
+
+
+def test_lengths_are_found_where_the_path_stands_for_a_while():
+    """Forward, five seconds on one spot, and forward again."""
+    x = np.concatenate([np.linspace(0, 2, 9), np.full(20, 2.0), np.linspace(2, 5, 12)])
+    points = np.stack([x, 0 * x, 0 * x], axis=1)
+    knots = np.concatenate([[0.0] * 3, np.linspace(0, 10, len(x) - 2), [10.0] * 3])
+    arc = ArcLength(SplinePath(knots, points))
+    assert arc.length == pytest.approx(5.0, abs=1e-9)
+    assert back_and_forth(arc, 1001) < 1e-7
+    assert np.all(np.diff(arc.parameter(np.linspace(0, 5, 400))) > 0)

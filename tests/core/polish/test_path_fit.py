@@ -1,5 +1,7 @@
 """Fitted paths: planted ways come back, the sway of steps stays out of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,3 +73,18 @@ def test_the_heading_of_a_fitted_walk_does_not_wobble():
     yaw = np.arctan2(*fit_spline(WAY + SWAY, TIMES).at(TIMES, 1).T[1::-1])
     truth = np.arctan2(np.gradient(WAY[:, 1]), np.gradient(WAY[:, 0]))
     assert np.degrees(np.abs(yaw - truth))[60:-60].max() < 1.5
+
+
+@pytest.mark.parametrize("slope", (0.3, -0.2))
+def test_the_ground_under_a_walk_up_a_hill_rises_with_it(slope):
+    motion = gait(1.4, 6.0, 30.0)
+    standing = contacts.points(motion)
+    floor = contacts.ground_height(motion)
+    root = motion.root_positions.copy()
+    root[:, 2] += slope * (root[:, 0] - root[0, 0])
+    hill = replace(motion, root_positions=root)
+    truth = floor + slope * (root[:, 0] - root[0, 0])
+    assert np.abs(places_on_ground(hill, standing)[:, 2] - truth).max() < 0.12
+    path = fit(hill, standing)
+    times = np.arange(len(hill)) / 30.0
+    assert np.abs(path.at(times)[:, 2] - truth)[15:-15].max() < 0.08
