@@ -111,6 +111,10 @@ class Carrier(ABC):
             raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride", "that action",
                              "choose it again in the Action Editor, or press Leave")
         linked.refuse(found)
+        if found.users - found.use_fake_user > 1:  # a copy of the armature plays it too: each has his own
+            identifier, found = slot.identifier, found.copy()
+            slot = next(slot for slot in found.slots if slot.identifier == identifier)
+            channels.assign(self.body, found, slot)
         return found, slot
 
 

@@ -34,7 +34,8 @@ _SPARE = 0.002  # metres by which a fitted curve is longer than the path, so tha
 @dataclass(frozen=True, eq=False)
 class Drawn:
     """A curve object as it is now. points: (P, 9) m of Bezier points and their left and right handles, or (P, 4) of other
-    control points and their weights, in the world; notes: lines for the user."""
+    control points and their weights, in the world; still: bytes that are others only where it is edited, not where it is
+    animated; notes: lines for the user."""
 
     name: str
     kind: str
@@ -42,13 +43,14 @@ class Drawn:
     order: int
     clamped: bool
     closed: bool
+    still: bytes
     notes: tuple[str, ...]
 
     @property
     def digest(self) -> bytes:
         """Another where the path is another."""
         form = f"{self.kind} {self.order} {self.clamped} {self.closed}".encode()
-        return hashlib.blake2b(form + self.points.tobytes(), digest_size=16).digest()
+        return hashlib.blake2b(form + self.still, digest_size=16).digest()
 
     def line(self) -> np.ndarray:
         """Places (N, 3) m along it, close together where it bends."""
@@ -89,6 +91,10 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
         notes.append(f"curve {drawn.name}: only the first of its {len(lines)} lines is the path")
     if any(modifier.show_viewport for modifier in drawn.modifiers):
         notes.append(f"curve {drawn.name}: its modifiers are not followed")
+    if drawn.data.shape_keys is not None:
+        notes.append(f"curve {drawn.name}: its shape keys are not followed")
+    if animated := _is_animated(drawn):
+        notes.append(f"curve {drawn.name}: it moves; the motion rides it as it lay when it was edited last")
     world, units = np.array(drawn.matrix_world), units_per_metre(scene)
     points = _control_points(spline)
     places = points[:, :9] if spline.type == "BEZIER" else points[:, :3]
@@ -98,7 +104,8 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
         raise InputError(f"curve {drawn.name}", "a point that is no number", "numbers", "move or delete that point")
     kind = spline.type if spline.type in {"BEZIER", "POLY"} else "NURBS"
     order = spline.order_u if kind == "NURBS" else 0
-    return Drawn(drawn.name, kind, values, order, spline.use_endpoint_u, spline.use_cyclic_u, tuple(notes))
+    still = points.tobytes() + repr(units).encode() if animated else values.tobytes()
+    return Drawn(drawn.name, kind, values, order, spline.use_endpoint_u, spline.use_cyclic_u, still, tuple(notes))
 
 
 def create(
@@ -136,6 +143,16 @@ def create(
     room.objects.link(made)
     context.view_layer.update()
     return made
+
+
+def _is_animated(drawn: bpy.types.Object) -> bool:
+    """Whether a curve object goes elsewhere with the frame."""
+    while drawn is not None:
+        data = drawn.animation_data
+        if drawn.constraints or (data is not None and (data.action or data.nla_tracks or data.drivers)):
+            return True
+        drawn = drawn.parent
+    return False
 
 
 def _control_points(spline: bpy.types.Spline) -> np.ndarray:

@@ -55,6 +55,11 @@ def _after_change(_scene, depsgraph):
 
 
 @persistent
+def _after_frame(*_):
+    mark()  # an edit that a change of frame brings into force is told by nothing else
+
+
+@persistent
 def _after_undo(*_):
     source.unsure()
     mark()
@@ -76,13 +81,14 @@ def _tick():
 
 
 HANDLERS = (("undo_post", _after_undo), ("redo_post", _after_undo), ("load_post", _after_load),
-            ("depsgraph_update_post", _after_change))
+            ("depsgraph_update_post", _after_change), ("frame_change_post", _after_frame))
+WITH_WINDOW = {"depsgraph_update_post", "frame_change_post"}
 
 
 def register():
     """Follow from now on; by itself only where there is a window."""
     for name, handler in HANDLERS:
-        if name != "depsgraph_update_post" or not bpy.app.background:
+        if name not in WITH_WINDOW or not bpy.app.background:
             getattr(bpy.app.handlers, name).append(handler)
     if not bpy.app.background:
         bpy.app.timers.register(_tick, first_interval=0.5, persistent=True)

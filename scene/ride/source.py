@@ -91,9 +91,10 @@ def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: b
 def _mesh(ground: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """A mesh object as it is shown: vertices (V, 3) in the world, in Blender's units, and triangles (F, 3)."""
     shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    mesh = shown.data
+    mesh = shown.to_mesh()  # also while it is being edited
     places, corners = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
     mesh.vertices.foreach_get("co", places)
     mesh.loop_triangles.foreach_get("vertices", corners)
+    shown.to_mesh_clear()
     world = np.array(shown.matrix_world)
     return places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3], corners.reshape(-1, 3)

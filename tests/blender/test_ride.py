@@ -431,3 +431,88 @@ def test_feet_follow_a_mesh(scene, part):
     mesh.update()
     bpy.context.view_layer.update()
     assert live.follow(scene) == 1
+
+
+def test_a_copy_that_shares_the_action_gets_its_own(scene, part):
+    """Alt-D: two riders on two curves, and no write of one is undone by the other."""
+    live, riders = part("ride.live"), part("ride.riders")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    twin = body.copy()
+    scene.collection.objects.link(twin)
+    twin.beyond_mocap_ride.curve = circle()
+    bpy.context.view_layer.update()
+    assert twin.animation_data.action == body.animation_data.action
+    live.follow(scene)
+    assert twin.animation_data.action != body.animation_data.action and live.follow(scene) == 0
+    assert to_path(riders, twin, 20) < 0.12 and to_path(riders, body, 20) < 0.12
+
+
+def test_a_curve_that_moves_with_time_is_ridden_as_it_lay_when_edited(scene, part):
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    drawn = bpy.context.object
+    for frame, x in ((1, 0.0), (100, 9.0)):
+        drawn.location.x = x
+        drawn.keyframe_insert("location", frame=frame)
+    scene.frame_set(50)
+    live.follow(scene)
+    assert "it moves" in body.beyond_mocap_ride.told
+    before = bits(part, body)[:3]
+    scene.frame_set(90)
+    assert live.follow(scene) == 0 and bits(part, body)[:3] == before
+    drawn.data.splines[0].bezier_points[1].co.y += 1.0
+    assert live.follow(scene) == 1
+
+
+def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
+    """A short closed ring is gone round; an open line of 2 m ends, or is begun again; a long one is filled by cycling."""
+    live, channels = part("ride.live"), part("channels")
+    body = walker()
+    line = drawn([(0, 0, 0), (2.5, 0, 0)])
+    choose(body, line)
+    bpy.ops.beyond_mocap.edit_path()
+    ride = body.beyond_mocap_ride
+    frames = {}
+    for name, change in (("stop", {}), ("repeat", {"end": "repeat"}), ("cycle", {"cycle": True, "end": "stop"})):
+        for key, value in change.items():
+            setattr(ride, key, value)
+        if name == "cycle":
+            line.scale = (8.0, 1.0, 1.0)
+        bpy.context.view_layer.update()
+        live.follow(scene)
+        curves = {place: curve for place, curve in channels.curves(*channels.playing(body)).items() if "location" in place[0]}
+        frames[name] = channels.keyed_range(curves)[1]
+        assert all(np.isfinite(channels.keys_of(curve)["co"]).all() for curve in curves.values())
+    assert frames["stop"] < frames["repeat"] < frames["cycle"]
+    ring = circle(1.5)
+    ride.curve, ride.cycle = ring, False
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 1 and ride.told == ""
+    ring.data.splines[0].use_cyclic_u = False
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 1
+
+
+def test_the_ground_counts_while_it_is_edited(scene, part):
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    mesh = bpy.data.meshes.new("Floor")
+    mesh.from_pydata([(-50, -50, 0), (50, -50, 0), (50, 50, 0), (-50, 50, 0)], [], [(0, 1, 2, 3)])
+    floor = bpy.data.objects.new("Floor", mesh)
+    scene.collection.objects.link(floor)
+    body.beyond_mocap_ride.ground = floor
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 1
+    choose(floor)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 0 and "without faces" not in body.beyond_mocap_ride.told
+    bpy.ops.object.mode_set(mode="OBJECT")
+    mesh.clear_geometry()
+    bpy.context.view_layer.update()
+    before = bits(part, body)[:3]
+    assert live.follow(scene) == 0 and "without faces" in body.beyond_mocap_ride.told
+    assert bits(part, body)[:3] == before
