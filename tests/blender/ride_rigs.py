@@ -156,6 +156,19 @@ def quadruped():
     return rig
 
 
+def with_props(rig, hips):
+    """A sword that hangs on nothing and goes with the body, keyed; a bag on the hips; a stone that stays where it lies."""
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = rig.data.edit_bones
+    for name, parent, head in (("sword", None, (0.8, 0, 1)), ("bag", hips, (0, 0.2, 1)), ("stone", None, (0, 1, 0))):
+        bone = bones.new(name)
+        bone.head, bone.tail = head, Vector(head) + Vector((0, 0, 0.2))
+        bone.parent = bones[parent] if parent else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return rig
+
+
 def onto_object(rig, channels):
     """What a body's first bone goes over the ground is gone by the object instead."""
     action, slot = channels.playing(rig)

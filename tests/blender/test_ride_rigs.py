@@ -36,6 +36,7 @@ def recorded(part, core):
         bake = part("rig_bake")
         bake.bake(rig, part("bone_maps").suggest(rig), bake.source_of(body, scene), scene, bake.Wishes(**wishes))
         bpy.data.objects.remove(body)
+        bpy.context.view_layer.update()
         return rig
 
     return make
@@ -209,3 +210,147 @@ def whole(part, rig):
     stands = [(tuple(b.location), tuple(b.rotation_quaternion), tuple(b.rotation_euler), b.rotation_mode) for b in rig.pose.bones]
     keys = bits(part, rig)[:3] if data.action is not None else None
     return keys, tracks, data.use_nla, stands, [tuple(row) for row in rig.matrix_world], len(bpy.data.scenes)
+
+
+def start(rig, **settings):
+    """Edit Path on an armature, its curve then bent to one side; the curve's object."""
+    for name, value in settings.items():
+        setattr(rig.beyond_mocap_ride, name, value)
+    choose(rig)
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    return rig.beyond_mocap_ride.curve
+
+
+def bend(scene, drawn, part):
+    """Move the curve and bend it; its riders follow."""
+    drawn.location, drawn.rotation_euler = (4.0, 2.0, 0.0), (0.0, 0.0, 1.0)
+    drawn.data.splines[0].bezier_points[-1].co.x += 1.0
+    bpy.context.view_layer.update()
+    part("ride.live").follow(scene)
+
+
+def refuses(verb, match):
+    with pytest.raises(RuntimeError, match=match):
+        verb()
+
+
+def rigid(poses):
+    """Places of bones (F, B, 4, 4) seen from the first of them."""
+    return (np.linalg.inv(poses[:, :1]) @ poses)[..., :3, 3]
+
+
+def test_what_a_body_carries_goes_along_and_what_lies_stays(part, recorded):
+    rig = ride_rigs.with_props(recorded(), "Hips")
+    frames, scene = np.arange(5, 65), bpy.context.scene
+    hips = shown(rig, frames, ["Hips"])[:, 0, :3, 3]
+    rest = np.array(rig.data.bones["sword"].matrix_local.to_3x3())
+    for index, values in enumerate(((hips - hips[0]) @ rest).T):
+        ride_rigs.keys(rig, ride_rigs.bone_path("sword", "location"), index, frames, values, "sword")
+    was = shown(rig, frames[::STEP], ["Hips", "sword", "bag"])
+    stone = shown(rig, [5, 40], ["stone"])
+    bend(scene, start(rig, plant=False, lean=False), part)
+    now = shown(rig, frames[::STEP], ["Hips", "sword", "bag"])
+    assert np.abs(now[..., :3, 3] - was[..., :3, 3]).max() > 1.0
+    np.testing.assert_allclose(rigid(now)[:, 2], rigid(was)[:, 2], atol=1e-4)
+    assert np.linalg.norm(rigid(now) - rigid(was), axis=-1).max() < 1e-3
+    np.testing.assert_allclose(shown(rig, [5, 40], ["stone"]), stone, atol=1e-6)
+
+
+def test_a_dog_rides_as_it_is_and_that_is_told(part):
+    bpy.context.scene.render.fps = 30
+    dog, frames = ride_rigs.quadruped(), np.arange(5, 65, STEP)
+    was = shown(dog, frames)
+    bend(bpy.context.scene, start(dog), part)
+    now = shown(dog, frames)
+    assert "no legs" in dog.beyond_mocap_ride.told
+    assert np.abs(now - was)[..., :3, 3].max() > 1.0
+    np.testing.assert_allclose(rigid(now), rigid(was), atol=1e-4)
+
+
+def test_muted_curves_stay_muted_and_half_frames_other_slots_and_drivers_are_kept(part, recorded):
+    scene, rig = bpy.context.scene, ride_rigs.walk_ik()
+    channels = part("channels")
+    action, slot = channels.playing(rig)
+    other = action.slots.new(id_type="OBJECT", name="Other")
+    channels.new_curve(action, other, "location", 0, "").keyframe_points.insert(1, 5.0)
+    ride_rigs.keys(rig, ride_rigs.bone_path("spine_01", "location"), 1, [5, 40], [0.0, 5.0]).mute = True
+    ride_rigs.keys(rig, ride_rigs.bone_path("head", "rotation_euler"), 1, [5.5, 20.25, 33.3], [0.0, 0.5, 0.0])
+    rig.pose.bones["head"].rotation_mode = "XYZ"
+    driver = rig.driver_add('pose.bones["neck_01"].rotation_euler', 0).driver
+    driver.type, driver.expression = "SCRIPTED", "0.2"
+    rig.pose.bones["neck_01"].rotation_mode = "XYZ"
+    bpy.context.view_layer.update()
+    frames = np.arange(5, 65, STEP)
+    upper = ["pelvis", "spine_01", "head", "neck_01", "hand_l"]
+    was = shown(rig, frames, upper)
+    bend(scene, start(rig, plant=False, lean=False), part)
+    assert rig.beyond_mocap_ride.told == ""
+    np.testing.assert_allclose(rigid(shown(rig, frames, upper)), rigid(was), atol=1e-4)
+    made, slot = channels.playing(rig)
+    assert len(made.slots) == 1 and len(action.slots) == 2
+    assert channels.curves(made, slot)[ride_rigs.bone_path("spine_01", "location"), 1].mute
+
+
+def test_the_controls_of_inverse_kinematics_stay_with_it(part):
+    """No switch is turned: feet are moved by their controls, knees by their poles, the rest by the COG."""
+    rig, scene = ride_rigs.walk_ik(), bpy.context.scene
+    scene.render.fps = 30
+    original = set(part("channels").curves(*part("channels").playing(rig)))
+    bend(scene, start(rig), part)
+    now = part("channels").curves(*part("channels").playing(rig))
+    bones = {path.split('"')[1] for path, _ in set(now) - original}
+    assert bones <= {"COG", "pelvis", "foot_ctrl.L", "foot_ctrl.R", "knee_pole.L", "knee_pole.R"}
+    assert all("influence" not in path for path, _ in now)
+
+
+def test_one_root_carries_all_where_it_travels(part, recorded):
+    rig = recorded(rigs.unreal, root="SMOOTH")
+    channels, scene = part("channels"), bpy.context.scene
+    action, slot = channels.playing(rig)
+    before = {place: channels.keys_of(curve)["co"] for place, curve in channels.curves(action, slot).items()}
+    bend(scene, start(rig, plant=False, lean=False), part)
+    now = channels.curves(*channels.playing(rig))
+    changed = {path for (path, i), curve in now.items()
+               if (path, i) not in before or not np.array_equal(channels.keys_of(curve)["co"], before[path, i])}
+    assert {path.split('"')[1] for path in changed} == {"root"}
+
+
+def test_motions_that_are_faster_slower_longer_and_shorter(core, part, recorded, ride):
+    rig = ride_rigs.walk_ik()
+    for settings in ({"speed": 0.8}, {"speed": 2.0}, {"delay": 0.5}, {"by_arc_length": False}):
+        read, ridden = ride(rig, bent=True, **settings)
+        assert max(off(core, rig, read, ridden).values()) < 5.0
+    read, ridden = ride(rig, bent=False, plant=False, lean=False)
+    assert max(off(core, rig, read, ridden).values()) < 0.1  # all that was written before is as it was again
+
+
+def test_what_cannot_ride_is_said(part, recorded, tmp_path):
+    scene = bpy.context.scene
+    rig = ride_rigs.walk_ik()
+    choose(rig)
+    action = rig.animation_data.action
+    rig.animation_data.action = None
+    refuses(bpy.ops.beyond_mocap.edit_path, "plays no action")
+    rig.animation_data.action = action
+    rig.scale = (1.0, 2.0, 1.0)
+    refuses(bpy.ops.beyond_mocap.edit_path, "one positive scale")
+    rig.scale = (1.0, 1.0, 1.0)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    choose(camera)
+    refuses(bpy.ops.beyond_mocap.edit_path, "armature")
+    bpy.data.libraries.write(str(tmp_path / "rig.blend"), {rig})
+    with bpy.data.libraries.load(str(tmp_path / "rig.blend"), link=True) as (theirs, mine):
+        mine.objects = [rig.name]
+    linked = mine.objects[0]
+    scene.collection.objects.link(linked)
+    bpy.context.view_layer.update()
+    choose(linked)
+    refuses(bpy.ops.beyond_mocap.edit_path, "linked")
+    own = linked.override_create()
+    scene.collection.objects.link(own)
+    bpy.context.view_layer.update()
+    was = shown(own, [5, 30], ["pelvis"])
+    bend(scene, start(own), part)
+    assert np.abs(shown(own, [5, 30], ["pelvis"]) - was).max() > 1.0
+    assert not rig.beyond_mocap_ride.on
