@@ -54,6 +54,8 @@ Accepted results can be turned from one form into the other"""
         if lost or not players:
             found = f"no take of {', '.join(lost) or 'any player'} in this session"
             raise InputError("accept", found, "a take", "synthesize again")
+        for line in (line for player in players for line in preview.off_path(player)):
+            self.report({"INFO"}, line)
         for player in unseen:
             preview.show(context, player, player.take, {})
         bodies = [preview.keep(context, player, self.form) for player in players]

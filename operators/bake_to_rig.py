@@ -9,6 +9,7 @@ from bpy.props import EnumProperty
 from ..beyond_mocap.errors import InputError
 from ..scene import bake, bone_maps, channels, rig, rig_bake, rig_copy, session
 from ..scene.measure import frames_per_second
+from ..scene.ride import riders
 from ..scene.settings import active_player
 from .verb import Verb
 
@@ -141,7 +142,10 @@ def source_body(settings) -> bpy.types.Object | None:
 
 
 def standing_of(scene: bpy.types.Scene, player):
-    """Function from scene frames (F,) to which feet stand (F, 2) in the player's take; None where there is none."""
+    """Function from scene frames (F,) to which feet stand (F, 2) in the player's take, or on the path that his body
+    rides; None where there is none."""
+    if player is not None and player.body is not None and player.body.beyond_mocap_ride.on:
+        return riders.standing(player.body)
     made = session.made(player.take) if player is not None and player.take else None
     if made is None:
         return None

@@ -28,6 +28,8 @@ class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
         if not players:
             raise InputError("discard", "no preview is shown", "a preview", "synthesize first")
         for player in players:
+            for line in preview.off_path(player):
+                self.report({"INFO"}, line)
             preview.discard(context, player)
             show_automatic(context, player)
         self.report({"INFO"}, f"discarded: {', '.join(player.name for player in players)}")

@@ -147,6 +147,8 @@ def _playing(context) -> list[bpy.types.Object]:
     for rig in rigs:
         if channels.playing(rig)[0].library is not None:
             raise InputError(rig.name, "its action belongs to another file", "actions of this file")
+        if rig.beyond_mocap_ride.on:
+            raise InputError(rig.name, "its motion still rides a path", "a motion of its own", "press Keep in Path Editing first")
     return rigs
 
 

@@ -32,6 +32,8 @@ def write(
     """
     linked.refuse(body)
     channels.check_free(body)
+    if body.beyond_mocap_ride.on:
+        raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not", "press Keep or Leave first")
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:
         raise InputError(f"armature {body.name}", f"no bone {', '.join(missing[:3])}", "a bone for every joint")

@@ -11,6 +11,7 @@ from ..beyond_mocap.errors import InputError
 from . import bake, blocks, channels, error_curves, hand_keys, linked, session, stage
 from .bake import MARK
 from .clock import of_scene
+from .ride import riders
 from .set_aside import bring_back, drop, play_as_before, put_aside
 from .settings import BeyondMocapPlayer
 
@@ -30,11 +31,17 @@ def check(player: BeyondMocapPlayer) -> None:
                          "make it editable: Outliner, Library Override, Make")
 
 
+def off_path(player: BeyondMocapPlayer) -> list[str]:
+    """A body that rides a path plays its own motion again, before its result is another; a line about it."""
+    return riders.leave(player.body)
+
+
 def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines: dict[str, str]) -> bpy.types.Object:
     """Put the session's take of that name onto the player's armature, made where it is missing, and set aside what was
     there; lines: `quality`, `moments`, `warnings`, `recipe` and `made_of` of the take. Returns the armature."""
     made, result = session.made(take), player.result
     check(player)
+    left = off_path(player)
     if result.state != "NONE" and not shown(context.scene, player):
         forget(player)
     hand, clock = hand_keys.Hand(), ""
@@ -45,6 +52,8 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
     player.take = take
     for name, text in lines.items():
         setattr(result if name in STEPS else player, name, text)
+    if left:
+        player.warnings = "\n".join(filter(None, [player.warnings, *left]))
     with _shared_length(context.scene):
         body = bake.player(context, player, made)
     action, slot = channels.playing(body)
@@ -62,6 +71,7 @@ def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bp
     """Accept what is shown on a player, as one action ("ACTION") or as NLA strips ("STRIPS"); what had been set aside
     for it and was ours is removed. Returns the armature."""
     result, body = player.result, player.body
+    off_path(player)
     if result.motion.kept and body.animation_data is not None:
         play_as_before(result.motion, body.animation_data)
     if form == "STRIPS":
@@ -105,6 +115,7 @@ def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
 def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     """Take the preview off a player: what was there before is there again, to the last bit."""
     result, body = player.result, player.body
+    off_path(player)
     accepted = result.was_accepted
     if body is not None and body == result.body and result.motion.kept:
         _undress(context, player)

@@ -251,7 +251,10 @@ def fitted(
 
 def lay(one: Fitted) -> Baked:
     """Let the rig play what was worked out for it, as a new action."""
+    from .ride import riders  # which build on what is here
+
     rig, driven = one.driven.rig, one.driven
+    left = riders.leave(rig)
     before, kept = _remembered(rig, driven), _keep_own(rig)
     channels.discard(rig, MARK)
     made = channels.animate(rig, f"{one.name} on {rig.name}", one.frames, one.curves)
@@ -259,7 +262,7 @@ def lay(one: Fitted) -> Baked:
     note(rig)
     for switch in driven.controls.switches:
         rig.pose.bones[switch.bone][switch.name] = switch.value
-    told = [*one.told, *kept, *_off(driven, one.frames, one.heads, driven.scene)]
+    told = [*left, *one.told, *kept, *_off(driven, one.frames, one.heads, driven.scene)]
     return Baked(made, one.frames, one.fit.scale, one.fit.slides, told)
 
 

@@ -118,6 +118,17 @@ class Carrier(ABC):
         return found, slot
 
 
+    def own(self) -> tuple[bpy.types.Action, object]:
+        """The same, a copy where another object plays it too: a duplicate of a rider is a rider of its own."""
+        found, slot = self.ours()
+        if found.users - found.use_fake_user < 2:
+            return found, slot
+        copy = found.copy()
+        copy.use_fake_user = False
+        channels.assign(self.body, copy, next(one for one in copy.slots if one.identifier == slot.identifier))
+        return channels.playing(self.body)
+
+
 class PlainCarrier(Carrier):
     """An armature whose motion is the channels of its bones, in any rotation mode."""
 

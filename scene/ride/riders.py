@@ -87,7 +87,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     ground = source.ground_digest(ridden_by.ground)
     parts = known.digest + drawn.digest + ground + repr(settings).encode()
     digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
-    made = carrier.ours()[0]
+    made = carrier.own()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
         return False
@@ -197,6 +197,30 @@ def end(body: bpy.types.Object) -> None:
     """The armature plays its original motion again, to the last bit."""
     carrier_of(body).end()
     _over(body.beyond_mocap_ride)
+
+
+def leave(*bodies: bpy.types.Object | None) -> list[str]:
+    """Riders among these play their originals again, because something else is to be done with them; a line for each."""
+    riding = [body for body in bodies if body is not None and body.beyond_mocap_ride.on]
+    for body in riding:
+        may_end(body)
+    for body in riding:
+        end(body)
+    return [f"{body.name} left its path first: its curve stays, Edit Path takes it up again" for body in riding]
+
+
+def standing(body: bpy.types.Object | None):
+    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where that is not known."""
+    now = shown(body) if body is not None else None
+    if now is None:
+        return None
+    stands = now.ridden.standing.any(axis=2)
+
+    def at(frames: np.ndarray) -> np.ndarray:
+        rows = np.round(frames).astype(int) - now.first
+        return stands[np.clip(rows, 0, len(stands) - 1)] & ((rows >= 0) & (rows < len(stands)))[:, None]
+
+    return at
 
 
 def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
