@@ -23,10 +23,12 @@ the file"""
         return bool(meant(context))
 
     def do(self, context):
-        """All that are meant: worked out first, so that nothing is kept where one cannot be."""
+        """All that are meant; of who could not follow lately, the last motion that could be worked out."""
         chosen = meant(context)
         for body in chosen:
-            riders.renew(context.scene, body)
-        kept = [riders.keep(context.scene, body).name for body in chosen]
+            riders.may_end(body)
+        kept = [riders.keep(context.scene, body) for body in chosen]
         riders.back_to(context, chosen)
-        self.report({"INFO"}, f"kept as {', '.join(kept)}")
+        self.report({"INFO"}, f"kept as {', '.join(action.name for action, _ in kept)}")
+        for line in (told for _, told in kept if told):
+            self.report({"WARNING"}, f"the last motion that could be worked out is kept: {line}")

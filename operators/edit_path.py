@@ -26,7 +26,7 @@ curve becomes the path instead. The original action is put aside; Leave brings i
     count: IntProperty(**COUNT)
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
     degree: IntProperty(**DEGREE)
-    straight: BoolProperty(name="Straight", description="A straight line instead of the original path")
+    straight: BoolProperty(name="Straight", description="A straight line, as long, instead of the original path")
 
     @classmethod
     def poll(cls, context):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.ride import riders
+from ..scene.ride import measure, riders
 from ..scene.ride.settings import meant
 from .verb import Verb
 
@@ -25,3 +25,4 @@ class BEYOND_MOCAP_OT_update_path(Verb, bpy.types.Operator):
         """All that are meant."""
         for body in meant(context):
             riders.renew(context.scene, body, anew=True)
+            measure.measure(context.scene, body)

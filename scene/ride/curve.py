@@ -19,7 +19,7 @@ KINDS = (
 )
 SHAPES = (
     ("FITTED", "Original", "Along the original path"),
-    ("STRAIGHT", "Straight", "A straight line from the beginning of the original path to its end"),
+    ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward where that ends"),
     ("PRESENT", "As It Is", "Along the new path as it is, with other points"),
 )
 MARK = "beyond_mocap_path"  # on curve objects that were made here
@@ -112,7 +112,7 @@ def create(
     context: bpy.types.Context, name: str, path: Path, straight: bool = False, count: int = 0, kind: str = "BEZIER",
     degree: int = 3,
 ) -> bpy.types.Object:
-    """A curve object along a path, or straight from its beginning to its end.
+    """A curve object along a path, or a straight line as long, from its beginning toward its end.
 
     count: control points; 0 takes as many as it needs to be within 3 cm. kind: BEZIER or NURBS; degree: of the NURBS.
     InputError where there are too few points for the degree.
@@ -136,7 +136,7 @@ def create(
     else:
         spline.points.add(len(points) - 1)
         spline.points.foreach_set("co", np.column_stack([local, np.ones(len(local), np.float32)]).ravel())
-        spline.order_u, spline.use_endpoint_u = degree + 1, True
+        spline.order_u, spline.use_endpoint_u = min(degree + 1, len(points)), True
     made = bpy.data.objects.new(name, data)
     made.location, made[MARK] = origin, True
     room = context.scene.collection if context.layer_collection.exclude else context.collection
@@ -187,8 +187,9 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
 
     degree = 3 if kind == "BEZIER" else degree
     more = 2 if kind == "BEZIER" else 0  # a cubic spline of P control points is a chain of P - 2 Bezier points
+    count = max(count, 2) if count else 0
     if straight:
-        points = path_line.straight(path, count or max(4, degree + 1))
+        points = _lengthened(path_line.straight(path, count or max(4, degree + 1)), path)
         third = (points[1] - points[0]) / 3.0
         return points, (points - third, points + third)
     points = path_line.control_points(path, count + more, degree) if count else _close_enough(path, degree)
@@ -230,3 +231,11 @@ def _as_long(points: np.ndarray, degree: int, path: Path) -> np.ndarray:
     if path.closed or lacks <= 0.0 or np.linalg.norm(ahead) < 1e-6:
         return points
     return np.concatenate([points[:-1], points[-1:] + ahead * (lacks / np.linalg.norm(ahead))])
+
+
+def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
+    """Even points (P, 3) of a straight line, as long as the path."""
+    from ...beyond_mocap.motion.arc_length import ArcLength
+
+    whole = points[-1] - points[0]
+    return points[0] + (points - points[0]) * ((ArcLength(path).length + _SPARE) / np.linalg.norm(whole))

@@ -21,6 +21,7 @@ from .settings import riders
 
 TICK, IDLE = 0.01, 0.05  # seconds between two looks: after a change, and while nothing happens
 QUIET = 0.5  # seconds after the last change in which looks are frequent
+SHARE = 0.3  # of the time that a look has taken is left to the window before the next one
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Mesh, bpy.types.Armature, bpy.types.Action, bpy.types.Scene)
 
 _seen = {"dirty": True, "changed": 0.0}
@@ -72,12 +73,15 @@ def _after_load(*_):
 
 
 def _tick():
-    window = next(iter(bpy.context.window_manager.windows), None)
-    if _seen["dirty"] and window is not None and not bpy.app.is_job_running("RENDER"):
-        _seen["dirty"] = False
-        with bpy.context.temp_override(window=window):
-            follow(window.scene)
-    return TICK if perf_counter() - _seen["changed"] < QUIET else IDLE
+    if not _seen["dirty"] or bpy.app.is_job_running("RENDER"):
+        return TICK if perf_counter() - _seen["changed"] < QUIET else IDLE
+    _seen["dirty"], begun, scenes = False, perf_counter(), set()
+    for window in bpy.context.window_manager.windows:
+        if window.scene.session_uid not in scenes:
+            scenes.add(window.scene.session_uid)
+            with bpy.context.temp_override(window=window):
+                follow(window.scene)
+    return max(TICK, SHARE * (perf_counter() - begun))
 
 
 HANDLERS = (("undo_post", _after_undo), ("redo_post", _after_undo), ("load_post", _after_load),

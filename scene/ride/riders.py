@@ -166,25 +166,34 @@ def new_curve(
         bpy.data.curves.remove(made.data)
         raise
     if before is not None and before.get(curve.MARK) and not any(r.beyond_mocap_ride.curve == before for r in riders(scene)):
-        name = before.name
+        name, data = before.name, before.data
         bpy.data.objects.remove(before)
-        made.name = name
+        if not data.users:
+            bpy.data.curves.remove(data)
+        made.name = made.data.name = name
     return made
 
 
-def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> bpy.types.Action:
-    """The ridden motion becomes an ordinary action of the armature; the original stays in the file. Returns the action."""
-    ride, carrier = body.beyond_mocap_ride, carrier_of(body)
-    renew(scene, body)
-    made, slot = carrier.ours()
-    original = ride.before.action
-    carrier.settle()
+def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[bpy.types.Action, str]:
+    """The ridden motion becomes an ordinary action of the armature; the original stays in the file. Where it cannot be
+    brought up to date, the last that could is kept. Returns the action, and why it is not up to date."""
+    ride, carrier, told = body.beyond_mocap_ride, carrier_of(body), ""
+    try:
+        renew(scene, body)
+    except BeyondMocapError as error:
+        told = str(error)
+    may_end(body)
+    made = carrier.ours()[0]
+    original, drawn = ride.before.action, ride.curve
+    if original is not None:
+        carrier.settle()
     play_as_before(ride.before, body.animation_data)
     drop(ride.before, MARK)
     del made[MARK]
-    made.name = f"{original.name} on {ride.curve.name}" if original is not None else f"{body.name} path motion"
+    name = original.name if original is not None else body.name
+    made.name = f"{name} on {drawn.name}" if drawn is not None else f"{name} path motion"
     _over(ride)
-    return made
+    return made, told
 
 
 def may_end(body: bpy.types.Object) -> None:

@@ -393,6 +393,40 @@ def test_kept_is_an_ordinary_action_and_the_original_stays_in_the_file(scene, pa
     assert bits(part, bpy.data.objects[name]) == after and original in bpy.data.actions
 
 
+def test_what_was_ridden_last_can_be_kept_when_its_curve_is_gone(scene, part):
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    before = bits(part, body)[2]
+    bpy.data.objects.remove(bpy.context.object)
+    bpy.context.view_layer.update()
+    choose(body)
+    assert bpy.ops.beyond_mocap.bake_path() == {"FINISHED"}
+    assert bits(part, body)[2] == before and not body.beyond_mocap_ride.on
+
+
+def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    name = bpy.context.object.name
+    for arguments, points in (({"shape": "STRAIGHT", "count": 2}, 2), ({"shape": "PRESENT", "kind": "NURBS", "count": 9}, 9),
+                              ({"shape": "FITTED", "count": 1}, 2), ({"kind": "NURBS", "degree": 5}, 6)):
+        assert bpy.ops.beyond_mocap.path_curve(**arguments) == {"FINISHED"}
+        spline = bpy.context.object.data.splines[0]
+        assert len(spline.bezier_points or spline.points) >= points and body.beyond_mocap_ride.told == ""
+        assert [curve.name for curve in bpy.data.curves] == [name] == [bpy.context.object.name]
+    with pytest.raises(RuntimeError, match="control points"):
+        bpy.ops.beyond_mocap.path_curve(kind="NURBS", degree=5, count=4)
+    assert [curve.name for curve in bpy.data.curves] == [name] == [body.beyond_mocap_ride.curve.name]
+    original = part("ride.riders").shown(body).source.arc.length
+    bpy.ops.beyond_mocap.path_curve(shape="STRAIGHT")
+    assert np.ptp(part("ride.riders").shown(body).line, axis=0).max() == pytest.approx(original, abs=0.02)
+    own = circle()
+    body.beyond_mocap_ride.curve = own
+    bpy.context.view_layer.update()
+    bpy.ops.beyond_mocap.path_curve()
+    assert own.name in bpy.data.objects
+
+
 def test_button_and_function_give_the_same(scene, part, core):
     """What is written is what the core says, for the motion and the curve as they are read."""
     action, curve = part("action"), part("ride.curve")
