@@ -27,6 +27,7 @@ _ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 4_000_000, 9000, 24
 _STRIDE_SHARE = 0.85  # a loop is at least so long, of the stride's time: strides differ
 _SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which nobody loops: a stop is no gait
 _LABEL = 0.06  # metres that a wrong sole costs
+_FEET = 0.5  # what a metre costs by which feet that stand at both ends stand elsewhere: they would be moved there
 _CROWDED = 0.05  # metres that it costs to have no frames to fade over
 _VARIETY = 0.3  # how much better one more stride makes a loop of one stride
 _MOST = 0.6  # how unlike a loop's ends are at most
@@ -77,7 +78,8 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
     free = pace >= max(_SLOWEST, _SLOW_SHARE * float(np.median(pace[moving])))
     tried = _rough(features, residuals, free, least, stride)
     usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
-    found = [_exact(features, residuals, pair, free, least, stride, usual) for pair in tried]
+    feet = _feet(residuals.skeleton, features)
+    found = [_exact(features, residuals, pair, free, least, stride, usual, feet) for pair in tried]
     found = [loop for loop in found if loop and loop.unlike <= _MOST and _strides(residuals.standing, loop)]
     best: dict[int, Loop] = {}
     for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):
@@ -140,6 +142,17 @@ def _features(residuals: Residuals) -> np.ndarray:
     velocity = _slope(ground, max(1, int(round(residuals.fps / 60.0)))) * residuals.fps
     both = np.concatenate([places, _VELOCITY_SECONDS * velocity], axis=1)
     return both.reshape(len(both), -1) / np.sqrt(len(joints))
+
+
+def _feet(skeleton: Skeleton, features: np.ndarray) -> np.ndarray | None:
+    """(T, 2, 2) metres along and across the path from the pelvis to the left and right foot; None of an unknown body."""
+    try:
+        body = identify(skeleton)
+    except InputError:
+        return None
+    joints = _main_joints(skeleton)
+    at = [3 * joints.index(limb.toe_or_foot) for limb in (body.left, body.right)]
+    return np.sqrt(len(joints)) * np.stack([features[:, k : k + 2] for k in at], axis=1)
 
 
 def _slope(values: np.ndarray, reach: int) -> np.ndarray:
@@ -207,10 +220,10 @@ def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
 
 def _exact(
     features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int, stride: float,
-    usual: float,
+    usual: float, feet: np.ndarray | None,
 ) -> Loop | None:
     """The best loop around a rough pair, compared over windows at the full rate; usual: metres that any two moments are
-    apart."""
+    apart; feet (T, 2, 2) m: see `_feet`."""
     count, fps = len(features), residuals.fps
     reach, window = int(np.ceil(fps / 12.0)), int(round(WINDOW_SECONDS * fps))
     start, end = (at + np.arange(-reach - window, reach + window + 1) for at in pair)
@@ -219,16 +232,17 @@ def _exact(
     start, end = (np.clip(at, 0, count - 1) for at in (start, end))
     a, b = features[start], features[end]
     square = np.maximum((a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2.0 * (a @ b.T), 0.0)
-    soles = residuals.standing.reshape(count, 4)
-    wrong = (soles[start][:, None] != soles[end][None]).mean(axis=2)
-    total, wrong, seen = (_along_diagonals(np.where(known, v, 0.0), window) for v in (square, wrong, 1.0 * known))
+    wrong, moved = _soles_apart(residuals, feet, start, end)
+    total, wrong, moved, seen = (
+        _along_diagonals(np.where(known, v, 0.0), window) for v in (square, wrong, moved, 1.0 * known)
+    )
     seen = np.maximum(seen, 1e-9)
     middle = slice(window, len(a) - window)
     start, end = start[middle][:, None], end[middle][None]
     length = end - start
     still = np.cumsum(~free)
     apart = np.sqrt(total / seen)
-    cost = apart + _LABEL * wrong / seen + _CROWDED * (1.0 - seen / (2 * window + 1))
+    cost = apart + (_LABEL * wrong + _FEET * moved) / seen + _CROWDED * (1.0 - seen / (2 * window + 1))
     cost = cost * _liking(length, still[end] - still[start], stride)
     cost[~(known[middle, middle] & (length >= least) & free[start] & free[end])] = np.inf
     at = np.unravel_index(np.argmin(cost), cost.shape)
@@ -240,6 +254,20 @@ def _exact(
     ending = float(np.linalg.norm(features[first:last] - features[-1], axis=1).min())
     usual = max(usual, 1e-9)
     return Loop(first, last, off, off / usual, float(cost[at]), metres, (last - first) / stride, ending / usual)
+
+
+def _soles_apart(
+    residuals: Residuals, feet: np.ndarray | None, start: np.ndarray, end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of frames `start` (N,) and `end` (M,): (N, M) share of the soles that stand at one alone, and metres by which feet
+    that stand at both stand elsewhere under the body; feet (T, 2, 2)."""
+    soles = residuals.standing.reshape(len(residuals), 4)
+    wrong = (soles[start][:, None] != soles[end][None]).mean(axis=2)
+    if feet is None:
+        return wrong, np.zeros_like(wrong)
+    stands = residuals.standing.any(axis=2)
+    off = np.linalg.norm(feet[start][:, None] - feet[end][None], axis=-1)
+    return wrong, np.max(np.where(stands[start][:, None] & stands[end][None], off, 0.0), axis=2)
 
 
 def _along_diagonals(values: np.ndarray, window: int) -> np.ndarray:
