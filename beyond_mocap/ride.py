@@ -154,6 +154,20 @@ class Ridden:
         """The motion before leaning and planting."""
         return Motion(self.motion.skeleton, *self.laid, self.motion.fps)
 
+    @property
+    def once(self) -> Ridden:
+        """The ride until motion and path begin anew: each time they are laid out alike."""
+        if not len(self.again):
+            return self
+        return replace(self.showing(np.arange(self.again[0])), again=np.zeros(0, dtype=int))
+
+    def showing(self, which: np.ndarray) -> Ridden:
+        """The frames `which` (N,)."""
+        rows = ("frames", "standing", "arc", "origin", "heading", "correction", "miss")
+        motion, laid = self.motion, tuple(values[which] for values in self.laid)
+        motion = replace(motion, root_positions=motion.root_positions[which], rotations=motion.rotations[which])
+        return replace(self, **{name: getattr(self, name)[which] for name in rows}, motion=motion, laid=laid)
+
 
 def prepare(
     motion: Motion, settings: RideSettings, standing: np.ndarray | None = None, path: Path | None = None
@@ -217,7 +231,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, laid, source,
         (*source.warnings, *end.told), end.again,
     )  # fmt: skip
-    return _begun_again(ridden, end.shown) if len(end.again) else ridden
+    return ridden.showing(end.shown) if len(end.again) else ridden
 
 
 def _timed(
@@ -249,14 +263,6 @@ def _timed(
     timing = timing.first(end.count)
     seams = np.searchsorted(timing.at, seams - 1e-9)
     return residuals, seams[seams < end.count], timing, replace(end, told=(*told, *end.told))
-
-
-def _begun_again(ridden: Ridden, shown: np.ndarray) -> Ridden:
-    """The frames `shown` (N,) of a motion that begins again: each time it is laid out alike."""
-    rows = ("frames", "standing", "arc", "origin", "heading", "correction", "miss")
-    motion, laid = ridden.motion, tuple(values[shown] for values in ridden.laid)
-    motion = replace(motion, root_positions=motion.root_positions[shown], rotations=motion.rotations[shown])
-    return replace(ridden, **{name: getattr(ridden, name)[shown] for name in rows}, motion=motion, laid=laid)
 
 
 def _parameters(

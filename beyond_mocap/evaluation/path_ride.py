@@ -23,8 +23,10 @@ _MOVING = 0.3  # m/s below which a body stands, and no speed is kept
 def figures(source, ridden, path, ground=None) -> dict:
     """All figures, None where nothing is known, as where the skeleton is no human body's. `before`: not yet planted.
 
-    path: the new path. ground: the Terrain that it stood on, None for the path's own height.
+    path: the new path. ground: the Terrain that it stood on, None for the path's own height. Of a motion that begins anew
+    with its path only the first time is looked at: the others are the same, with a cut between.
     """
+    ridden = ridden.once
     pelvis, own = (_pelvis(motion, source.humanoid) for motion in (ridden.motion, source.motion))
     frames = np.clip(np.rint(ridden.frames).astype(int), 0, len(source.motion) - 1)
     fps = ridden.motion.fps

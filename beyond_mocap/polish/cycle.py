@@ -37,6 +37,7 @@ SEEN = 0.35
 """How unlike a loop's ends may be without being told, and its motion's end to count as a step like the others."""
 
 _ALSO_GOOD = (1.6, 0.02)  # loops that cost at most so many times the best one's, and metres more, may be taken too
+_KEEPS = 3.0  # how much strides of another length count against seams
 _OTHERS = 3  # times that another loop than the main one is run through, at most
 
 
@@ -66,7 +67,7 @@ def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None =
     most = KEPT_SCALE if found and found[0].ending <= SEEN else MOST_SCALE
     if length <= (1.0 + most) * own:
         scale = length / own if length >= (1.0 - most) * own else 1.0
-        return Cycled(_scaled(residuals, scale), np.zeros(0, int), scale)
+        return Cycled(_scaled(residuals, scale), np.zeros(0, int), scale, _other_strides(scale))
     if not found:
         raise InputError("cycling", _why_not(residuals), "at least one whole stride", _NEXT_STEP)
     return _filled(residuals, found, length, most)
@@ -84,7 +85,7 @@ def _filled(residuals: Residuals, loops: tuple[Loop, ...], wanted: float, most: 
         told += (f"the path is {wanted:.0f} m long: the motion ends after {minutes:.0f} minutes and {length:.0f} m of it",)
     if jumps:
         scale = length / float(shown.step.sum())
-        return Cycled(_scaled(shown, scale), seams, scale, told)
+        return Cycled(_scaled(shown, scale), seams, scale, (*told, *_other_strides(scale)))
     arc = np.cumsum(shown.step)
     count = int(np.argmin(np.abs(arc - length))) + 1
     scale = length / float(arc[count - 1])
@@ -113,6 +114,13 @@ def _seen(loops: tuple[Loop, ...]) -> tuple[str, ...]:
     if unlike <= SEEN:
         return ()
     return (f"no two strides of the motion are alike: where it is repeated, poses are {100 * unlike:.0f} % apart",)
+
+
+def _other_strides(scale: float) -> tuple[str, ...]:
+    if abs(scale - 1.0) <= KEPT_SCALE + 1e-3:
+        return ()
+    word = "longer" if scale > 1.0 else "shorter"
+    return (f"strides are {100 * abs(scale - 1.0):.1f} % {word}, so that the motion ends where the path does",)
 
 
 def _cut(loop: Loop) -> tuple[str, ...]:
@@ -158,7 +166,7 @@ def _rating(jumps: tuple[Loop, ...], scale: float, best: float) -> float:
     """What speaks against a plan: strides of another length, many jumps, jumps that are seen."""
     strides = sum(loop.strides for loop in jumps)
     worse = sum(loop.cost for loop in jumps) / len(jumps) / max(best, 1e-6) - 1.0
-    return abs(scale - 1.0) / MOST_SCALE + len(jumps) / max(strides, 1.0) + worse
+    return _KEEPS * abs(scale - 1.0) / MOST_SCALE + len(jumps) / max(strides, 1.0) + worse
 
 
 def _ordered(main: Loop, count: int, other: Loop, times: int) -> tuple[Loop, ...]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
+from beyond_mocap.evaluation.path_ride import figures
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.polish.path_line import through
 from beyond_mocap.ride import RideSettings, prepare, ride
@@ -55,6 +56,12 @@ def test_the_motion_begins_again_with_the_path(source):
     lap = out.again[0]
     assert np.array_equal(out.motion.root_positions[lap : 2 * lap], out.motion.root_positions[:lap])
     assert len(ride(source, line(2.0), RideSettings()).motion) == lap
+
+
+def test_figures_look_at_a_repeated_ride_once(source):
+    path = line(2.0)
+    told = [figures(source, ride(source, path, RideSettings(end=end)), path) for end in ("stop", "repeat")]
+    assert told[0] == told[1]
 
 
 def test_a_closed_path_is_gone_round_without_a_cut(source):
