@@ -78,14 +78,15 @@ def _filled(line: np.ndarray) -> np.ndarray:
 
 
 def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.ndarray) -> dict:
-    """Arc length per frame against the recording's: shares by which it is off, where the recording moves and nothing is
-    joined.
+    """Arc length per frame against the recording's at the frame that is shown: shares by which it is off, where the
+    recording moves and nothing is joined. Played twice as fast it is off by 1.
 
     path: of the path; body: of the pelvis behind the window, which in bends is shorter by what the window cuts off.
     """
     fps, there = ridden.motion.fps, np.arange(len(frames) - 1)
-    own_arc = source.arc.at(np.clip(ridden.frames / source.motion.fps, *source.path.domain))
-    step, asked = np.diff(ridden.arc), np.diff(own_arc)
+    middle = 0.5 * (ridden.frames[1:] + ridden.frames[:-1])
+    ends = np.clip((middle + [[-0.5], [0.5]]) / source.motion.fps, *source.path.domain)
+    step, asked = np.diff(ridden.arc), source.arc.at(ends[1]) - source.arc.at(ends[0])
     free = (asked * fps > _MOVING) & (np.diff(ridden.frames) > 0) & (step > 0)
     for seam in np.asarray(ridden.seams, int):
         free &= np.abs(there - seam) > 0.75 * fps
