@@ -14,6 +14,7 @@ OVERLAYS = {
     "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED",
 }
 CAMERAS = (("ABOVE", "Above"), ("SIDE", "Side"), ("QUARTER", "Quarter"), ("BEHIND", "Behind"))
+LOOKED = "beyond_mocap_path_camera"  # custom property of our cameras: which one it is
 NUDGES = (
     ("LEFT", "TRIA_LEFT"), ("RIGHT", "TRIA_RIGHT"), ("FORTH", "TRIA_UP"), ("BACK", "TRIA_DOWN"), ("UP", "SORT_DESC"),
     ("DOWN", "SORT_ASC"),
@@ -46,7 +47,7 @@ class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
                 section(layout, "body", "Body", lambda opened: own_body(opened, ride))
                 if told := lines(ride.figures):
                     section(layout, "figures", "Figures", lambda opened: figures(opened, told))
-        section(layout, "cameras", "Cameras & Nudging", lambda opened: looking(opened, context.scene.beyond_mocap), closed=False)
+        section(layout, "cameras", "Cameras & Nudging", lambda opened: looking(opened, context), closed=False)
         section(layout, "overlays", "Overlays", lambda opened: overlays(opened, context.scene.beyond_mocap.view))
 
 
@@ -135,14 +136,16 @@ def paper(layout, ride) -> None:
     paragraph(layout, WORSE[ride.frame], "INFO")
 
 
-def looking(layout, settings) -> None:
+def looking(layout, context) -> None:
     """Four cameras; the step by which control points go, and the ways."""
-    row = layout.row(align=True)
-    row.operator("beyond_mocap.path_cameras", text="", icon="VIEW_CAMERA")
+    column = layout.column(align=True)
+    column.operator("beyond_mocap.path_cameras", icon="VIEW_CAMERA")
+    row, camera = column.row(align=True), context.scene.camera
+    seen = camera.get(LOOKED) if camera is not None else ""
     for kind, text in CAMERAS:
-        row.operator("beyond_mocap.path_camera", text=text).which = kind
+        row.operator("beyond_mocap.path_camera", text=text, depress=kind == seen).which = kind
     row = layout.row(align=True)
-    row.prop(settings, "nudge_step", text="Nudge")
+    row.prop(context.scene.beyond_mocap, "nudge_step", text="Nudge")
     for direction, icon in NUDGES:
         row.operator("beyond_mocap.nudge_points", text="", icon=icon).direction = direction
 

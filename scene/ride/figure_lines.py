@@ -14,7 +14,7 @@ FIGURES = (  # name, path in the figures, factor, form, unit; what is aimed for:
     ("Speed off", "kept_speed.path.p95", 100.0, "{:.2f}", " %", 0.01),
     ("Feet slide", "skate.contact_cm_s", 1.0, "{:.1f}", " cm/s", "skate.source_contact_cm_s"),
     ("Not planted", "skate.before_contact_cm_s", 1.0, "{:.1f}", " cm/s", None),
-    ("Slide a step", "skate.stance_mm_median", 1.0, "{:.1f}", " mm", "skate.source_stance_mm_median"),
+    ("Slide a step", "skate.stance_mm_median", 1.0, "{:.1f}", " mm", 5.0),
     ("Feet moved", "foot_correction_m.p95", 100.0, "{:.1f}", " cm", 0.10),
     ("Legs short", "ik_miss_share", 100.0, "{:.1f}", " %", 0.0),
     ("Hardest seam", "seam_jerk.max", 1.0, "{:.2f}", " x", 1.3),

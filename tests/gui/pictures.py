@@ -5,7 +5,7 @@ import pathlib
 
 import bpy
 from mathutils import Euler
-from tab import EXTENSION, TAB, output, sample, window
+from tab import EXTENSION, TAB, output, room, run, sample, window
 from window import unfold
 
 LIMIT = 400
@@ -89,6 +89,77 @@ def check_each_panel_of_the_3d_view():
         yield from picture_of_tab(f"panel-{NAMES.get(name, name)}", area)
         for fold in fold_again:
             fold()
+
+
+def a_walk_on_a_bend():
+    """A walk of the sample with a low-poly body, on a curve with two bends; the curve's middle point is selected."""
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    scene = bpy.context.scene
+    bpy.ops.beyond_mocap.import_clips(filepath=str(sample() / "library" / "walk_jog_walk.bvh"))
+    walker = bpy.context.object
+    motion = room("scene.action").read(walker, scene)
+    person = room("scene.body").create(walker, "person", (0.75, 0.05, 0.06), scene.collection, scene, motion)
+    for collection in person.users_collection:
+        collection.color_tag = "NONE"
+    walker.hide_set(False)
+    bpy.ops.beyond_mocap.edit_path(kind="NURBS", count=6)
+    curve = bpy.context.object
+    for point, aside in zip(curve.data.splines[0].points, (0.0, 0.0, 5.0, -5.0, 0.0, 4.0)):
+        point.co.y += aside
+    bpy.ops.beyond_mocap.update_path()
+    bpy.ops.beyond_mocap.path_cameras()
+    scene.frame_end = scene.frame_start + len(motion) - 1
+    scene.frame_set(scene.frame_start + int(0.36 * len(motion)))
+    yield 2.5  # figures
+
+
+def picture_of_view(name):
+    """The 3D view without its sidebar."""
+    area = window.area("VIEW_3D")
+    area.spaces.active.show_region_ui = False
+    area.spaces.active.region_3d.view_camera_zoom = 27.0
+    yield 1.5
+    window.part(KEPT / f"{name}.png", area.x, area.y, area.width, area.height, "-resize", "900x")
+    output.say(f"     {name}.png")
+
+
+def check_path_editing():
+    yield from a_walk_on_a_bend()
+    for shown in window.area("VIEW_3D").spaces:
+        shown.overlay.show_extras = False  # cameras are no part of it
+    for kind in ("quarter", "behind"):
+        run("beyond_mocap.path_camera", "EXEC_DEFAULT", which=kind.upper())
+        yield from picture_of_view(f"path-editing-{kind}")
+    run("beyond_mocap.path_camera", "EXEC_DEFAULT", which="FREE")
+    curve = bpy.context.object
+    seen = window.area("VIEW_3D").spaces.active.region_3d
+    seen.view_perspective, seen.view_distance = "PERSP", 8.5
+    rider = next(thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE")
+    hips = rider.matrix_world @ rider.pose.bones[0].head
+    seen.view_location, seen.view_rotation = (hips.x + 0.4, 0.5 * hips.y, 0.5), Euler((1.12, 0.0, 0.35)).to_quaternion()
+    view = bpy.context.scene.beyond_mocap.view
+    view.path_ghost = view.path_residuals = True
+    yield from picture_of_view("path-editing-residuals")
+    view.path_ghost = view.path_residuals = False
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.curve.select_all(action="DESELECT")
+    curve.data.splines[0].points[3].select = True
+    yield from picture_of_view("path-editing")
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.object.mode_set(mode="OBJECT")
+    panel, = (cls for cls in panels("VIEW_3D") if "PT_path" in cls.__name__)
+    area = window.area("VIEW_3D")
+    solo([panel], "VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    yield from picture_of_tab("panel-path", area)
+    fold, view = unfold(panel), bpy.context.preferences.view
+    view.ui_scale = 0.75  # it is longer than the window
+    yield 1
+    yield from picture_of_tab("panel-path-open", area)
+    view.ui_scale = 1.0
+    fold()
 
 
 def check_the_preferences():

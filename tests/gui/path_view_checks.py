@@ -1,0 +1,145 @@
+"""What is drawn of riders costs next to nothing and is made anew only when a motion was; so does the panel about them."""
+
+import time
+
+import bpy
+from tab import PICTURES, TAB, output, room, run, sample, window
+from window import Stand, unfold
+
+LIMIT = 300
+SWITCHES = ("path_source", "path_new", "path_trackers", "path_residuals", "path_ghost")
+
+
+def a_rider():
+    """A walk of the sample on a curve, which is active, all overlays of paths on."""
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    bpy.ops.beyond_mocap.import_clips(filepath=str(sample() / "library" / "walk_jog_walk.bvh"))
+    bpy.ops.beyond_mocap.edit_path(kind="NURBS", count=8)
+    for name in SWITCHES:
+        setattr(bpy.context.scene.beyond_mocap.view, name, True)
+    yield 0.5
+
+
+def redrawn(count):
+    for _ in range(count):
+        window.area("VIEW_3D").tag_redraw()
+        yield 0.06
+
+
+class Counted:
+    """While a `with` lasts: what each call of the drawing of riders takes, and which shapes are made."""
+
+    def __enter__(self):
+        self.draw, self.rides, self.seconds, self.made = room("scene.overlays.draw"), room("scene.overlays.rides"), [], []
+        self.items, self.making = self.rides.items, self.draw._made
+        self.draw.rides = Stand(self.rides, items=self.timed)
+        self.draw._made = self.watched
+        return self
+
+    def timed(self, scene):
+        start = time.perf_counter()
+        found = self.items(scene)
+        self.seconds.append(time.perf_counter() - start)
+        return found
+
+    def watched(self, key, meshes):
+        new, start = key not in self.draw._batches, time.perf_counter()
+        found = self.making(key, meshes)
+        if new:
+            self.made.append((key, time.perf_counter() - start))
+        return found
+
+    def __exit__(self, *error):
+        self.draw.rides, self.draw._made = self.rides, self.making
+
+    def told(self, heading):
+        each = 1000 * sorted(self.seconds)[len(self.seconds) // 2]
+        making = 1000 * sum(seconds for _, seconds in self.made)
+        output.say(f"     {heading}: {each:.2f} ms a redraw, {len(self.made)} shapes made in {making:.1f} ms")
+        return each
+
+
+def check_overlays_of_riders_are_made_once():
+    yield from a_rider()
+    yield from redrawn(4)
+    with Counted() as counted:
+        yield from redrawn(12)
+    assert counted.told("at rest") < 0.5
+    assert len(counted.seconds) >= 10 and not counted.made
+    with Counted() as counted:
+        bpy.context.object.data.splines[0].points[4].co.y += 1.0
+        run("beyond_mocap.update_path", "EXEC_DEFAULT")
+        yield from redrawn(6)
+    counted.told("laid anew once")
+    source = room("scene.ride.riders").shown(rider()).source
+    assert 0 < len(counted.made) <= 3, [key[1:] for key, _ in counted.made]
+    assert all(key[0] is not source for key, _ in counted.made), "the original's own shapes were made again"
+    assert sum(seconds for _, seconds in counted.made) < 0.02
+    with Counted() as counted:
+        for name in SWITCHES:
+            setattr(bpy.context.scene.beyond_mocap.view, name, False)
+        yield from redrawn(8)
+    assert counted.told("switched off") < 0.1 and not counted.made
+    batches = room("scene.overlays.draw")._batches
+    assert not [key for key in batches if not isinstance(key[0], str)], "shapes of riders are kept though none is drawn"
+
+
+def rider():
+    return next(thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE")
+
+
+def check_nothing_of_riders_stays_when_they_are_gone():
+    yield from a_rider()
+    yield from redrawn(3)
+    draw = room("scene.overlays.draw")
+    assert [key for key in draw._batches if not isinstance(key[0], str)]
+    run("beyond_mocap.leave_path", "EXEC_DEFAULT")
+    yield from redrawn(4)
+    assert not [key for key in draw._batches if not isinstance(key[0], str)]
+    yield from a_rider()
+    yield from redrawn(3)
+    bpy.data.objects.remove(rider())
+    yield from redrawn(3)
+    assert not [key for key in draw._batches if not isinstance(key[0], str)]
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield from redrawn(3)
+
+
+def check_the_panel_is_quick():
+    yield from a_rider()
+    area, panel, spent = window.area("VIEW_3D"), room("panels.path").BEYOND_MOCAP_PT_path, []
+    fold, plain = unfold(panel), panel.draw
+
+    def timed(self, context):
+        start = time.perf_counter()
+        plain(self, context)
+        spent.append(time.perf_counter() - start)
+
+    panel.draw = timed
+    opened = type("BEYOND_MOCAP_PT_path_opened", panel.__bases__, {
+        **{key: value for key, value in vars(panel).items() if not key.startswith("__") and key != "bl_rna"},
+        "bl_options": set(), "bl_order": 0, "draw": timed})
+    bpy.utils.register_class(opened)
+    yield from window.open_tab(area, TAB)
+    for _ in range(20):
+        window.sidebar(area).tag_redraw()
+        yield 0.06
+    window.picture(PICTURES / "path-panel.png")
+    bpy.utils.unregister_class(opened)
+    panel.draw = plain
+    fold()
+    each = 1000 * sorted(spent)[len(spent) // 2]
+    output.say(f"     the panel, unfolded: {each:.2f} ms")
+    assert len(spent) >= 10 and each < 2.5
+
+
+def check_figures_come_when_the_curve_is_at_rest():
+    yield from a_rider()
+    for _ in range(60):
+        if "skate" in rider().beyond_mocap_ride.figures:
+            break
+        yield 0.25
+    told = room("scene.ride.figure_lines").lines(rider().beyond_mocap_ride.figures)
+    output.say("     " + "; ".join(line.replace("\t", " ") for line in told.splitlines()))
+    assert "Feet slide" in told and "Off the path" in told
