@@ -72,9 +72,13 @@ class Moves:
 
 
 class Rows:
-    """Source frames (N,) of the frames shown, in general fractional, counted from the first that was seen."""
+    """Source frames (N,) of the frames shown, in general fractional, counted from the first that was seen.
+
+    known: what was taken from tables there, by the name that was given; a path that is dragged asks for the same again.
+    """
 
     def __init__(self, at: np.ndarray, count: int):
+        self.frames, self.known = at, {}
         at = np.clip(at, 0.0, count - 1.0)
         near = np.round(at)
         self.at, self.whole = at, bool(np.abs(at - near).max(initial=0.0) < 1e-6)
@@ -82,15 +86,31 @@ class Rows:
         self.weight = np.zeros(len(at)) if self.whole else at - self.low
         self.same = self.whole and len(at) == count and np.array_equal(self.low, np.arange(count))
 
-    def numbers(self, table: np.ndarray) -> np.ndarray:
-        """A table (F, ...) of numbers there."""
+    def numbers(self, name, table: np.ndarray) -> np.ndarray:
+        """A table (F, ...) of numbers there; name: anything that is its own."""
+        return self.remembered(name, lambda: self._numbers(table))
+
+    def turns(self, name, table: np.ndarray) -> np.ndarray:
+        """A table (F, 4) of rotations there."""
+        return self.remembered(name, lambda: self._turns(table))
+
+    def remembered(self, name, made) -> np.ndarray:
+        """What was made under this name, or what `made` makes."""
+        if name not in self.known:
+            self.known[name] = made()
+        return self.known[name]
+
+    def _numbers(self, table: np.ndarray) -> np.ndarray:
+        if self.same:
+            return table
         if self.whole:
             return table[self.low]
         weight = self.weight.reshape(-1, *[1] * (table.ndim - 1))
         return (1.0 - weight) * table[self.low] + weight * table[np.minimum(self.low + 1, len(table) - 1)]
 
-    def turns(self, table: np.ndarray) -> np.ndarray:
-        """A table (F, 4) of rotations there."""
+    def _turns(self, table: np.ndarray) -> np.ndarray:
+        if self.same:
+            return table
         if self.whole:
             return table[self.low]
         return quaternion.slerp(table[self.low], table[np.minimum(self.low + 1, len(table) - 1)], self.weight)
@@ -167,7 +187,7 @@ class Carried:
 
     def _table(self, rig: bpy.types.Object, control: Control) -> dict[str, np.ndarray]:
         """Over the source's frames: turn of the control's base and its own (F, 4), its place and its base's (F, 3) m, the
-        directions of its location's axes (F, 3, 3) m a unit, its location (F, 3)."""
+        what turns metres into its location's units (F, 3, 3), its location (F, 3)."""
         number = self.seen.number(control.name)
         places, turn = in_world(self.seen, [number], self.units)
         own, location = self.seen.own(number), self.seen.channels["location"][:, number]
@@ -180,7 +200,7 @@ class Carried:
         axes = self.seen.lies[:, :3, :3] @ self._axes(rig, control.name, base) / self.units
         rests = places[:, 0] - np.einsum("fij,fj->fi", axes, location)
         return {"base": quaternion.continuous(base), "own": quaternion.continuous(own), "place": places[:, 0],
-                "rests": rests, "axes": axes, "location": location}  # fmt: skip
+                "rests": rests, "back": np.linalg.inv(axes), "location": location}  # fmt: skip
 
     def _axes(self, rig: bpy.types.Object, name: str, base: np.ndarray) -> np.ndarray:
         """The directions (F, 3, 3) of a bone's location in the armature's space, as Blender composes poses."""
@@ -199,12 +219,7 @@ class Carried:
         """What carries each group. motion: as ridden; rigid: the same before leaning and planting; lies (N, 4, 4): the
         object in the world on the frames shown, None where it stays as in the source's frames."""
         places, world = forward_kinematics(motion)
-        was, had = self.places, self.world
-        if rows.whole:
-            was, had = was[rows.low], had[rows.low]
-        else:
-            root, local = at_frames(self.motion, rows.at)
-            was, had = forward_kinematics(Motion(self.motion.skeleton, root, local, self.motion.fps))
+        was, had = rows.remembered("source", lambda: self._source_at(rows))
         used = {group for one in self.controls for group in (one.own, one.turn, one.place, one.axes)}
         turn, before, after = {}, {}, {}
         for part in used & set(self.joint):
@@ -216,11 +231,18 @@ class Carried:
         if self.object_goes:
             turn[OBJECT], before[OBJECT], after[OBJECT] = turn[WHOLE], before[WHOLE], after[WHOLE]
         else:
-            then, origin = rows.turns(self.lie[0]), rows.numbers(self.lie[1])
+            then, origin = rows.turns("lie", self.lie[0]), rows.numbers("origin", self.lie[1])
             now = then if lies is None else rotations(lies)
             turn[OBJECT] = quaternion.multiply(now, quaternion.inverse(then))
             before[OBJECT], after[OBJECT] = origin, origin if lies is None else lies[:, :3, 3] / self.units
         return Moves(turn, before, after)
+
+    def _source_at(self, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+        """Places (N, J, 3) and rotations (N, J, 4) of the source's joints in the world."""
+        if rows.whole:
+            return self.places[rows.low], self.world[rows.low]
+        root, local = at_frames(self.motion, rows.at)
+        return forward_kinematics(Motion(self.motion.skeleton, root, local, self.motion.fps))
 
     def changed(self, moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
         """Of each control what has to be other than in the source: (bone, "turn") -> rotations (N, 4) of its own
@@ -230,24 +252,24 @@ class Carried:
             if all(moves.alike(one.own, other) for other in (one.turn, one.place)):
                 continue
             table = self.tables[one.name]
-            base, own = rows.turns(table["base"]), rows.turns(table["own"])
-            pose = quaternion.multiply(moves.between(one.turn, one.own), quaternion.multiply(base, own))
-            turned = quaternion.multiply(quaternion.inverse(base), pose)
+            base, own, pose = rows.remembered(one, lambda: _turns_at(rows, table))
+            turned = quaternion.multiply(base, quaternion.multiply(moves.between(one.turn, one.own), pose))
             if one.name in self.held or np.abs(np.abs(np.sum(turned * own, axis=1)) - 1.0).max() > 1e-14:
                 found[one.name, "turn"] = turned
             if one.slides:
-                rests = moves.point(one.place, rows.numbers(table["rests"]))
-                away = moves.point(one.own, rows.numbers(table["place"])) - rests
-                back = quaternion.inverse(moves.turn[one.axes])
-                location = _solved(rows.numbers(table["axes"]), quaternion.rotate(back, away))
-                if np.abs(location - rows.numbers(table["location"])).max() > _SAME:
+                rests = moves.point(one.place, rows.numbers((one, "rests"), table["rests"]))
+                away = moves.point(one.own, rows.numbers((one, "place"), table["place"])) - rests
+                away = quaternion.rotate(quaternion.inverse(moves.turn[one.axes]), away)
+                location = np.einsum("nij,nj->ni", rows.numbers((one, "back"), table["back"]), away)
+                if np.abs(location - rows.numbers((one, "location"), table["location"])).max() > _SAME:
                     found[one.name, "location"] = location
         return found
 
 
-def _solved(axes: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """What makes ways (N, 3) along axes (N, 3, 3)."""
-    return np.linalg.solve(axes, way[..., None])[..., 0]
+def _turns_at(rows: Rows, table: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A control's turns (N, 4): what takes its base off, its own, and both together."""
+    base, own = rows.turns((id(table), "base"), table["base"]), rows.turns((id(table), "own"), table["own"])
+    return quaternion.inverse(base), own, quaternion.multiply(base, own)
 
 
 def channel_values(mode: str, turned: np.ndarray, like: np.ndarray) -> np.ndarray:

@@ -38,6 +38,7 @@ class RigSource:
             self.motion = rig_parts.motion_of(rig, parts, seen, self.units, frames_per_second(scene))
             controls = _controls(rig, side, parts, played)
             rides = rig_study.study(rig, side, controls, list(parts.shown.values()))
+        self._rows: Rows | None = None
         self._ways = seen.lies @ np.linalg.inv(seen.basis)
         self._hangs = bool(np.ptp(self._ways, axis=0).max() > 1e-6)
         self.seen, self.carried = seen, Carried(rig, parts, seen, rides, played.object_keyed, self.motion, self.units)
@@ -45,9 +46,8 @@ class RigSource:
     def values(self, ridden, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
         """(Data path, index) -> values (N,) on the frames from `start` on: what has to be other than in the source, and,
         where the frames shown are not the source's own, all that is animated."""
-        rows = Rows(np.asarray(ridden.frames, float), len(self.motion))
-        above = self._above(len(ridden.motion), rig)
-        moves = self.carried.moves(ridden.motion, ridden.rigid, rows, above @ rows.numbers(self.seen.basis))
+        rows, above = self.rows(ridden), self._above(len(ridden.motion), rig)
+        moves = self.carried.moves(ridden.motion, ridden.rigid, rows, above @ rows.numbers("basis", self.seen.basis))
         found = {} if rows.same and not self.played.layered else {p: self.own(*p, rows) for p in self.played.places}
         for (bone, what), values in self.carried.changed(moves, rows).items():
             number = self.seen.number(bone)
@@ -60,18 +60,28 @@ class RigSource:
             found |= self._object(moves, rows, above, rig)
         return found
 
+    def rows(self, ridden) -> Rows:
+        """The source's frames that are shown; the same object as long as they are the same."""
+        at = np.asarray(ridden.frames, float)
+        if self._rows is None or not np.array_equal(at, self._rows.frames):
+            self._rows = Rows(at, len(self.motion))
+        return self._rows
+
     def own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
         """A channel's values (N,) in the source on the source's frames that are shown; None where it was not looked at."""
+        return rows.remembered((path, index), lambda: self._own(path, index, rows))
+
+    def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
         if (table := self.seen.others.get(path)) is not None:
             table = table[:, min(index, table.shape[1] - 1)]
-            return table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers(table)
+            return table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers((path, index, "is"), table)
         match = BONE.match(path)
         if match is None or match[2] not in POSED or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
             return None
         table = self.seen.channels[match[2]][:, self.seen.number(bpy.utils.unescape_identifier(match[1]))]
         if match[2] == "rotation_quaternion":
             table = quaternion.continuous(table)
-        return rows.numbers(table[:, index])
+        return rows.numbers((path, index, "is"), table[:, index])
 
     def _above(self, count: int, rig: bpy.types.Object) -> np.ndarray:
         """What the object hangs on, parents and constraints, on the `count` frames from `start` on: (count, 4, 4)."""
@@ -86,7 +96,7 @@ class RigSource:
 
     def _object(self, moves, rows: Rows, above: np.ndarray, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
         """The object's own location and rotation, where it is the object that goes."""
-        now = rows.numbers(self.seen.lies)
+        now = rows.numbers("lies", self.seen.lies).copy()
         now[:, :3, :3] = quaternion.to_matrix(moves.turn[OBJECT]) @ now[:, :3, :3]
         now[:, :3, 3] = moves.point(OBJECT, now[:, :3, 3] / self.units) * self.units
         basis = np.linalg.inv(above) @ now

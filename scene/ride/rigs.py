@@ -21,7 +21,6 @@ from ..measure import frames_per_second, units_per_metre
 from ..set_aside import play_as_before, put_aside, stance_of, stand
 from . import keys, rig_parts
 from .carrier import MARK, Carrier, Read
-from .rig_ride import Rows
 from .rig_source import BONE, POSED, RigSource, playing_strips
 
 KIND = "beyond_mocap_ride_kind"
@@ -102,7 +101,7 @@ class RigCarrier(Carrier):
         sources = {} if layered or original is None else channels.curves(original, own)
         sheet = keys.Sheet(made, slot, channels.curves(made, slot), sources)
         wanted = rig.values(ridden, self.body)
-        rows = Rows(np.asarray(ridden.frames, float), len(read.motion))
+        rows = rig.rows(ridden)
         for place in sheet.curves:  # what was written once and is as in the source again
             if place not in wanted and place not in sources and (values := rig.own(*place, rows)) is not None:
                 wanted[place] = values
