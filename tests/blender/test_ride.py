@@ -423,6 +423,7 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
     own = circle()
     body.beyond_mocap_ride.curve = own
     bpy.context.view_layer.update()
+    choose(body)
     bpy.ops.beyond_mocap.path_curve()
     assert own.name in bpy.data.objects
 
