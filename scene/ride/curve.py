@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion.path import Path
@@ -142,6 +143,7 @@ def create(
     room = context.scene.collection if context.layer_collection.exclude else context.collection
     room.objects.link(made)
     context.view_layer.update()
+    _as_long(context.scene, made, path)
     return made
 
 
@@ -193,7 +195,6 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
         third = (points[1] - points[0]) / 3.0
         return points, (points - third, points + third)
     points = path_line.control_points(path, count + more, degree) if count else _close_enough(path, degree)
-    points = _as_long(points, degree, path)
     if kind != "BEZIER":
         return points, ()
     spline = path_line.b_spline(points, degree)
@@ -220,17 +221,27 @@ def _close_enough(path: Path, degree: int) -> np.ndarray:
     return points
 
 
-def _as_long(points: np.ndarray, degree: int, path: Path) -> np.ndarray:
-    """Control points (P, 3) of a spline that is no shorter than the path: its last point moved on where it would be."""
+def _as_long(scene: bpy.types.Scene, made: bpy.types.Object, path: Path) -> None:
+    """Move a new curve's last point on where it is shorter than the path, so that the motion does not end early."""
     from ...beyond_mocap.motion.arc_length import ArcLength
-    from ...beyond_mocap.polish.path_line import b_spline
 
-    spline = b_spline(points, degree)
-    lacks = ArcLength(path).length + _SPARE - ArcLength(spline).length
-    ahead = points[-1] - points[-2]
-    if path.closed or lacks <= 0.0 or np.linalg.norm(ahead) < 1e-6:
-        return points
-    return np.concatenate([points[:-1], points[-1:] + ahead * (lacks / np.linalg.norm(ahead))])
+    spline = made.data.splines[0]
+    if spline.use_cyclic_u:
+        return
+    units, length = units_per_metre(scene), ArcLength(path).length + _SPARE
+    for _ in range(3):
+        line = read(scene, made).line()
+        lacks = length - ArcLength(read(scene, made).path()).length
+        ahead = line[-1] - line[-2]
+        if lacks <= 0.0 or np.linalg.norm(ahead) < 1e-9:
+            return
+        by = Vector(ahead / np.linalg.norm(ahead) * lacks * units)
+        last = points_of(spline)[-1]
+        if spline.type == "BEZIER":
+            last.handle_left, last.handle_right = last.handle_left + by, last.handle_right + by
+            last.co = last.co + by
+        else:
+            last.co = last.co + Vector((*by, 0.0))
 
 
 def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
