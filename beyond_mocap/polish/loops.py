@@ -2,7 +2,7 @@
 
 Compared are places and velocities of the main joints as seen from the path's moving frame, travelling with the body, in
 a window around both frames; which soles stand; and how far the body lies off its path. A motion graph (Kovar et al.
-2002) finds its transitions alike. The search is bounded: rough over at most four million pairs, then exact around
+2002) finds its transitions alike. The search is bounded: rough over at most two and a half million pairs, then exact around
 the best two dozen.
 """
 
@@ -23,7 +23,7 @@ WINDOW_SECONDS = 0.12
 """Pairs are compared over so much before and after."""
 
 _VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
-_ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 4_000_000, 9000, 24
+_ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 2_500_000, 9000, 24
 _STRIDE_SHARE = 0.85  # a loop is at least so long, of the stride's time: strides differ
 _SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which nobody loops: a stop is no gait
 _LABEL = 0.06  # metres that a wrong sole costs
