@@ -259,7 +259,8 @@ def _timed(
         timing = by_arc_length(residuals, settings.speed, settings.delay)
     else:
         timing = by_time(residuals, path, arc, settings.speed, settings.delay)
-    end = ending(timing.arc, arc.length, residuals.fps, settings.end, path.closed or source.still)
+    wish = "stop" if len(seams) else settings.end  # a cycle ends with the path: what is a hair longer does not begin anew
+    end = ending(timing.arc, arc.length, residuals.fps, wish, path.closed or source.still)
     timing = timing.first(end.count)
     seams = np.searchsorted(timing.at, seams - 1e-9)
     return residuals, seams[seams < end.count], timing, replace(end, told=(*told, *end.told))

@@ -77,6 +77,18 @@ def test_who_stands_still_is_not_cycled():
         ride(source, line(5.0), asked(cycle=True))
 
 
+def test_a_cycle_on_bends_that_slow_ends_with_the_path(source):
+    out = ride(source, circle(1.2), asked(cycle=True, end="repeat", bends=True))
+    assert not len(out.again) and out.arc[-1] == pytest.approx(2.4 * np.pi, abs=0.06)
+
+
+def test_two_frames_can_ride():
+    source = prepare(gait(1.4, 1.0, 30.0).frames(0, 2), RideSettings())
+    assert np.isfinite(ride(source, line(2.0), RideSettings()).motion.root_positions).all()
+    with pytest.raises(InputError, match="cycling off"):
+        ride(source, line(2.0), asked(cycle=True))
+
+
 def test_by_time_nothing_is_cycled_and_that_is_told(source):
     out = ride(source, line(20.0), asked(cycle=True, by_arc_length=False))
     assert len(out.motion) == len(source.motion) and any("by time" in line for line in out.warnings)
