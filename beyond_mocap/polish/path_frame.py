@@ -15,15 +15,17 @@ from scipy.linalg import solveh_banded
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.skeleton import Skeleton
+from ..motion.track import zero_phase_hann
 
 FRAMES = ("path", "tangent", "absolute")
 
 CLEAR = 0.25
 """m/s over the ground from which on a direction of travel is believed; below, the heading is carried across."""
 
-_FULL, _POWER, _MOST = 0.4, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
-_STIFF, _TIGHT = 0.1, 0.3  # seconds: of the heading's smoothness, and beyond which a gap is crossed in a straight line
+_FULL, _POWER, _MOST = 0.5, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
+_STIFF, _TIGHT = 0.1, 0.03  # seconds: of the heading's smoothness, and beyond which a gap is crossed in a straight line
 _STILL = 0.01
+_COMES, _SURELY = 1.0, 0.6  # seconds; m/s above which speed alone counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +133,11 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
 
     Where the horizontal tangent vanishes (standing still, vertical stretches, cusps) it says nothing, and a body that
     stands does not spin with it: least squares, sum w |h - a|^2 + |h''|^2 + |h'|^2 with a the tangent's direction and
-    its weight w falling steeply below a slow walk. At a walk and above that is the tangent's own direction.
+    its weight w falling steeply below a slow walk. At a walk and above that is the tangent's own direction. Who sways or
+    shifts his feet about is slow, however fast that is: what counts is how far he comes within a second.
     """
+    mean = zero_phase_hann(along[:, :2] * speed[:, None], fps, _COMES) if len(along) > 2 else along[:, :2]
+    speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURELY)
     raw = np.arctan2(along[:, 1], along[:, 0])
     clear = speed >= min(CLEAR, 0.5 * speed.max(initial=0.0))
     if len(raw) < 3 or speed.max(initial=0.0) < _STILL:
