@@ -318,13 +318,13 @@ def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Tim
 def _ground(
     path: Path, arc: ArcLength, settings: RideSettings, terrain: Terrain | None, moving: MovingFrame, timing: Timing,
     rows: Residuals,
-) -> Ground | None:
-    """What the feet are to go on; None where that is as level as what they went on."""
-    if not settings.slopes or (terrain is None and is_level(path, arc) and not rows.under.any()):
-        return None
-    surface = path_surface(path, arc, timing.arc) if terrain is None else mesh_surface(terrain, moving.origin)
+) -> Ground:
+    """What the feet are to go on."""
+    own = moving.origin[:, 2:] + rows.under
     up = quaternion.rotate(quaternion.about_up(moving.heading)[:, None], rows.up)
-    return Ground(moving.origin[:, 2:] + rows.under, up, surface)
+    if not settings.slopes or (terrain is None and is_level(path, arc) and not rows.under.any()):
+        return Ground(own, up)
+    return Ground(own, up, path_surface(path, arc, timing.arc) if terrain is None else mesh_surface(terrain, moving.origin))
 
 
 def _own_ground(

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.contacts import sole_height
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
@@ -26,6 +27,7 @@ from .foot_plant import (
     held_less,
     held_shift,
     lacking,
+    lift_to_ground,
     laid_foot,
     pelvis_drop,
     settled,
@@ -56,6 +58,7 @@ LEAST_BEND = 0.01
 
 _FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
 _PELVIS_SECONDS = 0.5
+_UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004
 _BEHIND = 0.1  # seconds by which a rise or drop is spread
 
@@ -63,11 +66,11 @@ _BEHIND = 0.1  # seconds by which a rise or drop is spread
 @dataclass(frozen=True, eq=False)
 class Ground:
     """What the feet go on. own (T, 2) m: heights of each foot's ground that the motion was laid with; up (T, 2, 3) its
-    normals; surface: what they are to go on instead."""
+    normals; surface: what they are to go on instead, None where that is the same."""
 
     own: np.ndarray
     up: np.ndarray
-    surface: Surface
+    surface: Surface | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +87,12 @@ def follow(
     rotations: np.ndarray,
     standing: np.ndarray,
     fps: float,
-    ground: Ground | None = None,
+    ground: Ground,
     steps: Steps | None = None,
 ) -> Planted:
     """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. ground: None where feet keep their heights; steps: None
-    where they are as long as they were.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. steps: None where they are as long as they were.
     """
     legs, kept, limbs = _legs(skeleton)
     places, world = pose_kinematics(legs, root, rotations[:, kept])
@@ -99,23 +101,25 @@ def follow(
     if steps is not None:
         feet = [_stretched(foot, root, steps) for foot in feet]
     feet = [turned_flat(foot, scale) for foot in feet]
-    firm, sunk, most = [foot.weight for foot in feet], np.zeros(len(root)), MOST_DROP
+    lifts = [_lift(foot, ground.own[:, side], sole_height(skeleton), scale) for side, foot in enumerate(feet)]
+    feet = [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)]
+    lifted = np.mean(lifts, axis=0)
+    firm = [foot.weight for foot in feet]
     for turn in range(_ROUNDS + 1):
         shifts = [held_shift(foot.moves, weight, scale)[0] for foot, weight in zip(feet, firm)]
         put = [foot.moved(np.pad(by, ((0, 0), (0, 1)))) for foot, by in zip(feet, shifts)]
-        if ground is not None:
-            put, sunk, most = _on_ground(put, standing, fps, ground)
+        put, up, most = _on_ground(put, standing, fps, ground, lifted)
         goals = [_goal(foot, spread) for foot in put]
         drop = pelvis_drop(put, [goal for goal, _ in goals], spread, most)
         short = [lacking(foot, goal, drop) for foot, (goal, _) in zip(put, goals)]
         if turn == _ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
             break
         firm = [held_less(weight, s) for weight, s in zip(firm, short)]
-    down = (sunk + drop)[:, None] * [0.0, 0.0, 1.0]
+    down = (drop - up)[:, None] * _UP
     places = places - down[:, None]
     out, correction, miss = np.array(rotations, dtype=float), np.zeros((len(root), 2)), np.zeros((len(root), 2))
     for side, (foot, (goal, turned)) in enumerate(zip(put, goals)):
-        hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
+        hip = foot.hip - drop[:, None] * _UP
         target = _eased(foot, goal, hip, scale)
         joints = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
         found, _ = bent_limb(legs, places, world, joints, target, end_rotation=turned, soft=1e-4)
@@ -157,29 +161,45 @@ def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
     return foot.moved(np.pad((much * ahead)[:, None] * along, ((0, 0), (0, 1))))
 
 
+def _lift(foot: Foot, own: np.ndarray, sole: float, scale: float) -> np.ndarray:
+    """Metres (T,) up that bring a standing foot onto its ground, `own` (T,) m high: the floors of recordings are uneven."""
+    return lift_to_ground(foot.moved(-own[:, None] * _UP), sole, scale)
+
+
 def _frames(seconds: float, fps: float) -> int:
     return int(round(seconds * fps))
 
 
-def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground) -> tuple[list[Foot], np.ndarray, float]:
-    """Feet on their ground, metres (T,) by which the body goes down for that, and those that it may go down further."""
+def _on_ground(
+    feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground, lifted: np.ndarray
+) -> tuple[list[Foot], np.ndarray, float]:
+    """Feet on their ground, metres (T,) by which the body goes up for that, and metres by which it may go down further;
+    lifted (T,) m: by which the feet were lifted before."""
+    if ground.surface is None:
+        up = _followed(lifted, fps)
+        return [replace(foot, hip=foot.hip + up[:, None] * _UP) for foot in feet], up, MOST_DROP
     over = np.stack([np.stack([foot.heel, foot.toe], axis=1) for foot in feet], axis=1)
     clear = over[..., 2].min(axis=2) - ground.own
     under = footing(over[..., :2], standing, clear, fps, ground.surface)
     rise = under.height - ground.own
     steep = np.linalg.norm(under.slope, axis=2).mean(axis=1)
-    up = zero_phase_hann((rise.mean(axis=1) - SINK_BY_SLOPE * steep)[:, None], fps, _PELVIS_SECONDS)[:, 0]
+    up = _followed(lifted + rise.mean(axis=1) - SINK_BY_SLOPE * steep, fps)
     tip = quaternion.between(ground.up, under.normal)
     put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
-    return put, -up, MOST_DROP + DROP_BY_SLOPE * float(np.abs(under.slope).max(initial=0.0))
+    return put, up, MOST_DROP + DROP_BY_SLOPE * float(np.abs(under.slope).max(initial=0.0))
+
+
+def _followed(height: np.ndarray, fps: float) -> np.ndarray:
+    """The pelvis's share (T,) m of what is under the feet."""
+    return zero_phase_hann(height[:, None], fps, _PELVIS_SECONDS)[:, 0]
 
 
 def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Foot:
     """The foot tipped (T, 4) about its toe and brought up by rise (T,) m; its hip goes up by `up` (T,) m."""
-    toe = foot.toe + rise[:, None] * [0.0, 0.0, 1.0]
+    toe = foot.toe + rise[:, None] * _UP
     return replace(
         foot,
-        hip=foot.hip + up[:, None] * [0.0, 0.0, 1.0],
+        hip=foot.hip + up[:, None] * _UP,
         toe=toe,
         heel=toe + quaternion.rotate(tip, foot.heel - foot.toe),
         rotation=quaternion.multiply(tip, foot.rotation),

@@ -39,11 +39,11 @@ def mesh(heights):
 
 
 def off_the_ground(ridden, ground):
-    """Metres (N,) by which standing toes are higher over `ground`, a function of x, than they were over their own."""
+    """Metres (N,) that toes are above `ground`, a function of x, in feet that stand with their toes on it."""
     toe = foot_joints(ridden.motion.skeleton)[:, 1]
     now, before = (forward_kinematics(motion)[0][:, toe] for motion in (ridden.motion, ridden.rigid))
-    off = now[..., 2] - ground(now[..., 0]) - (before[..., 2] - ridden.origin[:, 2:])
-    return off[ridden.standing[..., 1]]
+    down = ridden.standing.all(axis=2) & (before[..., 2] - ridden.origin[:, 2:] < 0.004)
+    return (now[..., 2] - ground(now[..., 0]))[down]
 
 
 def along(path):
