@@ -3,5 +3,5 @@
 - `numbers`      kinds of options
 - `outputs`      where results may be written, and who writes them
 - `told`         progress, notes, Ctrl-C
-- `ride_path`    the verb `path`
+- `ride_path`    the verb `path`; `keep_apart`: a rider that goes round others
 """

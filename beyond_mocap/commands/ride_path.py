@@ -39,6 +39,12 @@ def add(verbs):
     verb.add_argument("--slow-on-slopes", action="store_true", help="shorter steps up and down, as people make them")
     verb.add_argument("--no-slopes", action="store_true", help="feet do not follow slopes; the body rides up as in a lift")
     _add_curve(verb)
+    verb.add_argument("--delay", type=partial(between, low=0.0, high=3600.0, expected="0 to 3600 seconds"), default=0.0,
+                      metavar="SECONDS", help="that it waits before it sets out")  # fmt: skip
+    verb.add_argument("--avoid", type=Path, action="append", default=[], metavar="OTHER.bvh",
+                      help="a moving body to keep clear of, by waiting or going round; may be repeated")  # fmt: skip
+    verb.add_argument("--distance", type=partial(between, low=0.05, high=20.0, expected="0.05 to 20 metres"), default=0.6,
+                      metavar="METRES", help="between the middles of two bodies, with --avoid; default 0.6")  # fmt: skip
     verb.add_argument("--ground", type=Path, metavar="HILL.obj", help="a mesh for the feet to stand on: metres, Y up")
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--provenance", type=Path, metavar="P.csv")
@@ -61,15 +67,18 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`path`: rides it, and writes what was asked for about it."""
     from ..files import bvh
 
-    inputs = (options.input, options.path, options.ground)
+    inputs = (options.input, options.path, options.ground, *options.avoid)
     check_outputs(options.out, options.report, options.provenance, never=inputs)
     write = writer_of(options.out, writers)
     if options.control_degree and not options.control_points:
         raise InputError("--control-degree", "without --control-points", "both", "add --control-points")
+    if options.closed and options.control_points:
+        raise InputError("--closed", "with --control-points", "one of them", "a B-spline of control points has two ends")
     path, ground = _path(options), _ground(options)
     clip = bvh.read(options.input, options.unit)
     told.progress(0.2, "path")
     source, settings = _prepared(clip.motion, options)
+    settings, asked = _apart(source, path, settings, ground, options)
     told.progress(0.5, "ride")
     ridden, take = _ridden(source, path, settings, ground, options)
     report = _report(source, ridden, take, path, ground) if options.report else None
@@ -80,7 +89,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
         write(take, options.out)
     _write_tables(options, take, report)
     told.end()
-    for note in (*notes, *ridden.warnings):
+    for note in (*notes, *asked, *ridden.warnings):
         told.note(note)
     gone = float(ridden.arc[-1] - ridden.arc[0]) if len(ridden.arc) else 0.0
     print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} m")
@@ -129,12 +138,22 @@ def _prepared(motion, options):
         fit="polynomial" if options.degree else "spline", degree=options.degree or RideSettings.degree,
         by_arc_length=not options.no_arc_length, speed=options.speed, end=options.end, cycle=options.cycle,
         frame=options.frame, plant=not options.no_plant, lean=not options.no_lean, bends=options.slow_in_bends,
-        slopes=not options.no_slopes, climbs=options.slow_on_slopes,
+        slopes=not options.no_slopes, climbs=options.slow_on_slopes, delay=options.delay,
     )
     try:
         return prepare(motion, settings), settings
     except InputError as error:
         raise InputError(options.input, str(error)) from None  # a motion does not know its file
+
+
+def _apart(source, path, settings, ground, options):
+    """The settings that keep it clear of other bodies, and what these ask of it, one line each."""
+    if not options.avoid:
+        return settings, ()
+    from .keep_apart import clear_of, read_others
+
+    others = read_others(options.avoid, None)
+    return clear_of(others, options.distance, source, path, settings, ground, options.input.name)
 
 
 def _ridden(source, path, settings, ground, options):

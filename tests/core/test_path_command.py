@@ -127,6 +127,21 @@ def test_a_path_that_ends_stops_the_motion_and_cycling_goes_on(run, tmp_path):
     assert counts["stop"] < 120 and counts["cycle"] > 380
 
 
+def test_a_rider_goes_round_a_body_that_moves_already(run, place, tmp_path):
+    (place / "along.csv").write_text("x_m,y_m\n0,0\n6,0\n")
+    (place / "back.csv").write_text("x_m,y_m\n6,0.1\n0,0.1\n")
+    assert run(curve="along", out="first.bvh")[0] == 0
+    first = bvh.read(tmp_path / "first.bvh", 0.01).motion.root_positions
+    gaps = {}
+    for name, more in (("through", ()), ("round", ("--avoid", tmp_path / "first.bvh", "--distance", 0.8))):
+        status, _, error = run(*more, curve="back", out="second.bvh")
+        second = bvh.read(tmp_path / "second.bvh", 0.01).motion.root_positions
+        count = min(len(first), len(second))
+        gaps[name] = np.linalg.norm((first[:count] - second[:count])[:, :2], axis=1).min()
+        assert status == 0 and any("walk.bvh goes" in line or "walk.bvh waits" in line for line in error) == bool(more)
+    assert gaps["through"] < 0.3 and gaps["round"] > 0.75
+
+
 @pytest.mark.parametrize("content, parts", [
     ("", ["bad.csv", "empty"]),
     ("\0\1\2", ["bad.csv", "binary"]),
@@ -166,6 +181,10 @@ def test_a_bad_ground_is_one_line(capfd, place, tmp_path, content, parts):
     (["--control-degree", "2"], ["--control-points"]),
     (["--control-points", "--control-degree", "20"], ["few.csv", "degree"]),
     (["--unit", "0"], ["--unit"]),
+    (["--closed", "--control-points"], ["--closed"]),
+    (["--delay", "-1"], ["--delay"]),
+    (["--avoid", "missing.bvh"], ["missing.bvh"]),
+    (["--distance", "0"], ["--distance"]),
     (["--ground", "missing.obj"], ["missing.obj"]),
     (["--report", "nowhere/r.json"], ["nowhere"]),
 ])  # fmt: skip
