@@ -37,7 +37,7 @@ SEEN = 0.35
 """How unlike a loop's ends may be without being told, and its motion's end to count as a step like the others."""
 
 _ALSO_GOOD = (1.6, 0.02)  # loops that cost at most so many times the best one's, and metres more, may be taken too
-_KEEPS = 3.0  # how much strides of another length count against seams
+_KEEPS, _ALIKE = 3.0, 0.3  # how much strides of another length, and loops whose ends differ, count against seams
 _OTHERS = 3  # times that another loop than the main one is run through, at most
 
 
@@ -77,13 +77,14 @@ def _filled(residuals: Residuals, loops: tuple[Loop, ...], wanted: float, most: 
     """The motion with as many jumps as `wanted` metres take."""
     own = float(residuals.step.sum())
     length = min(wanted, _longest(residuals, loops[0], own))
-    jumps = _exact_end(loops, own, length, most)
-    shown, seams = _jumped(residuals, jumps or _steady(residuals, loops[0], own, length))
-    told = _seen(loops)
+    exact = _exact_end(loops, own, length, most)
+    jumps = exact or _steady(residuals, loops, own, length)
+    shown, seams = _jumped(residuals, jumps)
+    told = _seen(jumps)
     if length < wanted:
         minutes = len(shown) / residuals.fps / 60.0
         told += (f"the path is {wanted:.0f} m long: the motion ends after {minutes:.0f} minutes and {length:.0f} m of it",)
-    if jumps:
+    if exact:
         scale = length / float(shown.step.sum())
         return Cycled(_scaled(shown, scale), seams, scale, (*told, *_other_strides(scale)))
     arc = np.cumsum(shown.step)
@@ -166,7 +167,7 @@ def _rating(jumps: tuple[Loop, ...], scale: float, best: float) -> float:
     """What speaks against a plan: strides of another length, many jumps, jumps that are seen."""
     strides = sum(loop.strides for loop in jumps)
     worse = sum(loop.cost for loop in jumps) / len(jumps) / max(best, 1e-6) - 1.0
-    return _KEEPS * abs(scale - 1.0) / MOST_SCALE + len(jumps) / max(strides, 1.0) + worse
+    return _KEEPS * abs(scale - 1.0) / MOST_SCALE + len(jumps) / max(strides, 1.0) + _ALIKE * worse
 
 
 def _ordered(main: Loop, count: int, other: Loop, times: int) -> tuple[Loop, ...]:
@@ -179,8 +180,9 @@ def _ordered(main: Loop, count: int, other: Loop, times: int) -> tuple[Loop, ...
     return ()
 
 
-def _steady(residuals: Residuals, loop: Loop, own: float, length: float) -> tuple[Loop, ...]:
+def _steady(residuals: Residuals, loops: tuple[Loop, ...], own: float, length: float) -> tuple[Loop, ...]:
     """One loop until the path's end falls into it or before it, so that nobody is cut in the middle of stopping."""
+    loop = min(loops, key=lambda loop: _rating((loop,), 1.0, loops[0].cost))
     outro = float(residuals.step[loop.end + 1 :].sum())
     return (loop,) * max(int(np.ceil((length - own + outro) / loop.metres)), 1)
 
