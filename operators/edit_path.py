@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
@@ -18,7 +20,7 @@ DEGREE = {"name": "Degree", "default": 3, "min": 2, "max": 5,
 
 class BEYOND_MOCAP_OT_edit_path(Verb, bpy.types.Operator):
     """Lay the selected armature's motion on a curve along its path: edit the curve (Tab), and the motion follows. A selected
-curve becomes the path instead. The original action is put aside; Leave brings it back"""
+curve becomes the path instead, also of who rides already. The original action is put aside; Leave brings it back"""
 
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
@@ -30,7 +32,7 @@ curve becomes the path instead. The original action is put aside; Leave brings i
 
     @classmethod
     def poll(cls, context):
-        """Armatures that do not ride yet."""
+        """Armatures."""
         cls.poll_message_set("Leave edit mode first (Tab)")
         if context.mode not in {"OBJECT", "POSE"}:
             return False
@@ -39,26 +41,33 @@ curve becomes the path instead. The original action is put aside; Leave brings i
 
     def do(self, context):
         """Curve and motion, and the curve active."""
-        chosen = bodies(context)
-        waiting = [body for body in chosen if not body.beyond_mocap_ride.on]
-        if not waiting:
-            raise InputError(f"armature {chosen[0].name}", "it rides already", "one that does not", "edit its curve, or press Leave")
         linked.refuse(context.scene)
+        chosen = bodies(context)
         drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
-        begun = []
+        riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
+        if drawn is None and len(riding) == len(chosen):
+            raise InputError(f"armature {chosen[0].name}", "it rides already", "one that does not", "edit its curve, or press Leave")
+        begun, used = [], drawn
         try:
-            for body in waiting:
+            for body, _ in riding if drawn is not None else ():
+                riders.change(context.scene, body, drawn)
+            for body in [body for body in chosen if not body.beyond_mocap_ride.on]:
                 before = body.beyond_mocap_ride.curve
-                begun.append((body, before, riders.begin(context, body, drawn, self.count, self.kind, self.degree, self.straight)))
+                made = riders.begin(context, body, drawn, self.count, self.kind, self.degree, self.straight)
+                begun.append((body, before, made if made not in (drawn, before) else None))
+                used = used or made
         except BeyondMocapError:
-            for body, before, used in begun:
-                riders.revert(body, before, used if used not in (drawn, before) else None)
+            for body, before, made in begun:
+                riders.revert(body, before, made)
+            for body, before in riding:
+                with suppress(BeyondMocapError):  # who could not ride his curve before cannot now
+                    riders.change(context.scene, body, before)
             raise
-        made = begun[0][2]
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
-        riders.choose(context, made)
-        self.report({"INFO"}, f"{', '.join(body.name for body, *_ in begun)}: edit the points of {made.name} (Tab); the motion follows")
+        riders.choose(context, used)
+        names = ", ".join(body.name for body in chosen)
+        self.report({"INFO"}, f"{names}: edit the points of {used.name} (Tab); the motion follows")
 
 
 def bodies(context) -> list[bpy.types.Object]:

@@ -117,7 +117,7 @@ def begin(
     source.unsure()
     known = source.of(carrier, scene, RideSettings(**wishes(ride))).core
     before = ride.curve
-    if drawn is None and before is not None and before.name in scene.objects:
+    if drawn is None and not (straight or count) and before is not None and before.name in scene.objects:
         drawn = before
     made = None
     if drawn is None:
@@ -142,6 +142,17 @@ def revert(body: bpy.types.Object, before: bpy.types.Object | None, made: bpy.ty
         bpy.data.curves.remove(made.data)
 
 
+def change(scene: bpy.types.Scene, body: bpy.types.Object, drawn: bpy.types.Object) -> None:
+    """Let a rider ride another curve. InputError, and nothing changed, where it cannot."""
+    ride = body.beyond_mocap_ride
+    before, ride.curve = ride.curve, drawn
+    try:
+        renew(scene, body)
+    except BeyondMocapError:
+        ride.curve = before
+        raise
+
+
 def new_curve(
     context: bpy.types.Context, body: bpy.types.Object, shape: str = "FITTED", count: int = 0, kind: str = "BEZIER",
     degree: int = 3,
@@ -158,11 +169,9 @@ def new_curve(
         settings = RideSettings(**wishes(ride))
         path, straight = _own_path(source.of(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
     made = curve.create(context, f"{body.name} path", path, straight, count, kind, degree)
-    ride.curve = made
     try:
-        renew(scene, body)
+        change(scene, body, made)
     except BeyondMocapError:
-        ride.curve = before
         bpy.data.curves.remove(made.data)
         raise
     if before is not None and before.get(curve.MARK) and not any(r.beyond_mocap_ride.curve == before for r in riders(scene)):

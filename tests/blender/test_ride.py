@@ -428,6 +428,27 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
     assert own.name in bpy.data.objects
 
 
+def test_who_rides_already_takes_the_selected_curve(scene, part):
+    riders = part("ride.riders")
+    first, second = walker(), walker("jogging_2_9")
+    choose(first)
+    bpy.ops.beyond_mocap.edit_path()
+    own = first.beyond_mocap_ride.curve
+    choose(first)
+    with pytest.raises(RuntimeError, match="rides already"):
+        bpy.ops.beyond_mocap.edit_path()
+    ring, point = circle(), drawn([(0, 0, 0)])
+    before = bits(part, first), bits(part, second)
+    choose(first, second, point)
+    with pytest.raises(RuntimeError, match="no line"):
+        bpy.ops.beyond_mocap.edit_path()
+    assert (bits(part, first), bits(part, second)) == before and first.beyond_mocap_ride.curve == own
+    choose(first, second, ring)
+    assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
+    assert first.beyond_mocap_ride.curve == second.beyond_mocap_ride.curve == ring == bpy.context.object
+    assert max(to_path(riders, body, frame) for body in (first, second) for frame in (1, 40)) < 0.15
+
+
 def test_button_and_function_give_the_same(scene, part, core):
     """What is written is what the core says, for the motion and the curve as they are read."""
     action, curve = part("action"), part("ride.curve")
