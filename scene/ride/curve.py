@@ -148,12 +148,17 @@ def create(
 
 
 def _is_animated(drawn: bpy.types.Object) -> bool:
-    """Whether a curve object goes elsewhere with the frame."""
-    while drawn is not None:
-        data = drawn.animation_data
-        if drawn.constraints or (data is not None and (data.action or data.nla_tracks or data.drivers)):
+    """Whether a curve object goes elsewhere with the frame, by itself or with what it hangs on."""
+    known, waiting = set(), [drawn]
+    while waiting:
+        thing = waiting.pop()
+        if thing is None or thing in known:
+            continue
+        known.add(thing)
+        data = thing.animation_data
+        if data is not None and (data.action or data.nla_tracks or data.drivers):
             return True
-        drawn = drawn.parent
+        waiting += [thing.parent, *(getattr(constraint, "target", None) for constraint in thing.constraints)]
     return False
 
 

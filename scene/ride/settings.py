@@ -104,6 +104,8 @@ def wishes(ride: BeyondMocapRide) -> dict:
 
 def riders(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """All armatures of a scene that ride."""
+    if not bpy.data.armatures:
+        return []
     return [body for body in scene.objects if body.type == "ARMATURE" and body.beyond_mocap_ride.on]
 
 

@@ -522,6 +522,28 @@ def test_a_curve_that_moves_with_time_is_ridden_as_it_lay_when_edited(scene, par
     assert live.follow(scene) == 1
 
 
+def test_a_curve_that_hangs_on_something_goes_with_it(scene, part):
+    """On a parent, and on a constraint's target, both moved by hand."""
+    live, riders = part("ride.live"), part("ride.riders")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    path = bpy.context.object
+    hook, target = bpy.data.objects.new("Hook", None), bpy.data.objects.new("Target", None)
+    for thing in (hook, target):
+        scene.collection.objects.link(thing)
+    path.parent = hook
+    path.constraints.new("COPY_LOCATION").target = target
+    for thing, place in ((target, (3.0, 4.0, 0.0)), (target, (3.0, 4.0, 1.0))):
+        thing.location = place
+        bpy.context.view_layer.update()
+        scene.frame_set(20)
+        assert live.follow(scene) == 1 and body.beyond_mocap_ride.told == ""
+        np.testing.assert_allclose(riders.shown(body).line[0], place, atol=1e-3)
+    hook.rotation_euler[2] = 1.0
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 1
+
+
 def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
     """A short closed ring is gone round; an open line of 2 m ends, or is begun again; a long one is filled by cycling."""
     live, channels = part("ride.live"), part("channels")
