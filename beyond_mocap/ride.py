@@ -246,14 +246,15 @@ def _timed(
     if way is not None and way.plain(wishes) and source.way.plain(wishes):
         way = None
     if settings.cycle and settings.by_arc_length:
-        around = cycled(residuals, arc.length if way is None else asked_length(way, wishes), source.loops)
+        asked = arc.length if way is None else asked_length(residuals, _own_way(source, residuals), way, wishes)
+        around = cycled(residuals, asked, source.loops)
         residuals, seams, told = around.residuals, around.seams, around.told
     elif settings.cycle:
         told = ("by time the motion fills every path: it is not cycled",)
     if source.still:
         told += ("the motion stands still: it is placed at the path's beginning",)
     if way is not None:
-        own = way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
+        own = _own_way(source, residuals)
         timing = by_way(residuals, own, way, wishes, settings.speed, settings.delay, path.closed)
     elif settings.by_arc_length or source.still:
         timing = by_arc_length(residuals, settings.speed, settings.delay)
@@ -264,6 +265,11 @@ def _timed(
     timing = timing.first(end.count)
     seams = np.searchsorted(timing.at, seams - 1e-9)
     return residuals, seams[seams < end.count], timing, replace(end, told=(*told, *end.told))
+
+
+def _own_way(source: RideSource, residuals: Residuals) -> Way:
+    """What the motion's own path is like at every row."""
+    return way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
 
 
 def _parameters(

@@ -17,7 +17,7 @@ SHORTEST = 1e-6
 """Metres that a path is long at least."""
 
 _STEP = 0.5  # metres; a path or lap shorter than this is told
-_SHORTEST_LAP = 0.5  # seconds
+_SHORTEST_LAP, _UNSEEN = 0.5, 0.1  # seconds: of a lap that is begun anew, and of a motion's end that nobody misses
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,10 @@ def ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", closed
     if end == "repeat" and count - first >= _SHORTEST_LAP * fps:
         return _again(first, count, total, fps, short)
     when, left = count / fps, (total - count) / fps
-    stops = TimedLine(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
+    line = TimedLine(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
+    stops = (line,) if left > _UNSEEN else ()
     brief = ("the path is passed too quickly to begin again",) if end == "repeat" else ()
-    return Ending(count, whole[:count], none, (stops, *brief, *short))
+    return Ending(count, whole[:count], none, (*stops, *brief, *short))
 
 
 def _begins(arc: np.ndarray) -> int:

@@ -112,10 +112,12 @@ def by_way(
     return Timing(at, np.interp(at, np.arange(len(s)), s))
 
 
-def asked_length(way: Way, wishes: Wishes) -> float:
-    """Metres that a motion goes in its own steps while it passes the whole of a way."""
-    k, _ = _steps(way, wishes)
-    return float(np.sum(np.diff(way.arc) * 0.5 * (1.0 / k[1:] + 1.0 / k[:-1])))
+def asked_length(residuals: Residuals, own: Way, new: Way, wishes: Wishes) -> float:
+    """Metres that a motion goes in its own steps while it passes the whole of a new way; own: its own at every row."""
+    k, _ = _steps(new, wishes)
+    level = np.sum(residuals.step / _steps(own, wishes)[0])
+    recorded = residuals.step.sum() / level if level > 0.0 else 1.0
+    return float(recorded * np.sum(np.diff(new.arc) * 0.5 * (1.0 / k[1:] + 1.0 / k[:-1])))
 
 
 def way_of(path: Path, arc: ArcLength) -> Way:

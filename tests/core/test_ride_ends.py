@@ -5,6 +5,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation.path_ride import figures
+from beyond_mocap.motion.arc_length import ArcLength
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.polish.path_line import through
 from beyond_mocap.ride import RideSettings, prepare, ride
@@ -80,6 +81,17 @@ def test_who_stands_still_is_not_cycled():
 def test_a_cycle_on_bends_that_slow_ends_with_the_path(source):
     out = ride(source, circle(1.2), asked(cycle=True, end="repeat", bends=True))
     assert not len(out.again) and out.arc[-1] == pytest.approx(2.4 * np.pi, abs=0.06)
+
+
+def test_a_cycle_reaches_the_path_s_end_over_hills_and_from_a_hill(source):
+    x = np.linspace(0.0, 14.0, 200)
+    hill = through(np.stack([x, 0.0 * x, 1.2 * np.sin(x / 14.0 * 2.0 * np.pi)], axis=1), "hill")
+    over = ride(source, hill, RideSettings(cycle=True))
+    assert over.arc[-1] == pytest.approx(ArcLength(hill).length, abs=0.06)
+    up = ride(source, through(np.stack([x, 0.0 * x, 0.15 * x], axis=1), "up"), RideSettings())
+    level = ride(prepare(up.motion, RideSettings(), up.standing), line(12.0), RideSettings(cycle=True))
+    assert level.arc[-1] == pytest.approx(12.0, abs=0.06)
+    assert not [told for told in (*over.warnings, *level.warnings) if "before the motion" in told]
 
 
 def test_two_frames_can_ride():

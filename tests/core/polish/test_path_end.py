@@ -22,6 +22,11 @@ def test_stopping_cuts_at_the_path_s_end():
     assert "ends after 1.4 s" in out.told[0] and out.told[0].spans
 
 
+def test_a_frame_or_two_that_are_missing_are_not_told():
+    out = ending(ARC, 4.86, FPS)
+    assert out.count == 98 and not out.told
+
+
 def test_repeating_begins_again_with_motion_and_path():
     out = ending(ARC, 2.01, FPS, "repeat")
     assert out.count == 41 and len(out.shown) == 100
