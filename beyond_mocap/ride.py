@@ -56,6 +56,9 @@ INTO_SLOPE, MOST_FORWARD, SLOPE_SECONDS = 0.45, 0.2, 0.6
 """Share of a slope by which the trunk leans into it, and radians of that at most (Leroux, Fung and Barbeau 2002: some
 3 degrees forward at a rise of 10 %, backward going down); seconds over which a slope is felt."""
 
+OUT_OF_REACH = 0.03
+"""Metres that a foot may be short of its place without being told."""
+
 STILL = 0.05
 """Metres of path below which a motion stands still."""
 
@@ -224,7 +227,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         under = _ground(path, arc, settings, ground, moving, timing, rows)
         steps, more = _steps(source, rows, moving, timing)
         held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, steps)
-        end = replace(end, told=end.told + more)
+        end = replace(end, told=(*end.told, *more, *_out_of_reach(held.miss, residuals.fps)))
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
     ridden = Ridden(
@@ -319,6 +322,16 @@ def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Tim
             TimedLine(f"{span[0]:.1f} s: the path asks for steps {much:.1f} times as long as they were; feet slide", span)
         )
     return Steps(moving.heading, times), tuple(told)
+
+
+def _out_of_reach(miss: np.ndarray, fps: float) -> list[str]:
+    """One line for all stances that legs do not reach, from their misses (N, 2) m."""
+    far = miss.max(axis=1)
+    spans = [(first / fps, (end - 1) / fps) for first, end in runs(far > OUT_OF_REACH)]
+    if not spans:
+        return []
+    times = f"{len(spans)} times, first at {spans[0][0]:.1f} s" if len(spans) > 1 else f"at {spans[0][0]:.1f} s"
+    return [TimedLine(f"feet do not reach where they should stand, by up to {100.0 * far.max():.0f} cm: {times}", *spans)]
 
 
 def _ground(

@@ -57,7 +57,7 @@ LEAST_BEND = 0.01
 """Root of the metres that a leg always lacks to its full length."""
 
 _FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
-_PELVIS_SECONDS = 0.5
+_PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stairs, in the mean
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004
 _BEHIND = 0.1  # seconds by which a rise or drop is spread
@@ -182,11 +182,12 @@ def _on_ground(
     clear = over[..., 2].min(axis=2) - ground.own
     under = footing(over[..., :2], standing, clear, fps, ground.surface)
     rise = under.height - ground.own
-    steep = np.linalg.norm(under.slope, axis=2).mean(axis=1)
+    apart = np.abs(np.diff(under.height, axis=1)) / _STRIDE
+    steep = np.maximum(np.linalg.norm(under.slope, axis=2).mean(axis=1), zero_phase_hann(apart, fps, 1.0)[:, 0])
     up = _followed(lifted + rise.mean(axis=1) - SINK_BY_SLOPE * steep, fps)
     tip = quaternion.between(ground.up, under.normal)
     put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
-    return put, up, MOST_DROP + DROP_BY_SLOPE * float(np.abs(under.slope).max(initial=0.0))
+    return put, up, MOST_DROP + DROP_BY_SLOPE * float(steep.max(initial=0.0))
 
 
 def _followed(height: np.ndarray, fps: float) -> np.ndarray:
