@@ -16,9 +16,10 @@ WHICH = (
     ("SIDE", "Side", "From the side, the path across the picture"),
     ("QUARTER", "Quarter", "From three quarters, a little above"),
     ("BEHIND", "Behind", "Behind the body, following it"),
-    ("FREE", "Free View", "The view as it was before"),
+    ("FREE", "Free View", "The view as it was before, and the scene's own camera"),
 )
-_free: dict[int, str] = {}  # perspective of the free view, by the area's pointer
+VIEW = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera turns a view
+_free: dict[int, tuple] = {}  # by the area's pointer: its VIEW before the first of these cameras
 
 
 class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
@@ -46,7 +47,9 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
         scene, area = context.scene, _view(context)
         kind = self.which if self.which != "NEXT" else _after(scene, area)
         if kind == "FREE":
-            _look_freely(area)
+            if area is not None and scene.camera is not None and scene.camera.get(path_cameras.MARK):
+                _look_freely(area)
+            path_cameras.give_back(scene)
             return
         camera = path_cameras.found(scene, kind)
         if camera is None:
@@ -54,9 +57,9 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
                              "press Path Cameras in the panel Path Editing")
         if kind == "BEHIND" and riders(scene):
             path_cameras.follow(scene, path_cameras.route(scene, next(iter(meant(context)), None)))
-        scene.camera = camera
         if area is not None:
-            _look_through(area, camera)
+            _look_through(area, scene.camera, camera)
+        path_cameras.take(scene, camera)
 
 
 def _view(context) -> bpy.types.Area | None:
@@ -78,15 +81,21 @@ def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
     return row[(row.index(seen) + 1) % len(row)] if seen in row else row[0]
 
 
-def _look_through(area: bpy.types.Area, camera: bpy.types.Object) -> None:
+def _look_through(area: bpy.types.Area, before: bpy.types.Object | None, camera: bpy.types.Object) -> None:
     space = area.spaces.active
-    if space.region_3d.view_perspective != "CAMERA":
-        _free[area.as_pointer()] = space.region_3d.view_perspective
+    view = space.region_3d
+    if view.view_perspective != "CAMERA" or before is None or not before.get(path_cameras.MARK):
+        place, turn = view.view_location.copy(), view.view_rotation.copy()
+        _free[area.as_pointer()] = view.view_perspective, place, turn, view.view_distance
     if space.use_local_camera:
         space.camera = camera
-    space.region_3d.view_perspective = "CAMERA"
+    view.view_perspective = "CAMERA"
 
 
-def _look_freely(area: bpy.types.Area | None) -> None:
-    if area is not None and area.spaces.active.region_3d.view_perspective == "CAMERA":
-        area.spaces.active.region_3d.view_perspective = _free.get(area.as_pointer(), "PERSP")
+def _look_freely(area: bpy.types.Area) -> None:
+    """The view as it was before; where that is not known any more, from where the camera stands."""
+    view = area.spaces.active.region_3d
+    if view.view_perspective != "CAMERA":
+        return
+    for name, value in zip(VIEW, _free.get(area.as_pointer(), ("PERSP",))):
+        setattr(view, name, value)

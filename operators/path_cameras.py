@@ -18,7 +18,10 @@ behind the active one. Pressed again it lays only those anew that nobody has mov
 
     @classmethod
     def poll(cls, context):
-        """Somebody rides a path."""
+        """Somebody rides a path; edit mode has an undo of its own, which knows nothing of cameras."""
+        cls.poll_message_set("Leave edit mode first (Tab)")
+        if context.mode not in {"OBJECT", "POSE"}:
+            return False
         cls.poll_message_set("Select an armature and press Edit Path first")
         return bool(riders(context.scene))
 

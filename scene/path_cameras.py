@@ -23,7 +23,7 @@ from .ride.settings import riders
 KINDS = ("ABOVE", "SIDE", "QUARTER", "BEHIND")
 NAMES = {"ABOVE": "Path Above", "SIDE": "Path Side", "QUARTER": "Path Quarter", "BEHIND": "Path Behind"}
 COLLECTION, FOCUS = "Path Cameras", "Path Focus"
-MARK, LAID = "beyond_mocap_path_camera", "beyond_mocap_laid"
+MARK, LAID, BEFORE = "beyond_mocap_path_camera", "beyond_mocap_laid", "beyond_mocap_before"
 
 LENSES = {"ABOVE": 50.0, "SIDE": 50.0, "QUARTER": 40.0, "BEHIND": 35.0}
 TILTS = {"SIDE": 8.0, "QUARTER": 32.0, "BEHIND": 12.0}  # degrees that a camera looks down
@@ -118,6 +118,21 @@ def any_in(scene: bpy.types.Scene) -> bool:
     """Whether there is one of them at all."""
     collection = _kept(scene)
     return collection is not None and any(thing.get(MARK) in KINDS for thing in collection.objects)
+
+
+def take(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
+    """Make one of them the scene's camera, and remember whose place it took."""
+    collection, before = _kept(scene), scene.camera
+    if before is not None and not before.get(MARK):
+        collection[BEFORE] = before
+    scene.camera = camera
+
+
+def give_back(scene: bpy.types.Scene) -> None:
+    """The scene has the camera again that it had before `take`."""
+    before = _kept(scene).get(BEFORE)
+    if before is not None and before.name in scene.objects:
+        scene.camera = before
 
 
 def untouched(camera: bpy.types.Object) -> bool:

@@ -145,6 +145,23 @@ def test_flicking_goes_through_all_four(cameras):
         bpy.ops.beyond_mocap.path_camera(which="SIDE")
 
 
+def test_the_scene_s_own_camera_comes_back(cameras):
+    scene, own = bpy.context.scene, bpy.data.objects.new("Own", bpy.data.cameras.new("Own"))
+    scene.collection.objects.link(own)
+    cameras.set_up(scene, route(cameras, circle()))
+    bpy.ops.beyond_mocap.path_camera(which="FREE")
+    assert scene.camera is None
+    scene.camera = own
+    for which in ("ABOVE", "SIDE"):
+        bpy.ops.beyond_mocap.path_camera(which=which)
+    bpy.ops.beyond_mocap.path_camera(which="FREE")
+    assert scene.camera == own
+    bpy.ops.beyond_mocap.path_camera(which="SIDE")
+    bpy.data.objects.remove(own)
+    bpy.ops.beyond_mocap.path_camera(which="FREE")
+    assert scene.camera == cameras.found(scene, "SIDE")
+
+
 def test_all_riders_are_in_view_and_the_active_one_is_followed(cameras):
     """Two walks, on curves of their own, ten metres apart."""
     scene, clip = bpy.context.scene, str(SOURCE / "sample_blend" / "library" / "walking_1_2.bvh")

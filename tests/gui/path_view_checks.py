@@ -6,7 +6,7 @@ import bpy
 from tab import PICTURES, TAB, output, room, run, sample, window
 from window import Stand, unfold
 
-LIMIT = 300
+LIMIT = 500
 SWITCHES = ("path_source", "path_new", "path_trackers", "path_residuals", "path_ghost")
 
 
@@ -143,3 +143,54 @@ def check_figures_come_when_the_curve_is_at_rest():
     told = room("scene.ride.figure_lines").lines(rider().beyond_mocap_ride.figures)
     output.say("     " + "; ".join(line.replace("\t", " ") for line in told.splitlines()))
     assert "Feet slide" in told and "Off the path" in told
+
+
+def check_keys_flick_through_the_cameras_and_back():
+    yield from a_rider()
+    run("beyond_mocap.path_cameras", "EXEC_DEFAULT")
+    area, scene = window.area("VIEW_3D"), bpy.context.scene
+    own = bpy.data.objects.new("Own", bpy.data.cameras.new("Own"))
+    scene.collection.objects.link(own)
+    scene.camera = own
+    view, kinds = area.spaces.active.region_3d, room("scene.path_cameras").KINDS
+    yield from window.move(area.x + area.width // 3, area.y + area.height // 2)
+    for perspective in ("PERSP", "ORTHO", "CAMERA"):
+        view.view_perspective = perspective
+        yield 0.5
+        before, seen = [list(row) for row in view.view_matrix], []
+        for key in ("J", "NUMPAD_0", "J", "NUMPAD_0"):
+            yield from window.press(key, shift=True)
+            yield 0.3
+            assert view.view_perspective == "CAMERA"
+            seen.append(scene.camera.get("beyond_mocap_path_camera"))
+        assert seen == list(kinds), seen
+        yield from window.press("J", shift=True)
+        yield 0.5
+        assert scene.camera == own and view.view_perspective == perspective
+        apart = max(abs(a - b) for row, old in zip(view.view_matrix, before) for a, b in zip(row, old))
+        assert apart < 1e-4, f"{perspective}: the view came back elsewhere, by {apart}"
+
+
+def check_keys_nudge_and_the_rider_follows():
+    yield from a_rider()
+    area = window.area("VIEW_3D")
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.curve.select_all(action="DESELECT")
+        bpy.context.object.data.splines[0].points[4].select = True
+        bpy.ops.ed.undo_push(message="selected")
+    yield from window.move(area.x + area.width // 3, area.y + area.height // 2)
+    yield 0.5
+    riders, frame = room("scene.ride.riders"), bpy.context.scene.frame_current
+    start, laid = tuple(bpy.context.object.data.splines[0].points[4].co), riders.shown(rider()).number
+    for key in ("UP_ARROW", "UP_ARROW", "RIGHT_ARROW", "PAGE_UP"):
+        yield from window.press(key, alt=True)
+        yield 0.5
+    moved = [round(a - b, 4) for a, b in zip(bpy.context.object.data.splines[0].points[4].co, start)]
+    assert moved[:3] == [0.1, 0.2, 0.1] and bpy.context.scene.frame_current == frame, moved
+    assert riders.shown(rider()).number - laid == 4
+    for _ in range(4):
+        yield from window.press("Z", ctrl=True)
+        yield 0.5
+    back = [round(a - b, 4) for a, b in zip(bpy.context.object.data.splines[0].points[4].co, start)]
+    assert back[:3] == [0.0, 0.0, 0.0] and bpy.context.mode == "EDIT_CURVE", (back, bpy.context.mode)
