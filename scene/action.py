@@ -32,7 +32,7 @@ def write(
     """
     linked.refuse(body)
     channels.check_free(body)
-    if body.beyond_mocap_ride.on:
+    if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
         raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not", "press Keep or Leave first")
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:

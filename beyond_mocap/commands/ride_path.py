@@ -28,7 +28,8 @@ def add(verbs):
         help="of a polynomial fitted to the recording's own path; default: a smoothing spline",
     )
     verb.add_argument("--no-arc-length", action="store_true", help="by time: the path's ends at the recording's ends")
-    verb.add_argument("--cycle", action="store_true", help="repeat the best stretch until the path's end")
+    # Blender's own Cycles add-on reads what stands behind `--` (batch.py) and ends Blender over `--cycle`
+    verb.add_argument("--cycle", "--loop", action="store_true", help="repeat the best stretch until the path's end")
     verb.add_argument("--end", choices=("stop", "repeat"), default="stop", help="where the path is shorter")
     verb.add_argument("--no-plant", action="store_true", help="leave the feet as the path carries them")
     faster = partial(between, low=0.1, high=10.0, expected="a number from 0.1 to 10")
