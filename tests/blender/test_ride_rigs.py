@@ -10,6 +10,7 @@ import ride_rigs
 import rigs
 from test_ride import SAMPLE, bits, choose
 from test_rigs import rigify  # noqa: F401  (a fixture)
+from undo import assert_one_step
 
 STEP = 6
 
@@ -200,6 +201,38 @@ def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(core
     part("ride.riders").end(rig)
     bpy.context.scene.frame_set(1)
     assert whole(part, rig) == before
+
+
+@pytest.mark.parametrize("kind", [hand_rig, strips, moved_object], ids=lambda kind: kind.__name__)
+def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
+    rig = kind(recorded, part, None)
+    rig.name = "Rig"
+    before = whole(part, rig)
+    bend(bpy.context.scene, start(rig), part)
+    was = shown(rig, [5, 20, 40])
+    file = str(tmp_path / "rig.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    rig, scene = bpy.data.objects["Rig"], bpy.context.scene
+    assert part("ride.live").follow(scene) == 1 and rig.beyond_mocap_ride.told == ""  # the original is looked at again
+    np.testing.assert_allclose(shown(rig, [5, 20, 40]), was, atol=1e-5)
+    rig.beyond_mocap_ride.curve.location.z += 0.5
+    bpy.context.view_layer.update()
+    assert part("ride.live").follow(scene) == 1
+    assert np.abs(shown(rig, [5, 20, 40]) - was).max() > 0.4
+    choose(rig)
+    assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
+    assert whole(part, rig) == before
+
+
+def test_each_button_is_one_step_with_a_rig_too(part):
+    rig = ride_rigs.walk_ik()
+    choose(rig)
+    assert_one_step(bpy.ops.beyond_mocap.edit_path)
+    assert_one_step(bpy.ops.beyond_mocap.bake_path)
+    choose(bpy.data.objects["Hand Rig"])
+    assert_one_step(bpy.ops.beyond_mocap.edit_path)
+    assert_one_step(bpy.ops.beyond_mocap.leave_path)
 
 
 def whole(part, rig):
