@@ -33,12 +33,14 @@ _CARRIERS = {
 @dataclass(frozen=True, eq=False)
 class Parts:
     """What is known of a rig's body. controls: part -> the bone that moves it; shown: part -> the bone that shows it, in
-    the order of joints; follows: bones that a part follows or that go with it -> the part; root: the bone that carries
-    all, "" where there is none. A rig that is no standing body has one part, "body", and no controls."""
+    the order of joints; follows: bones that a part follows or that go with it -> the part; trunk: likewise controls that
+    bend the spine beside its own ones (Rigify's chest), where they are animated; root: the bone that carries all, "" where
+    there is none. A rig that is no standing body has one part, "body", and no controls."""
 
     controls: dict[str, str]
     shown: dict[str, str]
     follows: dict[str, str]
+    trunk: dict[str, str]
     root: str
     humanoid: bool
 
@@ -55,7 +57,9 @@ def of_rig(rig: bpy.types.Object) -> Parts | None:
     shown["hips"] = _pelvis(rig, shown) or shown["hips"]
     if not _stands(rig, shown):
         return None
-    return Parts(controls, shown, _follows(rig, controls, shown), table.get("root", ""), True)
+    spine = [part for part in shown if part.startswith("spine")]
+    trunk = {"chest": spine[-1]} if spine and {"torso", "chest"} <= set(rig.data.bones.keys()) else {}
+    return Parts(controls, shown, _follows(rig, controls, shown), trunk, table.get("root", ""), True)
 
 
 def _shown(rig: bpy.types.Object, control: str) -> str:
@@ -287,7 +291,7 @@ def whole(rig: bpy.types.Object, seen: Look, object_keyed: bool, units: float) -
             break
     lowest = min(bones, key=lambda name: float(places[0, bones.index(name), 2]))
     shown = {"body": main} | ({"lowest": lowest} if lowest != main else {})
-    return Parts({}, shown, {}, "", False)
+    return Parts({}, shown, {}, {}, "", False)
 
 
 def is_root(rig: bpy.types.Object, parts: Parts) -> bool:

@@ -150,7 +150,7 @@ class Carried:
             if name in known:
                 return known[name]
             found = group(int(rides.turn_of[number]), (*trail, number))
-            goes = self.parts.follows.get(name)
+            goes = self.parts.follows.get(name) or self.parts.trunk.get(name)
             if goes is not None and (goes.endswith("toe") or goes.partition(" ")[0] != found.partition(" ")[0]):
                 found = goes
             elif found == OBJECT and not self.object_goes and self._travels(places[:, number]):
