@@ -477,13 +477,13 @@ def _curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.ndarr
                 rotation = -rotation
             found[f"{path}.rotation_quaternion"] = (name, rotation)
         elif mode == "AXIS_ANGLE":
-            found[f"{path}.rotation_axis_angle"] = (name, axis_angles(rotation))
+            found[f"{path}.rotation_axis_angle"] = (name, _axis_angles(rotation))
         else:
             found[f"{path}.rotation_euler"] = (name, euler_curves(rotation, mode))
     return found
 
 
-def axis_angles(rotation: np.ndarray) -> np.ndarray:
+def _axis_angles(rotation: np.ndarray) -> np.ndarray:
     """Angle and axis (F, 4) of sign-continuous rotations (F, 4)."""
     length = np.linalg.norm(rotation[:, 1:], axis=1)
     axis = np.where(length[:, None] > 1e-9, rotation[:, 1:] / np.maximum(length, 1e-9)[:, None], [0.0, 1.0, 0.0])

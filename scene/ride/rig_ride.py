@@ -16,7 +16,7 @@ import numpy as np
 
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics
-from ..rig_bake import axis_angles, euler_curves
+from .keys import rotation
 from .rig_look import Look
 from .rig_parts import Parts, in_world, rotations
 from .rig_study import STATIC, Rides
@@ -52,6 +52,12 @@ class Moves:
     def point(self, group: str, points: np.ndarray) -> np.ndarray:
         """Points (N, 3) that go with a group."""
         return quaternion.rotate(self.turn[group], points - self.before[group]) + self.after[group]
+
+    def points(self, groups: list[str], points: np.ndarray) -> np.ndarray:
+        """Points (N, C, 3) of which each column goes with its group."""
+        turn, before, after = (np.stack([table[group] for group in groups], axis=1)
+                               for table in (self.turn, self.before, self.after))
+        return quaternion.rotate(turn, points - before) + after
 
     def alike(self, one: str, other: str) -> bool:
         """Whether two groups are carried alike: to a ten-thousandth of a degree and of a millimetre."""
@@ -245,40 +251,46 @@ class Carried:
         return forward_kinematics(Motion(self.motion.skeleton, root, local, self.motion.fps))
 
     def changed(self, moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
-        """Of each control what has to be other than in the source: (bone, "turn") -> rotations (N, 4) of its own
-        channels, (bone, "location") -> (N, 3)."""
-        found = {}
-        for one in self.controls:
-            if all(moves.alike(one.own, other) for other in (one.turn, one.place)):
-                continue
-            table = self.tables[one.name]
-            base, own, pose = rows.remembered(one, lambda: _turns_at(rows, table))
-            turned = quaternion.multiply(base, quaternion.multiply(moves.between(one.turn, one.own), pose))
-            if one.name in self.held or np.abs(np.abs(np.sum(turned * own, axis=1)) - 1.0).max() > 1e-14:
-                found[one.name, "turn"] = turned
-            if one.slides:
-                rests = moves.point(one.place, rows.numbers((one, "rests"), table["rests"]))
-                away = moves.point(one.own, rows.numbers((one, "place"), table["place"])) - rests
-                away = quaternion.rotate(quaternion.inverse(moves.turn[one.axes]), away)
-                location = np.einsum("nij,nj->ni", rows.numbers((one, "back"), table["back"]), away)
-                if np.abs(location - rows.numbers((one, "location"), table["location"])).max() > _SAME:
-                    found[one.name, "location"] = location
-        return found
+        """Of each control what has to be other than in the source: (bone, "turn") -> sign-continuous rotations (N, 4) of
+        its own channels, (bone, "location") -> (N, 3)."""
+        some = [one for one in self.controls if not all(moves.alike(one.own, other) for other in (one.turn, one.place))]
+        return (self._turned(some, moves, rows) | self._slid([one for one in some if one.slides], moves, rows)) if some else {}
 
+    def _turned(self, some: list[Control], moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
+        back, own, pose = rows.remembered(("turns", *some), lambda: self._turns_at(some, rows))
+        between = np.stack([moves.between(one.turn, one.own) for one in some], axis=1)
+        turned = quaternion.multiply(back, quaternion.multiply(between, pose))
+        other = np.abs(np.abs(np.sum(turned * own, axis=2)) - 1.0).max(axis=0) > 1e-14
+        turned = quaternion.continuous(turned)
+        return {(one.name, "turn"): turned[:, i] for i, one in enumerate(some) if other[i] or one.name in self.held}
 
-def _turns_at(rows: Rows, table: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A control's turns (N, 4): what takes its base off, its own, and both together."""
-    base, own = rows.turns((id(table), "base"), table["base"]), rows.turns((id(table), "own"), table["own"])
-    return quaternion.inverse(base), own, quaternion.multiply(base, own)
+    def _turns_at(self, some: list[Control], rows: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Turns (N, C, 4) of controls: what takes their bases off, their own, and base and own together."""
+        base, own = (np.stack([rows.turns((one, what), self.tables[one.name][what]) for one in some], axis=1)
+                     for what in ("base", "own"))
+        return quaternion.inverse(base), own, quaternion.multiply(base, own)
+
+    def _slid(self, some: list[Control], moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
+        if not some:
+            return {}
+
+        def all_of(what: str) -> np.ndarray:
+            """A table of all of them: (N, C, ...)."""
+            made = lambda: np.stack([rows.numbers((one, what), self.tables[one.name][what]) for one in some], axis=1)  # noqa: E731
+            return rows.remembered((what, *some), made)
+
+        rests = moves.points([one.place for one in some], all_of("rests"))
+        away = moves.points([one.own for one in some], all_of("place")) - rests
+        turn = np.stack([moves.turn[one.axes] for one in some], axis=1)
+        location = np.einsum("ncij,ncj->nci", all_of("back"), quaternion.rotate(quaternion.inverse(turn), away))
+        other = np.abs(location - all_of("location")).max(axis=(0, 2)) > _SAME
+        return {(one.name, "location"): location[:, i] for i, one in enumerate(some) if other[i]}
 
 
 def channel_values(mode: str, turned: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """Values of a bone's rotation channel in its own mode; like (N, n): the source's, whose signs and turns are kept."""
+    """Values (N, n) of a bone's rotation channel in its own mode, of sign-continuous rotations (N, 4); like (n,): the
+    source's first, whose sign and full turns are kept."""
+    values = turned if mode == "QUATERNION" else rotation(mode, turned)
     if mode == "QUATERNION":
-        turned = quaternion.continuous(turned)
-        return turned if np.sum(turned[0] * like[0]) >= 0.0 else -turned
-    if mode == "AXIS_ANGLE":
-        return axis_angles(quaternion.continuous(turned))
-    angles = euler_curves(turned, mode)
-    return angles + 2.0 * np.pi * np.round((like[0] - angles[0]) / (2.0 * np.pi))
-
+        return values if np.sum(values[0] * like) >= 0.0 else -values
+    return values if mode == "AXIS_ANGLE" else values + 2.0 * np.pi * np.round((like - values[0]) / (2.0 * np.pi))

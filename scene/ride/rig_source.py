@@ -54,7 +54,7 @@ class RigSource:
             mode = self.seen.modes[number]
             channel = channel_of(mode) if what == "turn" else what
             if what == "turn":
-                values = channel_values(mode, values, self.seen.channels[channel][rows.low[:1], number])
+                values = channel_values(mode, values, self.seen.channels[channel][rows.low[0], number])
             found |= columns(f'pose.bones["{bpy.utils.escape_identifier(bone)}"].{channel}', values)
         if self.carried.object_goes:
             found |= self._object(moves, rows, above, rig)
@@ -103,10 +103,10 @@ class RigSource:
         mode = rig.rotation_mode
         delta = quaternion.from_matrix(np.array(
             rig.delta_rotation_quaternion.to_matrix() if mode == "QUATERNION" else rig.delta_rotation_euler.to_matrix()))
-        turned = quaternion.multiply(quaternion.inverse(delta), rig_parts.rotations(basis))
+        turned = quaternion.continuous(quaternion.multiply(quaternion.inverse(delta), rig_parts.rotations(basis)))
         table = self.seen.others.get(channel_of(mode), np.array([list(getattr(rig, channel_of(mode)))]))
         location = basis[:, :3, 3] - np.array(rig.delta_location)
-        return columns("location", location) | columns(channel_of(mode), channel_values(mode, turned, table[:1]))
+        return columns("location", location) | columns(channel_of(mode), channel_values(mode, turned, table[0]))
 
 
 def columns(path: str, values: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
