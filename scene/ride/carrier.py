@@ -182,7 +182,8 @@ class PlainCarrier(Carrier):
         made[MARK] = digest
 
     def settle(self) -> None:
-        keys.settle(keys.Sheet.of(*self.ours(), *self.source()))
+        if self.source()[0] is not None:
+            keys.settle(keys.Sheet.of(*self.ours(), *self.source()))
 
     def _wanted(self, scene: bpy.types.Scene, read: Read, ridden, sheet: keys.Sheet) -> dict[keys.Place, np.ndarray]:
         """Values (N,) of the bones' channels that are others than in the original."""

@@ -194,8 +194,7 @@ def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[bpy.types.Acti
     may_end(body)
     made = carrier.ours()[0]
     original, drawn = ride.before.action, ride.curve
-    if original is not None:
-        carrier.settle()
+    carrier.settle()
     play_as_before(ride.before, body.animation_data)
     drop(ride.before, MARK)
     del made[MARK]

@@ -118,9 +118,9 @@ class RigCarrier(Carrier):
         made, slot = self.ours()
         original, own = self.source()
         before = self.ride.before
-        if not self._strips():
+        if not self._strips() and original is not None:
             keys.settle(keys.Sheet.of(made, slot, original, own))
-        else:  # what the strips had a share in is in the action: they fall silent
+        elif self._strips():  # what the strips had a share in is in the action: they fall silent
             before.use_nla, before.influence, before.blend, before.extrapolation = False, 1.0, "REPLACE", "HOLD"
         if KIND in made:
             del made[KIND]
