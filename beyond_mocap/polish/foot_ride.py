@@ -182,12 +182,19 @@ def _on_ground(
     clear = over[..., 2].min(axis=2) - ground.own
     under = footing(over[..., :2], standing, clear, fps, ground.surface)
     rise = under.height - ground.own
-    apart = np.abs(np.diff(under.height, axis=1)) / _STRIDE
-    steep = np.maximum(np.linalg.norm(under.slope, axis=2).mean(axis=1), zero_phase_hann(apart, fps, 1.0)[:, 0])
-    up = _followed(lifted + rise.mean(axis=1) - SINK_BY_SLOPE * steep, fps)
+    steep = _steepness(under.height, under.normal, fps)
+    steeper = np.maximum(steep - _steepness(ground.own, ground.up, fps), 0.0)
+    up = _followed(lifted + rise.mean(axis=1) - SINK_BY_SLOPE * steeper, fps)
     tip = quaternion.between(ground.up, under.normal)
     put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
     return put, up, MOST_DROP + DROP_BY_SLOPE * float(steep.max(initial=0.0))
+
+
+def _steepness(height: np.ndarray, normal: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) how steep the ground is that two feet are on, from its heights (T, 2) m and normals (T, 2, 3)."""
+    slope = np.linalg.norm(normal[..., :2], axis=2) / np.maximum(normal[..., 2], 0.1)
+    apart = np.abs(np.diff(height, axis=1)) / _STRIDE
+    return np.maximum(slope.mean(axis=1), zero_phase_hann(apart, fps, 1.0)[:, 0])
 
 
 def _followed(height: np.ndarray, fps: float) -> np.ndarray:
