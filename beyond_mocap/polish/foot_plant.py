@@ -208,16 +208,18 @@ def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     return np.where((asked > even) & (odd > 0.0), np.clip(rise, 0.0, MOST_RISE), 0.0)
 
 
-def held_shift(velocity: np.ndarray, weight: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than MOST_SHIFT
+def held_shift(
+    velocity: np.ndarray, weight: np.ndarray, scale: float, most: float = MOST_SHIFT
+) -> tuple[np.ndarray, np.ndarray]:
+    """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than `most` metres
     are held less firmly, since a foot that slides looks better than a leg torn after it (give-way order,
     ../shared/metrics.md)."""
     ground = shift(velocity, weight, scale)
     for _ in range(4):
         far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
-        if far.max(initial=0.0) <= MOST_SHIFT:
+        if far.max(initial=0.0) <= most:
             break
-        weight = held_less(weight, far - MOST_SHIFT)
+        weight = held_less(weight, far - most)
         ground = shift(velocity, weight, scale)
     return ground, weight
 

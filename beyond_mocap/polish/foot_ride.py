@@ -37,6 +37,13 @@ from .foot_plant import (
 from .reach import bent_limb
 from .underfoot import Footing, Surface, footing
 
+MOST_SHIFT = 0.45
+"""Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the spot
+turn otherwise on another path."""
+
+FIRST_DROP = 0.015
+"""Metres that the pelvis is lowered before a heel is raised where a leg does not reach."""
+
 DROP_BY_SLOPE = 0.15
 """Metres more that the pelvis is lowered at most, times the slope of the ground: downhill the other foot is low."""
 
@@ -106,16 +113,18 @@ def follow(
     lifted = np.mean(lifts, axis=0)
     firm = [foot.weight for foot in feet]
     for turn in range(_ROUNDS + 1):
-        shifts = [held_shift(foot.moves, weight, scale)[0] for foot, weight in zip(feet, firm)]
+        shifts = [held_shift(foot.moves, weight, scale, MOST_SHIFT)[0] for foot, weight in zip(feet, firm)]
         put = [foot.moved(np.pad(by, ((0, 0), (0, 1)))) for foot, by in zip(feet, shifts)]
         put, up, most = _on_ground(put, standing, fps, ground, lifted)
+        first = pelvis_drop(put, [foot.heel for foot in put], spread, FIRST_DROP)
+        put = [replace(foot, hip=foot.hip - first[:, None] * _UP) for foot in put]
         goals = [_goal(foot, spread) for foot in put]
-        drop = pelvis_drop(put, [goal for goal, _ in goals], spread, most)
+        drop = pelvis_drop(put, [goal for goal, _ in goals], spread, most - FIRST_DROP)
         short = [lacking(foot, goal, drop) for foot, (goal, _) in zip(put, goals)]
         if turn == _ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
             break
         firm = [held_less(weight, s) for weight, s in zip(firm, short)]
-    down = (drop - up)[:, None] * _UP
+    down = (first + drop - up)[:, None] * _UP
     places = places - down[:, None]
     out, correction, miss = np.array(rotations, dtype=float), np.zeros((len(root), 2)), np.zeros((len(root), 2))
     for side, (foot, (goal, turned)) in enumerate(zip(put, goals)):
