@@ -181,9 +181,10 @@ def _ordered(main: Loop, count: int, other: Loop, times: int) -> tuple[Loop, ...
 
 
 def _steady(residuals: Residuals, loops: tuple[Loop, ...], own: float, length: float) -> tuple[Loop, ...]:
-    """One loop until the path's end falls into it or before it, so that nobody is cut in the middle of stopping."""
+    """One loop until the path's end falls into it or before it, so that nobody is cut in the middle of stopping; of a
+    motion that ends as it goes on, until it is long enough."""
     loop = min(loops, key=lambda loop: _rating((loop,), 1.0, loops[0].cost))
-    outro = float(residuals.step[loop.end + 1 :].sum())
+    outro = float(residuals.step[loop.end + 1 :].sum()) if loop.ending > SEEN else 0.0
     return (loop,) * max(int(np.ceil((length - own + outro) / loop.metres)), 1)
 
 
