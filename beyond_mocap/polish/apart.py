@@ -17,8 +17,8 @@ from .collisions import DISTANCE, HEIGHT, Collision, collisions, collisions_at, 
 from .detour import RISE, gentle_width
 from .follower import Change, Follower
 
-_SPARE = 0.01  # metres kept beyond the distance: bodies move in curves between the search's own times
-_RATE, _FINER = 20.0, 3  # times per second at which the search looks; at the end so many times as often
+_SPARE = 0.012  # metres kept beyond the distance: bodies move in curves between the search's own times
+_RATE, _FINER = 25.0, 3  # times per second at which the search looks; at the end so many times as often
 _KEPT, _MANY = (4, 2), 8  # sets of changes gone on with; fewer from so many collisions on
 _TRIED = 4  # ways to mend a collision, the cheapest of them
 _AROUND = 1.0  # seconds around a collision in which what mends it must be clear
@@ -29,6 +29,7 @@ _TIGHT = 0.3  # a detour on the inside of a bend leaves at least this share of i
 _BIN, _LAG = 0.5, 0.5  # seconds: how finely it is looked at first who may meet; what detours may cost
 _UNMENDED = 10.0  # what a collision that stays costs
 _SHARES = (0.0, 0.5, 0.75, 0.9)
+_AGAIN = 2  # times that it is gone over where something is left; from what was found it goes on otherwise
 _TWICE = 3.0  # ways are tried for at most this many times as many collisions as there were, and some
 
 
@@ -81,15 +82,24 @@ def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None)
     """
     search = _Search(followers, limits)
     state = search.begin(tuple(changes or (Change(),) * len(followers)))
-    before, states, rounds = state.collisions, [state], int(_TWICE * len(state.collisions)) + 20
-    kept = _KEPT[len(before) >= _MANY]
+    before = state.collisions
+    for _ in range(_AGAIN):
+        state = search.smaller(_mended(search, replace(state, given_up=frozenset())))
+        if not state.collisions:
+            break
+    return Resolution(state.changes, before, search.left(state.changes))
+
+
+def _mended(search: "_Search", state: "_State") -> "_State":
+    """The best state found from this one on."""
+    states, rounds = [state], int(_TWICE * len(state.collisions)) + 20
+    kept = _KEPT[len(state.collisions) >= _MANY]
     for _ in range(rounds):
         if states[0].open() is None:
             break
         found = {child.changes: child for state in states for child in search.children(state)}
         states = sorted(found.values(), key=search.score)[:kept]
-    best = search.smaller(states[0]).changes
-    return Resolution(best, before, search.left(best))
+    return states[0]
 
 
 class _Search:
