@@ -8,6 +8,7 @@ from time import perf_counter
 
 import bpy
 
+from ...beyond_mocap.errors import BeyondMocapError
 from .. import background
 from . import riders as rides
 from . import source
@@ -16,7 +17,9 @@ from .settings import riders
 KIND = "path figures"
 REST, LOOK, WAIT = 0.8, 0.4, 0.05  # seconds: without a change, between two looks, between two looks at the thread
 
-_measured: dict[int, int] = {}  # by session_uid of the armature: the number of what was measured
+KNOWN = '"root_error_m"'  # in the figures of a rider that was measured
+
+_failed: dict[int, int] = {}  # by session_uid of the armature: the number of what could not be measured
 _since: dict[int, tuple[int, float]] = {}  # likewise: the number of what is shown, and since when
 _running: list[tuple[background.Job, int, int]] = []  # at most one, with the armature's session_uid and the number
 
@@ -25,7 +28,7 @@ def measure(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     """Work out a rider's figures at once; nothing happens where it was not brought up to date in this session."""
     shown = rides.shown(body)
     if shown is not None:
-        _keep(body, shown.number, _figures(shown, _ground(scene, body)))
+        _keep(body, _figures(shown, _ground(scene, body)))
 
 
 def _figures(shown, ground) -> dict:
@@ -39,11 +42,10 @@ def _ground(scene: bpy.types.Scene, body: bpy.types.Object):
     return source.ground_of(scene, ground, source.ground_digest(ground))
 
 
-def _keep(body: bpy.types.Object, number: int, figures: dict) -> None:
+def _keep(body: bpy.types.Object, figures: dict) -> None:
+    """Beside those that are known while a path is dragged."""
     ride = body.beyond_mocap_ride
-    known = json.loads(ride.figures) if ride.figures else {}
-    ride.figures = json.dumps({**known, **figures})
-    _measured[body.session_uid] = number
+    ride.figures = json.dumps({**(json.loads(ride.figures) if ride.figures else {}), **figures})
 
 
 def _tick() -> float:
@@ -52,21 +54,27 @@ def _tick() -> float:
         return LOOK
     if _running:
         return _collect(window.scene)
-    for body in riders(window.scene):
-        shown = rides.shown(body)
-        if shown is not None and _rests(body.session_uid, shown.number):
-            ground = _ground(window.scene, body)
-            job = background.Job(KIND, lambda *_, shown=shown, ground=ground: _figures(shown, ground))
-            _running.append((job, body.session_uid, shown.number))
-            return WAIT
-    return LOOK
+    waiting = next((body for body in riders(window.scene) if _waits(body)), None)
+    if waiting is None:
+        return LOOK
+    shown = rides.shown(waiting)
+    try:
+        ground = _ground(window.scene, waiting)
+    except BeyondMocapError:  # told where the rider is brought up to date
+        _failed[waiting.session_uid] = shown.number
+        return LOOK
+    _running.append((background.Job(KIND, lambda *_: _figures(shown, ground)), waiting.session_uid, shown.number))
+    return WAIT
 
 
-def _rests(uid: int, number: int) -> bool:
-    """Whether what is shown has been the same for a while, and is not measured yet."""
-    if _since.get(uid, (0, 0.0))[0] != number:
-        _since[uid] = number, perf_counter()
-    return _measured.get(uid) != number and perf_counter() - _since[uid][1] > REST
+def _waits(body: bpy.types.Object) -> bool:
+    """Whether what is shown of a rider has been the same for a while, and is not measured."""
+    shown, uid = rides.shown(body), body.session_uid
+    if shown is None or KNOWN in body.beyond_mocap_ride.figures or _failed.get(uid) == shown.number:
+        return False
+    if _since.get(uid, (0, 0.0))[0] != shown.number:
+        _since[uid] = shown.number, perf_counter()
+    return perf_counter() - _since[uid][1] > REST
 
 
 def _collect(scene: bpy.types.Scene) -> float:
@@ -74,13 +82,13 @@ def _collect(scene: bpy.types.Scene) -> float:
     if not job.poll():
         return WAIT
     _running.clear()
-    _measured[uid] = number
     body = next((body for body in riders(scene) if body.session_uid == uid), None)
     shown = rides.shown(body) if body is not None else None
-    if job.error is None and shown is not None and shown.number == number:
-        _keep(body, number, job.result)
-    elif job.error is not None:
+    if job.error is not None:
+        _failed[uid] = number
         print(f"Beyond Mocap: no figures of a ride: {job.error}")
+    elif shown is not None and shown.number == number:
+        _keep(body, job.result)
     return LOOK
 
 
@@ -95,5 +103,5 @@ def unregister():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     background.stop(KIND)
-    for kept in (_measured, _since, _running):
+    for kept in (_failed, _since, _running):
         kept.clear()

@@ -1,6 +1,7 @@
 """What is drawn of riders, and what the panel says of them, from motions ridden by the core."""
 
 import json
+import time
 from dataclasses import replace
 from importlib import import_module
 
@@ -153,3 +154,46 @@ def test_figures_become_lines_with_what_is_aimed_for():
         "Not planted: 9.0 cm/s\t\t",
     ]
     assert lines("") == lines("{") == lines("[]") == ""
+
+
+def test_a_rider_at_rest_is_measured_once_and_again_when_it_was_laid_anew(monkeypatch):
+    """The timer's looks, one by one; there is no window here that would call them."""
+    measure = import_module(f"{EXTENSION}.scene.ride.measure")
+    monkeypatch.setattr(measure, "REST", 0.0)
+    bpy.ops.beyond_mocap.import_clips(filepath=str(SOURCE / "sample_blend" / "library" / "walking_1_2.bvh"))
+    body = bpy.context.object
+    ride = body.beyond_mocap_ride
+    bpy.ops.beyond_mocap.edit_path()
+    assert measure.KNOWN not in ride.figures
+    look(measure, ride)
+    first = json.loads(ride.figures)
+    assert first["metres"] > 5.0 and first["root_error_m"]["mean"] < 0.02 and "skate" in first
+    before = ride.figures
+    for _ in range(3):
+        measure._tick()
+    assert ride.figures == before and not measure._running
+    bpy.context.object.location.y += 1.0
+    bpy.context.object.scale = (0.5, 0.5, 1.0)
+    bpy.context.view_layer.update()
+    import_module(f"{EXTENSION}.scene.ride.riders").renew(bpy.context.scene, body)
+    assert measure.KNOWN not in ride.figures
+    look(measure, ride)
+    assert json.loads(ride.figures)["length_m"] < 0.6 * first["length_m"]
+
+
+def look(measure, ride):
+    """Tick until the figures are there."""
+    for _ in range(400):
+        measure._tick()
+        if measure.KNOWN in ride.figures:
+            return
+        time.sleep(0.02)
+    raise AssertionError("no figures")
+
+
+def test_update_path_measures_at_once():
+    bpy.ops.beyond_mocap.import_clips(filepath=str(SOURCE / "sample_blend" / "library" / "walking_1_2.bvh"))
+    body = bpy.context.object
+    bpy.ops.beyond_mocap.edit_path()
+    bpy.ops.beyond_mocap.update_path()
+    assert "Feet slide" in import_module(f"{EXTENSION}.scene.ride.figure_lines").lines(body.beyond_mocap_ride.figures)
