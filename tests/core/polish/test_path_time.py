@@ -79,7 +79,10 @@ def test_a_closed_way_is_gone_round(residuals):
 
 
 def test_a_way_is_as_long_as_the_steps_it_takes(residuals):
-    assert asked_length(level(10.0, slope=0.2), Wishes(slopes=True)) == pytest.approx(10.0 / 0.92)
+    wishes, climb = Wishes(slopes=True), level(10.0, slope=0.2)
+    assert asked_length(residuals, own(residuals), climb, wishes) == pytest.approx(10.0 / 0.92)
+    climbed = Way(np.cumsum(residuals.step), np.full(ROWS, 0.2), np.zeros(ROWS))
+    assert asked_length(residuals, climbed, climb, wishes) == pytest.approx(10.0)
 
 
 def test_steps_are_stretched_as_the_speed_is():
