@@ -61,15 +61,25 @@ def turns(mode: str, values: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def alone(rig: bpy.types.Object, scene: bpy.types.Scene):
-    """A scene in which only the armature is, and what it hangs on, at the rate of `scene`; gone afterwards."""
+    """A scene in which only the armature is, and what it hangs on, at the rate of `scene`; gone afterwards. What is
+    switched off or shown at rest is posed meanwhile."""
     side = bpy.data.scenes.new(f"{rig.name} alone")
+    hidden, position = rig.hide_viewport, rig.data.pose_position
     try:
+        if hidden:
+            rig.hide_viewport = False
+        if position != "POSE":
+            rig.data.pose_position = "POSE"
         side.render.fps, side.render.fps_base = scene.render.fps, scene.render.fps_base
         side.unit_settings.system = scene.unit_settings.system
         side.unit_settings.scale_length = scene.unit_settings.scale_length
         side.collection.objects.link(rig)
         yield side
     finally:
+        if position != "POSE":
+            rig.data.pose_position = position
+        if hidden:
+            rig.hide_viewport = True
         bpy.data.scenes.remove(side)
 
 

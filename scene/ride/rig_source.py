@@ -88,8 +88,7 @@ class RigSource:
         if not self._hangs:
             return np.broadcast_to(self._ways[0], (count, 4, 4))
         if count > len(self._ways):
-            scene = next(scene for scene in bpy.data.scenes if rig.name in scene.objects)
-            with rig_look.alone(rig, scene) as side:
+            with rig_look.alone(rig, bpy.context.scene) as side:
                 more = rig_look.look(rig, side, self.start + np.arange(len(self._ways), count))
             self._ways = np.concatenate([self._ways, more.lies @ np.linalg.inv(more.basis)])
         return self._ways[:count]
@@ -117,7 +116,7 @@ def columns(path: str, values: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
 class Played:
     """What an armature plays: frames (F,) of the scene; places: (data path, index) of what is animated, of the object and
     its bones; others: data paths that are not a bone's place or turn; bones: those that are animated; switches: whether
-    other settings are; layered: whether NLA strips have a share in it; told."""
+    other settings are; layered: see `layered`; told."""
 
     def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
         """InputError where it plays nothing."""
@@ -142,7 +141,7 @@ class Played:
             raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frames", f"2 to {_MOST} frames",
                              "key more than one frame")
         self.frames = np.arange(first, last + 1)
-        self.layered = bool(strips)
+        self.layered = layered(rig)
         paths = {path for path, _ in found}
         self.others = {path for path in paths if not _is_posed(path) and _resolves(rig, path)}
         self.places = {place for place in found if _is_posed(place[0]) or place[0] in self.others}
@@ -159,6 +158,13 @@ def playing_strips(rig: bpy.types.Object, aside: bool = False) -> list:
     solo = [track for track in data.nla_tracks if track.is_solo]
     return [strip for track in (solo or data.nla_tracks) if not track.mute or track.is_solo
             for strip in track.strips if not strip.mute and strip.action is not None]
+
+
+def layered(rig: bpy.types.Object) -> bool:
+    """Whether an armature plays something else than the action on top: strips below it, or a part of it."""
+    data = rig.animation_data
+    part = data.action is not None and (data.action_influence != 1.0 or data.action_blend_type != "REPLACE")
+    return part or bool(playing_strips(rig))
 
 
 def _cycles(curve: bpy.types.FCurve) -> bool:

@@ -21,10 +21,10 @@ from ..measure import frames_per_second, units_per_metre
 from ..set_aside import play_as_before, put_aside, stance_of, stand
 from . import keys, rig_parts
 from .carrier import MARK, Carrier, Read
-from .rig_source import BONE, POSED, RigSource, playing_strips
+from .rig_source import BONE, POSED, RigSource, layered, playing_strips
 
 KIND = "beyond_mocap_ride_kind"
-"""Custom property of a rider's action: it is carried as a rig."""
+"""Custom property of a rider's action that is carried as a rig: "rig", or "layers" where it stands for several."""
 
 _STILL = 1e-5
 
@@ -79,10 +79,10 @@ class RigCarrier(Carrier):
 
     def begin(self) -> None:
         body, (original, slot) = self.body, self.source()
-        layered = bool(playing_strips(body))
+        several = layered(body)
         put_aside(self.ride.before, body)
         name = f"{body.name} path motion"
-        if layered or original is None:
+        if several or original is None:
             made = bpy.data.actions.new(name)
             own = made.slots.new(id_type="OBJECT", name=body.name)
             keys.begin(made, own.identifier, MARK)
@@ -91,14 +91,13 @@ class RigCarrier(Carrier):
             made.name, made.use_fake_user = name, False
             keys.begin(made, slot.identifier, MARK)
             own = next(one for one in made.slots if one.identifier == slot.identifier)
-        made[KIND] = True
+        made[KIND] = "layers" if several else "rig"
         channels.assign(body, made, own)
 
     def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
         made, slot = self.ours()
         rig, (original, own) = read.rig, self.source()
-        layered = rig.played.layered
-        sources = {} if layered or original is None else channels.curves(original, own)
+        sources = {} if made[KIND] == "layers" or original is None else channels.curves(original, own)
         sheet = keys.Sheet(made, slot, channels.curves(made, slot), sources)
         wanted = rig.values(ridden, self.body)
         rows = rig.rows(ridden)
@@ -118,12 +117,11 @@ class RigCarrier(Carrier):
         made, slot = self.ours()
         original, own = self.source()
         before = self.ride.before
-        if not self._strips() and original is not None:
-            keys.settle(keys.Sheet.of(made, slot, original, own))
-        elif self._strips():  # what the strips had a share in is in the action: they fall silent
+        if made[KIND] == "layers":  # what the strips had a share in is in the action: they fall silent
             before.use_nla, before.influence, before.blend, before.extrapolation = False, 1.0, "REPLACE", "HOLD"
-        if KIND in made:
-            del made[KIND]
+        elif original is not None:
+            keys.settle(keys.Sheet.of(made, slot, original, own))
+        del made[KIND]
 
     def _strips(self) -> list:
         """The NLA strips that have a share in the original."""
@@ -174,7 +172,7 @@ def rides_as_rig(body: bpy.types.Object) -> bool:
 def is_plain(body: bpy.types.Object) -> bool:
     """Whether an armature shows just what the channels of its bones say, of which the topmost alone travels."""
     data = body.animation_data
-    if data is None or playing_strips(body) or data.action_influence != 1.0 or rig_bake.is_carried(body):
+    if data is None or layered(body) or rig_bake.is_carried(body):
         return False
     bones = body.pose.bones
     if any(not one.mute and one.influence > 0.0 for bone in bones for one in bone.constraints):

@@ -164,6 +164,22 @@ def strips(recorded, part, _):
     return ride_rigs.onto_strip(recorded(), scale=1.3)
 
 
+def half_an_action_over_strips(recorded, part, _):
+    rig = recorded()
+    data = rig.animation_data
+    action, slot = data.action, data.action_slot
+    ride_rigs.onto_strip(rig)
+    other = action.copy()
+    rest = ride_rigs.bone_path("Spine1" if "Spine1" in rig.pose.bones else rig.pose.bones[1].name, "rotation_quaternion")
+    for curve in part("channels").curves(other, other.slots[0]).values():
+        if curve.data_path == rest:
+            for point in curve.keyframe_points:
+                point.co.y = 0.5
+    data.action, data.action_influence = other, 0.5
+    data.action_slot = other.slots[0]
+    return rig
+
+
 def cyclic(recorded, part, _):
     rig = ride_rigs.walk_ik(frames=31)
     ride_rigs.cycled(rig, part("channels"))
@@ -172,7 +188,7 @@ def cyclic(recorded, part, _):
 
 
 KINDS = [rigify_fk, rigify_ik, hand_rig, hand_rig_of_few_keys, without_root, unreal_root_travels, unreal_root_stays, odd_modes,
-         moved_object, moved_object_under_moved_empty, under_scaled_empty, strips, cyclic]
+         moved_object, moved_object_under_moved_empty, under_scaled_empty, strips, half_an_action_over_strips, cyclic]
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -347,6 +363,15 @@ def test_one_root_carries_all_where_it_travels(part, recorded):
     changed = {path for (path, i), curve in now.items()
                if (path, i) not in before or not np.array_equal(channels.keys_of(curve)["co"], before[path, i])}
     assert {path.split('"')[1] for path in changed} == {"root"}
+
+
+def test_one_that_is_hidden_or_shown_at_rest_rides_as_it_would_be_posed(part, ride):
+    rig = ride_rigs.walk_ik()
+    posed = ride(rig, bent=True)[1].motion.root_positions
+    part("ride.riders").end(rig)
+    rig.data.pose_position, rig.hide_viewport = "REST", True
+    np.testing.assert_allclose(ride(rig, bent=True)[1].motion.root_positions, posed, atol=1e-6)
+    assert rig.data.pose_position == "REST" and rig.hide_viewport and len(bpy.data.scenes) == 1
 
 
 def test_motions_that_are_faster_slower_longer_and_shorter(core, part, recorded, ride):
