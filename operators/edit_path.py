@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty
 from ..beyond_mocap.errors import BeyondMocapError, InputError
 from ..scene import linked
 from ..scene.ride import curve, riders
+from ..scene.ride.settings import choose
 from .verb import Verb
 
 COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
@@ -65,7 +66,7 @@ curve becomes the path instead, also of who rides already. The original action i
             raise
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
-        riders.choose(context, used)
+        choose(context, used)
         names = ", ".join(body.name for body in chosen)
         self.report({"INFO"}, f"{names}: edit the points of {used.name} (Tab); the motion follows")
 

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import EnumProperty, IntProperty
 
 from ..scene.ride import curve, riders
-from ..scene.ride.settings import meant
+from ..scene.ride.settings import choose, meant
 from .edit_path import COUNT, DEGREE
 from .verb import Verb
 
@@ -38,4 +38,4 @@ is removed if it was made here and nobody else rides it"""
         made = riders.new_curve(context, body, self.shape, self.count, self.kind, self.degree)
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
-        riders.choose(context, made)
+        choose(context, made)

@@ -15,7 +15,7 @@ from .. import channels, linked
 from ..set_aside import drop, play_as_before
 from . import curve, keys, source
 from .carrier import MARK, carrier_of
-from .settings import riders, wishes
+from .settings import choose, riders, wishes
 
 _SAMPLES = 400
 
@@ -238,17 +238,6 @@ def standing(body: bpy.types.Object | None):
         return stands[np.clip(rows, 0, len(stands) - 1)] & ((rows >= 0) & (rows < len(stands)))[:, None]
 
     return at
-
-
-def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
-    """Select one object and nothing else, and make it active, so that Tab edits it."""
-    if thing.name not in context.view_layer.objects:
-        return
-    for other in list(context.selected_objects):
-        other.select_set(False)
-    thing.hide_set(False)
-    thing.select_set(True)
-    context.view_layer.objects.active = thing
 
 
 def back_to(context: bpy.types.Context, bodies: list[bpy.types.Object]) -> None:

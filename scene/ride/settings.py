@@ -36,12 +36,33 @@ def is_mesh(_ride, candidate: bpy.types.Object) -> bool:
     return candidate.type == "MESH"
 
 
+def follow_pick(ride, context: bpy.types.Context) -> None:
+    """Where a curve is active that nobody rides any more, the one that was picked instead becomes active."""
+    active = context.view_layer.objects.active if context.view_layer is not None else None
+    if not ride.on or ride.curve is None or context.mode != "OBJECT" or active is None or active.type != "CURVE":
+        return
+    if all(body.beyond_mocap_ride.curve != active for body in riders(context.scene)):
+        choose(context, ride.curve)
+
+
+def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    """Select one object and nothing else, and make it active, so that Tab edits it."""
+    if thing.name not in context.view_layer.objects:
+        return
+    for other in list(context.selected_objects):
+        other.select_set(False)
+    thing.hide_set(False)
+    thing.select_set(True)
+    context.view_layer.objects.active = thing
+
+
 class BeyondMocapRide(bpy.types.PropertyGroup):
     """One armature's path editing."""
 
     on: BoolProperty(name="Rides", description="Whether the armature's motion rides a curve")
     curve: PointerProperty(
-        name="New Path", type=bpy.types.Object, poll=is_curve, description="The curve object that the motion rides"
+        name="New Path", type=bpy.types.Object, poll=is_curve, update=follow_pick,
+        description="The curve object that the motion rides",
     )
     before: PointerProperty(type=BeyondMocapBefore, description="The original motion, put aside")
     fit: EnumProperty(name="Original Path", items=FITS, default="spline", description="How the original path is found")

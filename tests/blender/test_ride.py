@@ -428,6 +428,17 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
     assert own.name in bpy.data.objects
 
 
+def test_a_picked_curve_is_active_where_the_one_before_was(scene, part):
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    ring = circle()
+    body.beyond_mocap_ride.curve = ring
+    assert bpy.context.object == ring and bpy.ops.beyond_mocap.update_path() == {"FINISHED"}
+    choose(body)
+    body.beyond_mocap_ride.curve = circle(name="Another")
+    assert bpy.context.object == body
+
+
 def test_who_rides_already_takes_the_selected_curve(scene, part):
     riders = part("ride.riders")
     first, second = walker(), walker("jogging_2_9")
