@@ -18,6 +18,8 @@ from .carrier import MARK, carrier_of
 from .settings import choose, riders, wishes
 
 _SAMPLES = 400
+MOST_FRAMES = 40_000
+"""Frames that a cycled motion lasts at most, some: worked out again while a path is dragged, more would take minutes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +94,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     if up_to_date and remembered and not anew:
         return False
     path = drawn.path()
+    _check_length(known.core, path, settings)
     ridden = ride(known.core, path, settings, source.ground_of(scene, ridden_by.ground, ground))
     if anew or not up_to_date:
         carrier.write(scene, known.read, ridden, digest)
@@ -99,6 +102,20 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     _shown[body.session_uid] = digest, Shown(known.read.first, known.read.motion.fps, known.core, path, ridden, _counted)
     _tell(ridden_by, "\n".join((*drawn.notes, *known.read.told, *ridden.warnings)), _figures(known.core, ridden))
     return True
+
+
+def _check_length(known, path, settings) -> None:
+    """InputError where a motion would have to be repeated for ever."""
+    if not settings.cycle or known.arc.length <= 0.0:
+        return
+    line = _along(path)
+    metres = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+    motion = known.motion
+    frames = len(motion) * metres / known.arc.length / settings.speed
+    if frames > MOST_FRAMES:
+        minutes = frames / motion.fps / 60.0
+        raise InputError("cycle", f"the motion would last {minutes:.0f} minutes on a path of {metres:.0f} m",
+                         f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most", "shorten the path, or switch Cycle off")
 
 
 def begin(

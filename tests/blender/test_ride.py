@@ -555,6 +555,20 @@ def test_a_curve_that_hangs_on_something_goes_with_it(scene, part):
     assert live.follow(scene) == 1
 
 
+def test_nobody_cycles_for_hours(scene, part):
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    bpy.context.object.scale = (1000.0, 1000.0, 1000.0)
+    body.beyond_mocap_ride.cycle = True
+    before = bits(part, body)[:3]
+    bpy.context.view_layer.update()
+    assert live.follow(scene) == 0 and "22 minutes at most" in body.beyond_mocap_ride.told
+    assert bits(part, body)[:3] == before
+    body.beyond_mocap_ride.cycle = False
+    assert live.follow(scene) == 1
+
+
 def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
     """A short closed ring is gone round; an open line of 2 m ends, or is begun again; a long one is filled by cycling."""
     live, channels = part("ride.live"), part("channels")
