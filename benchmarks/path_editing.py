@@ -113,7 +113,7 @@ def table(rows: list[Row], by: str) -> list[str]:
 
 def _cell(group: list[Row], names: tuple[str, ...]) -> str:
     values = [_scale(name) * _median([row.values.get(name, np.nan) for row in group]) for name in names]
-    shown = ["-" if not np.isfinite(value) else f"{value:.3g}" for value in values]
+    shown = ["-" if not np.isfinite(value) else f"{value if abs(value) > 1e-6 else 0.0:.3g}" for value in values]
     if len(shown) == 3:
         return f"{shown[0]} -> {shown[1]} ({shown[2]})"
     own = len(shown) == 2 and "source" in names[1]

@@ -306,8 +306,8 @@ def bends():
     figure, axes = plots.canvas(1, 2, tall=5.0)
     for ax, (title, more) in zip(axes[0], (("as in the paper", AS_PAPER), ("planted, leaning into the bend", {}))):
         trial = tried(RUN, _cut(path_shapes.circle(3.0), 4.0), **more)
-        frames = np.linspace(0, len(trial.ridden.motion) - 1, 8).astype(int)
-        plots.photo(ax, plots.bodies(trial.ridden.motion, frames, -60.0, size=480), title, trial.feet)
+        frames = np.linspace(0, len(trial.ridden.motion) - 1, 6).astype(int)
+        plots.photo(ax, plots.bodies(trial.ridden.motion, frames, 110.0, size=480, wide=5.0), title, trial.feet)
         say(title, trial)
     return figure
 
