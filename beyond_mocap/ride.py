@@ -135,7 +135,7 @@ class Ridden:
     """A motion on its new path, N frames. frames (N,): of the source, in general fractional; standing (N, 2, 2) bool,
     carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,): first
     frames after a jump from a cycle's end to its start, faded over; again (R,): first frames where motion and path begin
-    anew, a cut; correction (N, 2) m by which each foot was moved, miss (N, 2) m that it is short of
+    anew, a cut, at which nobody stands; correction (N, 2) m by which each foot was moved, miss (N, 2) m that it is short of
     where it should be; laid: root (N, 3) m and local rotations (N, J, 4) before leaning and planting."""
 
     motion: Motion
@@ -234,7 +234,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, laid, source,
         (*source.warnings, *end.told), end.again,
     )  # fmt: skip
-    return ridden.showing(end.shown) if len(end.again) else ridden
+    return _begun_again(ridden, end) if len(end.again) else ridden
 
 
 def _timed(
@@ -268,6 +268,14 @@ def _timed(
     timing = timing.first(end.count)
     seams = np.searchsorted(timing.at, seams - 1e-9)
     return residuals, seams[seams < end.count], timing, replace(end, told=(*told, *end.told))
+
+
+def _begun_again(ridden: Ridden, end: Ending) -> Ridden:
+    """The ride as often as its end says; whoever is set back does not stand meanwhile."""
+    shown = ridden.showing(end.shown)
+    standing = shown.standing.copy()
+    standing[end.again - 1] = standing[end.again] = False
+    return replace(shown, standing=standing)
 
 
 def _own_way(source: RideSource, residuals: Residuals) -> Way:
