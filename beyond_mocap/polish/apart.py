@@ -29,8 +29,8 @@ _TIGHT = 0.3  # a detour on the inside of a bend leaves at least this share of i
 _BIN, _LAG = 0.5, 0.5  # seconds: how finely it is looked at first who may meet; what detours may cost
 _UNMENDED = 10.0  # what a collision that stays costs
 _SHARES = (0.0, 0.5, 0.75, 0.9)
+_PATIENCE = 3.0  # ways are looked for at most for so many times as many collisions as there were: a crowd too dense is told
 _AGAIN = 2  # times that it is gone over where something is left; from what was found it goes on otherwise
-_TWICE = 3.0  # ways are tried for at most this many times as many collisions as there were, and some
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None)
     search = _Search(followers, limits)
     state = search.begin(tuple(changes or (Change(),) * len(followers)))
     before = state.collisions
+    search.patience = int(_PATIENCE * len(before)) + 20
     for _ in range(_AGAIN):
         state = search.smaller(_mended(search, replace(state, given_up=frozenset())))
         if not state.collisions:
@@ -92,7 +93,7 @@ def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None)
 
 def _mended(search: "_Search", state: "_State") -> "_State":
     """The best state found from this one on."""
-    states, rounds = [state], int(_TWICE * len(state.collisions)) + 20
+    states, rounds = [state], int(_PATIENCE * len(state.collisions)) + 20
     kept = _KEPT[len(state.collisions) >= _MANY]
     for _ in range(rounds):
         if states[0].open() is None:
@@ -112,6 +113,7 @@ class _Search:
         end = max(follower.times[-1] for follower in followers) + limits.delay
         self.clock = np.linspace(begin, end, max(int(np.ceil((end - begin) * _RATE)), 1) + 1)
         self.places, self.costs, self.found, self.known = {}, {}, {}, {}
+        self.patience = 0  # for how many collisions ways are looked for
         self.may_meet = _may_meet(self)
 
     def begin(self, changes) -> _State:
@@ -186,7 +188,7 @@ class _Search:
             return [state]
         key, children = state.key(collision), []
         if key not in self.found:
-            self.found[key] = self.ways(state, collision)
+            self.found[key] = self.ways(state, collision) if len(self.found) < self.patience else []
         for changed in self.found[key]:
             changes = list(state.changes)
             for who, change in changed.items():

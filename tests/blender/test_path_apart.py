@@ -6,7 +6,7 @@ import json
 import bpy
 import numpy as np
 import pytest
-from test_ride import choose, part, pelvis, scene, walker  # noqa: F401
+from test_ride import choose, circle, part, pelvis, scene, walker  # noqa: F401
 from undo import assert_one_step
 
 
@@ -133,3 +133,35 @@ def test_a_curve_that_is_gone_is_one_line_and_nothing_changes(scene):  # noqa: F
     with pytest.raises(RuntimeError, match="curve"):
         bpy.ops.beyond_mocap.path_apart()
     assert [asked(body) for body in bodies] == before
+
+
+def test_at_a_broken_rate_and_in_centimetres(scene, said):  # noqa: F811
+    scene.render.fps, scene.render.fps_base = 24, 1.001
+    scene.unit_settings.scale_length = 0.01
+    bodies = rider((0, 0, 0), (300, 0, 0)), rider((300, 0, 0), (0, 0, 0))
+    assert nearest(*bodies) < 30.0
+    bpy.ops.beyond_mocap.path_apart()
+    assert said[0].before == 1 and said[0].left == ()
+    assert nearest(*bodies) > 59.0
+
+
+def test_round_a_closed_curve_again_and_again(scene, said):  # noqa: F811
+    bodies = []
+    for side in (1.0, -1.0):
+        drawn = circle(2.0)
+        drawn.scale.y = side
+        body = walker()
+        choose(body, drawn)
+        body.beyond_mocap_ride.cycle = True
+        bpy.ops.beyond_mocap.edit_path()
+        bodies.append(body)
+    bpy.ops.beyond_mocap.path_apart()
+    assert said[0].before >= 1 and said[0].left == ()
+    assert nearest(*bodies) > 0.59
+
+
+def test_a_path_that_begins_again_meets_nobody_on_its_way_back(scene, said):  # noqa: F811
+    again, beside = rider((0, 0, 0), (2, 0, 0)), rider((1, 3, 0), (1, 8, 0))
+    again.beyond_mocap_ride.end = "repeat"
+    bpy.ops.beyond_mocap.path_apart()
+    assert said[0].before == 0 and [asked(body) for body in (again, beside)] == [(0.0, [])] * 2
