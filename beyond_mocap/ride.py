@@ -1,7 +1,7 @@
 """Path editing: one good clip rides another path (Gleicher 2001, told by Path editing §3), and its feet stay planted.
 
-`prepare` finds a motion's own path and what the motion is relative to it, once; `ride` lays that on a new path, quickly,
-as often as the path is dragged.
+`prepare` finds a motion's own path and what the motion is relative to it, once; `ride` lays that on a new path,
+quickly, as often as the path is dragged.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ STILL = 0.05
 class RideSettings:
     """What a user chooses. fit: kind of the motion's own path, one of FITS, a polynomial of `degree`. by_arc_length: as
     fast as the motion was, else in as much time. speed: times as fast. end: what happens where the path ends before the
-    motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant, lean, slopes: feet are
-    held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends slow the motion (the
-    two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that it begins later.
+    motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant, lean, slopes: feet
+    are held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends slow the motion
+    (the two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that it begins later.
     detours: (arc m, width m, offset m to the left) each."""
 
     fit: str = "spline"
@@ -133,10 +133,10 @@ class RideSource:
 @dataclass(frozen=True, eq=False)
 class Ridden:
     """A motion on its new path, N frames. frames (N,): of the source, in general fractional; standing (N, 2, 2) bool,
-    carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,): first
-    frames after a jump from a cycle's end to its start, faded over; again (R,): first frames where motion and path begin
-    anew, a cut, at which nobody stands; correction (N, 2) m by which each foot was moved, miss (N, 2) m that it is short of
-    where it should be; laid: root (N, 3) m and local rotations (N, J, 4) before leaning and planting."""
+    carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,):
+    first frames after a jump from a cycle's end to its start, faded over; again (R,): first frames where motion and
+    path begin anew, a cut, at which nobody stands; correction (N, 2) m by which each foot was moved, miss (N, 2) m that
+    it is short of where it should be; laid: root (N, 3) m and local rotations (N, J, 4) before leaning and planting."""
 
     motion: Motion
     frames: np.ndarray
@@ -207,8 +207,8 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     """The motion of `source` on `path`.
 
     ground: a `motion.terrain.Terrain` that the feet are to follow; without it the path's own height, level across it.
-    The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the path
-    has no length.
+    The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the
+    path has no length.
     """
     path = with_detours(path, settings.detours)
     arc = source.arc if path is source.path else ArcLength(path)
@@ -240,8 +240,8 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
 def _timed(
     source: RideSource, path: Path, arc: ArcLength, settings: RideSettings
 ) -> tuple[Residuals, np.ndarray, Timing, Ending]:
-    """The residuals as they are shown, once through, cut or cycled; the cycles' seams; when each is shown where; and what
-    happens at the path's end."""
+    """The residuals as they are shown, once through, cut or cycled; the cycles' seams; when each is shown where; and
+    what happens at the path's end."""
     residuals, seams, told = source.residuals, np.zeros(0, dtype=int), ()
     wishes = Wishes(settings.slopes and settings.plant and source.humanoid, settings.climbs, settings.bends)
     plain = wishes.none or source.still or path is source.path or not settings.by_arc_length
@@ -263,7 +263,8 @@ def _timed(
         timing = by_arc_length(residuals, settings.speed, settings.delay)
     else:
         timing = by_time(residuals, path, arc, settings.speed, settings.delay)
-    wish = "stop" if len(seams) else settings.end  # a cycle ends with the path: what is a hair longer does not begin anew
+    # a cycle ends with the path: what is a hair longer does not begin anew
+    wish = "stop" if len(seams) else settings.end
     end = ending(timing.arc, arc.length, residuals.fps, wish, path.closed or source.still)
     timing = timing.first(end.count)
     seams = np.searchsorted(timing.at, seams - 1e-9)
@@ -314,7 +315,9 @@ def _leaned(
     return rotations
 
 
-def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing) -> tuple[Steps | None, tuple[str, ...]]:
+def _steps(
+    source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing
+) -> tuple[Steps | None, tuple[str, ...]]:
     """How long steps are on the new path, against their own, and what of that legs cannot do."""
     slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
     own = rows.step * np.cos(slope)
@@ -326,9 +329,8 @@ def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Tim
     for first, end in runs(worst):
         span = first / rows.fps, (end - 1) / rows.fps
         much = times[first:end][np.argmax(np.abs(np.log(np.maximum(times[first:end], 1e-3))))]
-        told.append(
-            TimedLine(f"{span[0]:.1f} s: the path asks for steps {much:.1f} times as long as they were; feet slide", span)
-        )
+        asks = f"the path asks for steps {much:.1f} times as long as they were; feet slide"
+        told.append(TimedLine(f"{span[0]:.1f} s: {asks}", span))
     return Steps(moving.heading, times), tuple(told)
 
 
@@ -339,7 +341,8 @@ def _out_of_reach(miss: np.ndarray, fps: float) -> list[str]:
     if not spans:
         return []
     times = f"{len(spans)} times, first at {spans[0][0]:.1f} s" if len(spans) > 1 else f"at {spans[0][0]:.1f} s"
-    return [TimedLine(f"feet do not reach where they should stand, by up to {100.0 * far.max():.0f} cm: {times}", *spans)]
+    much = f"feet do not reach where they should stand, by up to {100.0 * far.max():.0f} cm"
+    return [TimedLine(f"{much}: {times}", *spans)]
 
 
 def _ground(
@@ -351,13 +354,15 @@ def _ground(
     up = quaternion.rotate(quaternion.about_up(moving.heading)[:, None], rows.up)
     if not settings.slopes or (terrain is None and is_level(path, arc) and not rows.under.any()):
         return Ground(own, up)
-    return Ground(own, up, path_surface(path, arc, timing.arc) if terrain is None else mesh_surface(terrain, moving.origin))
+    surface = path_surface(path, arc, timing.arc) if terrain is None else mesh_surface(terrain, moving.origin)
+    return Ground(own, up, surface)
 
 
 def _own_ground(
     motion: Motion, standing: np.ndarray, path: Path, arc: ArcLength, moving: MovingFrame, metres: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Metres (T, 2) from the motion's own path up to the ground under its feet, and its normals (T, 2, 3) in the frame."""
+    """Metres (T, 2) from the motion's own path up to the ground under its feet, and its normals (T, 2, 3) in the
+    frame."""
     if is_level(path, arc):
         return _flat(len(motion))
     body = identify(motion.skeleton)

@@ -1,9 +1,9 @@
 """The feet of a motion that rides another path: held where they stand, on level ground or any other.
 
-As `foot_plant`, with three differences. The ground may rise and tip (`underfoot`): feet keep the height above it that they
-had above their own, soles and their steps tip with it, and the pelvis follows the mean of what is under both feet. A leg
-that is asked to be straighter than it was nears its full length gently, the same in the air and on the ground, so that no
-knee pops when a foot arrives. And only the joints of the legs are looked at, since paths are dragged.
+As `foot_plant`, with three differences. The ground may rise and tip (`underfoot`): feet keep the height above it that
+they had above their own, soles and their steps tip with it, and the pelvis follows the mean of what is under both feet.
+A leg that is asked to be straighter than it was nears its full length gently, the same in the air and on the ground, so
+that no knee pops when a foot arrives. And only the joints of the legs are looked at, since paths are dragged.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from .reach import bent_limb
 from .underfoot import Footing, Surface, footing
 
 MOST_SHIFT = 0.45
-"""Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the spot
-turn otherwise on another path."""
+"""Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the
+spot turn otherwise on another path."""
 
 FIRST_DROP = 0.015
 """Metres that the pelvis is lowered before a heel is raised where a leg does not reach."""
@@ -141,7 +141,8 @@ def follow(
 
 @lru_cache(maxsize=32)
 def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, Limb]]:
-    """A skeleton's legs and what they hang on, their joints in the whole one, and the limbs by the joints of the part."""
+    """A skeleton's legs and what they hang on, their joints in the whole one, and the limbs by the joints of the
+    part."""
     body = identify(skeleton)
     named = [[limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
     legs, kept = skeleton.part([joint for side in named for joint in side])
@@ -171,7 +172,8 @@ def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
 
 
 def _lift(foot: Foot, own: np.ndarray, sole: float, scale: float) -> np.ndarray:
-    """Metres (T,) up that bring a standing foot onto its ground, `own` (T,) m high: the floors of recordings are uneven."""
+    """Metres (T,) up that bring a standing foot onto its ground, `own` (T,) m high: the floors of recordings are
+    uneven."""
     return lift_to_ground(foot.moved(-own[:, None] * _UP), sole, scale)
 
 

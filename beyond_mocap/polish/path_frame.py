@@ -1,8 +1,8 @@
 """A motion relative to a path: where the body is, and how it is turned, in the path's moving frame.
 
-The frame "path" is the one of Path editing §3.1.2.2 and §3.1.3: its Z stays up, its X is the path's tangent projected on
-the ground. The other two show why it is the one to take: "tangent" follows the whole tangent, so that a hill tips the
-body over; "absolute" (§3.1.2.1) turns the body with the path, but not what it is off the path.
+The frame "path" is the one of Path editing §3.1.2.2 and §3.1.3: its Z stays up, its X is the path's tangent projected
+on the ground. The other two show why it is the one to take: "tangent" follows the whole tangent, so that a hill tips
+the body over; "absolute" (§3.1.2.1) turns the body with the path, but not what it is off the path.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ _COMES, _SURELY = 1.0, 0.6  # seconds; m/s above which speed alone counts
 class Residuals:
     """T frames of a motion in the moving frame of its own path.
 
-    place (T, 3) m of the root and rotations (T, J, 4) local, the root's relative to the frame; step (T,) m of the path's
-    length since the frame before, 0 in the first; standing (T, 2, 2) bool of heels and toes, left and right; frames (T,)
-    of the source, in general fractional; turn (T,) radians that the path turns since the frame before; under (T, 2) m
-    from the path up to the ground under each foot and up (T, 2, 3) its normal in the frame; fps, skeleton. Every array has
-    a row a frame.
+    place (T, 3) m of the root and rotations (T, J, 4) local, the root's relative to the frame; step (T,) m of the
+    path's length since the frame before, 0 in the first; standing (T, 2, 2) bool of heels and toes, left and right;
+    frames (T,) of the source, in general fractional; turn (T,) radians that the path turns since the frame before;
+    under (T, 2) m from the path up to the ground under each foot and up (T, 2, 3) its normal in the frame; fps,
+    skeleton. Every array has a row a frame.
     """
 
     place: np.ndarray
@@ -95,7 +95,8 @@ def check_frame(frame: str) -> None:
 
 
 def relative(frame: str, moving: MovingFrame, root: np.ndarray, turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The root's place (T, 3) m and rotation (T, 4) in the moving frame; root (T, 3) m and turned (T, 4) in the world."""
+    """The root's place (T, 3) m and rotation (T, 4) in the moving frame; root (T, 3) m and turned (T, 4) in the
+    world."""
     off, body = moving.turns(frame)
     place = quaternion.rotate(quaternion.inverse(off), root - moving.origin)
     return place, quaternion.multiply(quaternion.inverse(body), turned)
@@ -115,7 +116,8 @@ def placed(
 def moving_frame(
     origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray, fps: float, otherwise: float | None = None
 ) -> MovingFrame:
-    """The frame at places `origin` (T, 3) m of a path with tangents (T, 3) of any length, passed at lengths `arc` (T,) m.
+    """The frame at places `origin` (T, 3) m of a path with tangents (T, 3) of any length, passed at lengths `arc` (T,)
+    m.
 
     otherwise: the heading in radians of a path that leads nowhere over the ground; without it its first tangent's."""
     length = np.linalg.norm(tangent, axis=1)
@@ -133,8 +135,8 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
 
     Where the horizontal tangent vanishes (standing still, vertical stretches, cusps) it says nothing, and a body that
     stands does not spin with it: least squares, sum w |h - a|^2 + |h''|^2 + |h'|^2 with a the tangent's direction and
-    its weight w falling steeply below a slow walk. At a walk and above that is the tangent's own direction. Who sways or
-    shifts his feet about is slow, however fast that is: what counts is how far he comes within a second.
+    its weight w falling steeply below a slow walk. At a walk and above that is the tangent's own direction. Who sways
+    or shifts his feet about is slow, however fast that is: what counts is how far he comes within a second.
     """
     mean = zero_phase_hann(along[:, :2] * speed[:, None], fps, _COMES) if len(along) > 2 else along[:, :2]
     speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURELY)

@@ -1,8 +1,8 @@
 """When a rider is where on its new path, and which frame of its motion it shows there.
 
 By arc length (Path editing §3.2) the new path is passed as fast as the motion passed its own; by time (figure 3.8) each
-path is passed within the same time, however long it is. A speed factor plays the motion faster or slower; the frames shown
-then lie between recorded ones.
+path is passed within the same time, however long it is. A speed factor plays the motion faster or slower; the frames
+shown then lie between recorded ones.
 
 By arc length the new path may also ask for other steps than its own did. Uphill and downhill steps are shorter and
 quicker, the speed stays (runners at a given speed: Padulo et al. 2012, "Kinematics of running at different slopes and
@@ -92,8 +92,8 @@ def by_way(
 ) -> Timing:
     """As `by_arc_length`, with the steps that the new path asks for beyond what its own, `own` at every row, did.
 
-    The length s run on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS / k_own(p),
-    dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two sums and two inversions.
+    The length s run on the new path, the length S of the motion and its row p at time t follow
+    ds / k(s) = dS / k_own(p), dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two sums and two inversions.
     """
     k_own, r_own = _steps(own, wishes)
     k, r = _steps(new, wishes)
@@ -176,8 +176,8 @@ def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None
 
 def shown(residuals: Residuals, at: np.ndarray) -> Residuals:
     """The residuals at rows `at` (N,), fractional: cubics through the four rows around (Catmull and Rom 1974), since
-    straight lines between rows shake what moves quickly; feet that stand are those of the nearest row. Steps and turns are
-    those from one output frame to the next."""
+    straight lines between rows shake what moves quickly; feet that stand are those of the nearest row. Steps and turns
+    are those from one output frame to the next."""
     count = len(residuals)
     low = np.clip(np.floor(at + 1e-9).astype(int), 0, count - 1)
     share = np.clip(at - low, 0.0, 1.0)

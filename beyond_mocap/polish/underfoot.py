@@ -1,8 +1,8 @@
 """The ground under a rider's feet: where each foot stands, how high and how steep it is there, and in between.
 
 A foot's ground is a plane for as long as it stands, through what lies under its heel and its toe. On its way from one
-stance to the next it goes over from plane to plane, and is lifted where something sticks out in between (a stair's edge).
-So the ground's own roughness never shakes a foot, and stairs have no corners.
+stance to the next it goes over from plane to plane, and is lifted where something sticks out in between (a stair's
+edge). So the ground's own roughness never shakes a foot, and stairs have no corners.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ STEEPEST = 0.7
 """Slope of the ground under a foot beyond which it is an edge that the foot stands on, flat."""
 
 CLEARANCE, MOST_LIFT = 0.02, 0.35
-"""Metres that a foot in the air keeps above the ground, or as much as it had, and that it is lifted for that at most."""
+"""Metres that a foot in the air keeps above the ground, or as much as it had, and that it is lifted for that at
+most."""
 
 ABOVE = 1.0
 """Metres above the path below which the ground is looked for: a bridge overhead is not stood on."""
@@ -38,8 +39,8 @@ Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """The ground that two feet are told by. height (T, 2) m at each toe, slope (T, 2, 2) by x and by y, and lift (T, 2) m
-    by which a foot in the air has to go higher."""
+    """The ground that two feet are told by. height (T, 2) m at each toe, slope (T, 2, 2) by x and by y, and lift (T, 2)
+    m by which a foot in the air has to go higher."""
 
     height: np.ndarray
     slope: np.ndarray
@@ -108,8 +109,8 @@ def mesh_surface(terrain: Terrain, origin: np.ndarray) -> Surface:
 def footing(feet: np.ndarray, standing: np.ndarray, clear: np.ndarray, fps: float, surface: Surface) -> Footing:
     """The ground under two feet.
 
-    feet (T, 2, 2, 2) m: left and right, heel and toe, over the ground; standing (T, 2, 2) bool; clear (T, 2) m: how high
-    each foot was above its own ground.
+    feet (T, 2, 2, 2) m: left and right, heel and toe, over the ground; standing (T, 2, 2) bool; clear (T, 2) m: how
+    high each foot was above its own ground.
     """
     sides = [_side(feet[:, side], standing[:, side].any(axis=1), clear[:, side], fps, surface) for side in (0, 1)]
     return Footing(*(np.stack(parts, axis=1) for parts in zip(*sides)))
@@ -136,8 +137,8 @@ def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, s
 
 
 def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """How much of its way from stance to stance (T, 2) a foot has gone, from 0 to 1: over the ground, but by time, `way`
-    (T,), where it leaves and arrives and where it stays about where it is."""
+    """How much of its way from stance to stance (T, 2) a foot has gone, from 0 to 1: over the ground, but by time,
+    `way` (T,), where it leaves and arrives and where it stays about where it is."""
     by_time = way**3 * (10.0 - 15.0 * way + 6.0 * way**2)
     step = there - here
     length = np.sum(step * step, axis=1)

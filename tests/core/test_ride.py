@@ -97,7 +97,8 @@ def test_planted_feet_do_not_slide_in_bends(source):
 def test_a_vertical_path_and_one_who_stands_still_give_no_nan(walk, source):
     up = ride(source, through(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 9.0]]), "pole"), RideSettings())
     assert np.isfinite(up.motion.root_positions).all() and np.isfinite(up.motion.rotations).all()
-    still = Motion(walk.skeleton, np.tile(walk.root_positions[:1], (40, 1)), np.tile(walk.rotations[:1], (40, 1, 1)), 30.0)
+    root, rotations = np.tile(walk.root_positions[:1], (40, 1)), np.tile(walk.rotations[:1], (40, 1, 1))
+    still = Motion(walk.skeleton, root, rotations, 30.0)
     source = prepare(still, RideSettings())
     ridden = ride(source, through(np.array([[3.0, 1.0, 0.0], [3.0, 6.0, 0.0]]), "line"), RideSettings())
     assert np.allclose(ridden.motion.root_positions[:, :2], [3.0, 1.0], atol=0.15)
