@@ -39,13 +39,16 @@ class Item(NamedTuple):
 
 def items(scene: bpy.types.Scene) -> list[Item]:
     """All that is to be drawn of the riders that are seen, at the current frame."""
+    found = seen(scene)
+    if not found:
+        return []
     on, world = scene.beyond_mocap.view.on_path(), Matrix.Scale(units_per_metre(scene), 4)
-    return [item for shown in seen(scene) for item in _items(on, shown, scene.frame_current_final, world)]
+    return [item for shown in found for item in _items(on, shown, scene.frame_current_final, world)]
 
 
 def seen(scene: bpy.types.Scene) -> list[riders.Shown]:
     """The riders of which anything is to be drawn."""
-    if not scene.beyond_mocap.view.on_path():
+    if not riders.anybody_shown() or not scene.beyond_mocap.view.on_path():
         return []
     found = [riders.shown(body) for body in riding(scene) if body.visible_get()]
     return [shown for shown in found if shown is not None]

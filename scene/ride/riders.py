@@ -64,6 +64,11 @@ def forget() -> None:
     keys.forget()
 
 
+def anybody_shown() -> bool:
+    """Whether anything was worked out for any rider; quick, since it is asked at every redraw."""
+    return bool(_shown)
+
+
 def shown(body: bpy.types.Object) -> Shown | None:
     """What was worked out for a rider last; None where nothing was in this session."""
     return _shown[body.session_uid][1] if body.session_uid in _shown and body.beyond_mocap_ride.on else None

@@ -40,6 +40,7 @@ def shown(rides, ridden, monkeypatch):
     now = [rides.riders.Shown(1, motion.motion.fps, source, path, motion, 1)]
     monkeypatch.setattr(rides, "riding", lambda scene: [body])
     monkeypatch.setattr(rides.riders, "shown", lambda one: now[-1])
+    monkeypatch.setattr(rides.riders, "anybody_shown", lambda: True)
     return now
 
 
