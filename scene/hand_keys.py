@@ -18,7 +18,7 @@ import numpy as np
 
 from . import channels
 from .clock import Clock
-from .ride.carrier import carrier_of
+from .ride.carrier import original_of
 
 VALUES = "beyond_mocap_values"
 FORM = "beyond_mocap_form"
@@ -174,7 +174,7 @@ def of_strips(track: bpy.types.NlaTrack) -> Hand:
 
 def of_body(body: bpy.types.Object) -> tuple[Hand, str]:
     """The user's part of what a body plays, action or strips of ours, and the clock that it was made by."""
-    action, slot = carrier_of(body).source()  # of a body that rides a path its original
+    action, slot = original_of(body)
     made = read(action) if action is not None else None
     if made is not None:
         return found(action, slot), made.clock

@@ -35,6 +35,17 @@ class Read:
     told: tuple[str, ...] = ()
 
 
+def original_of(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object]:
+    """Action and slot of an armature's own motion: of a rider those put aside, else those that are played."""
+    if not body.beyond_mocap_ride.on:
+        return channels.playing(body)
+    before = body.beyond_mocap_ride.before
+    if before.action is None:
+        return None, None
+    slots = [slot for slot in before.action.slots if slot.target_id_type == "OBJECT"]
+    return before.action, next((slot for slot in slots if slot.identifier == before.slot), slots[0] if slots else None)
+
+
 class Carrier(ABC):
     """One armature for the length of one event; nothing of Blender's is kept in it longer than that."""
 
@@ -47,14 +58,8 @@ class Carrier(ABC):
         return self.body.beyond_mocap_ride
 
     def source(self) -> tuple[bpy.types.Action | None, object]:
-        """Action and slot of the original motion: those put aside, before that those that are played."""
-        if not self.ride.on:
-            return channels.playing(self.body)
-        before = self.ride.before
-        if before.action is None:
-            return None, None
-        slots = [slot for slot in before.action.slots if slot.target_id_type == "OBJECT"]
-        return before.action, next((slot for slot in slots if slot.identifier == before.slot), slots[0] if slots else None)
+        """Action and slot of the original motion."""
+        return original_of(self.body)
 
     def check(self) -> None:
         """InputError where the armature cannot ride."""

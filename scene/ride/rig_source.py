@@ -138,7 +138,7 @@ class Played:
             first, last = min(first, scene.frame_start), max(last, scene.frame_end)
             self.told.append(f"its curves repeat: the motion is what they show from frame {first} to {last}")
         if not 1 <= last - first < _MOST:
-            raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frames", f"2 to {_MOST} frames",
+            raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frame{'s' * (last > first)}", f"2 to {_MOST} frames",
                              "key more than one frame")
         self.frames = np.arange(first, last + 1)
         self.layered = layered(rig)

@@ -182,6 +182,8 @@ def is_plain(body: bpy.types.Object) -> bool:
     roots = [bone for bone in body.data.bones if bone.parent is None]
     if len(roots) > 1 or any(not _inherits(bone) for bone in body.data.bones if bone.parent is not None):
         return False
+    if any(_out_of_joint(bone, 1e-4 * body.dimensions.length) for bone in bones):
+        return False
     action, slot = channels.playing(body)
     found = channels.curves(action, slot) if action is not None else {}
     top = _path(roots[0].name) if roots else ""
@@ -202,6 +204,11 @@ def _path(bone: str) -> str:
 
 def _inherits(bone: bpy.types.Bone) -> bool:
     return bone.use_inherit_rotation and bone.inherit_scale == "FULL" and bone.use_local_location
+
+
+def _out_of_joint(bone: bpy.types.PoseBone, least: float) -> bool:
+    """Whether a bone is elsewhere than its parent puts it, or of another size."""
+    return bone.parent is not None and bone.location.length > least or max(abs(one - 1.0) for one in bone.scale) > 1e-4
 
 
 def _varies(curve: bpy.types.FCurve) -> bool:
