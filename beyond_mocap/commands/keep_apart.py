@@ -18,9 +18,9 @@ _ROUNDS = 3
 _HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
 
 
-def read_others(paths: Sequence[Path], unit: float | None) -> list[Follower]:
+def read_others(paths: Sequence[Path]) -> list[Follower]:
     """The bodies of other recordings, which stay where they are; second 0 is their first frame."""
-    motions = [(path.name, bvh.read(path, unit).motion) for path in paths]
+    motions = [(path.name, bvh.read(path).motion) for path in paths]
     return [
         Follower(name, np.arange(len(motion)) / motion.fps, motion.root_positions - (0.0, 0.0, _HIPS))
         for name, motion in motions

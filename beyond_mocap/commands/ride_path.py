@@ -37,14 +37,14 @@ def add(verbs):
     verb.add_argument("--frame", choices=_FRAMES, default="path", help=_FRAME_HELP)
     verb.add_argument("--no-lean", action="store_true", help="do not lean into bends")
     verb.add_argument("--slow-in-bends", action="store_true", help="slow down in tight bends as people do")
-    verb.add_argument("--slow-on-slopes", action="store_true", help="shorter steps up and down, as people make them")
+    verb.add_argument("--slow-on-slopes", action="store_true", help="slow down on slopes as people do")
     verb.add_argument("--no-slopes", action="store_true", help="feet do not follow slopes; the body rides up as in a lift")
     _add_curve(verb)
     verb.add_argument("--delay", type=partial(between, low=0.0, high=3600.0, expected="0 to 3600 seconds"), default=0.0,
                       metavar="SECONDS", help="that it waits before it sets out")  # fmt: skip
     verb.add_argument("--avoid", type=Path, action="append", default=[], metavar="OTHER.bvh",
                       help="a moving body to keep clear of, by waiting or going round; may be repeated")  # fmt: skip
-    verb.add_argument("--distance", type=partial(between, low=0.05, high=20.0, expected="0.05 to 20 metres"), default=0.6,
+    verb.add_argument("--distance", type=partial(between, low=0.05, high=20.0, expected="0.05 to 20 metres"),
                       metavar="METRES", help="between the middles of two bodies, with --avoid; default 0.6")  # fmt: skip
     verb.add_argument("--ground", type=Path, metavar="HILL.obj", help="a mesh for the feet to stand on: metres, Y up")
     verb.add_argument("--report", type=Path, metavar="R.json")
@@ -73,16 +73,22 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     write = writer_of(options.out, writers)
     if options.control_degree and not options.control_points:
         raise InputError("--control-degree", "without --control-points", "both", "add --control-points")
+    if options.distance and not options.avoid:
+        raise InputError("--distance", "without --avoid", "both", "add --avoid OTHER.bvh")
     if options.closed and options.control_points:
         raise InputError("--closed", "with --control-points", "one of them", "a B-spline of control points has two ends")
     path, ground = _path(options), _ground(options)
     clip = bvh.read(options.input, options.unit)
+    told.check()
     told.progress(0.2, "path")
     source, settings = _prepared(clip.motion, options)
     settings, asked = _apart(source, path, settings, ground, options)
+    told.check()
     told.progress(0.5, "ride")
     ridden, take = _ridden(source, path, settings, ground, options)
+    told.check()
     report = _report(source, ridden, take, path, ground) if options.report else None
+    told.check()
     notes = [f"{options.input}: {note}" for note in clip.notes]
     if options.out.suffix.lower() == ".bvh":
         notes += [f"{options.out}: {note}" for note in bvh.write(options.out, ridden.motion, clip.form)]
@@ -92,7 +98,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     told.end()
     for note in (*notes, *asked, *ridden.warnings):
         told.note(note)
-    gone = float(ridden.arc[-1] - ridden.arc[0]) if len(ridden.arc) else 0.0
+    gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # where it begins anew it is set back
     print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} m")
 
 
@@ -151,10 +157,11 @@ def _apart(source, path, settings, ground, options):
     """The settings that keep it clear of other bodies, and what these ask of it, one line each."""
     if not options.avoid:
         return settings, ()
+    from ..polish.collisions import DISTANCE
     from .keep_apart import clear_of, read_others
 
-    others = read_others(options.avoid, None)
-    return clear_of(others, options.distance, source, path, settings, ground, options.input.name)
+    others = read_others(options.avoid)
+    return clear_of(others, options.distance or DISTANCE, source, path, settings, ground, options.input.name)
 
 
 def _ridden(source, path, settings, ground, options):

@@ -6,6 +6,8 @@ import json
 import sys
 import threading
 
+from ..errors import Cancelled
+
 
 class Told:
     """What the user sees of the progress, and whether Ctrl-C was pressed."""
@@ -46,3 +48,8 @@ class Told:
     def cancelled(self) -> bool:
         """Whether the user wants out."""
         return self._stop.is_set()
+
+    def check(self) -> None:
+        """Raises Cancelled where the user wants out."""
+        if self.cancelled():
+            raise Cancelled("cancelled")

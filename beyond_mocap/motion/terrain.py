@@ -83,5 +83,6 @@ def _corners(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     if not np.isfinite(vertices).all():
         raise InputError("ground", "a vertex that is not finite", "metres")
     if len(triangles) and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
-        raise InputError("ground", f"a triangle of vertex {triangles.max()}", f"vertices 0 to {len(vertices) - 1}")
+        wrong = triangles.min() if triangles.min() < 0 else triangles.max()
+        raise InputError("ground", f"a triangle of vertex {wrong}", f"vertices 0 to {len(vertices) - 1}")
     return vertices[triangles.astype(int)]

@@ -41,8 +41,9 @@ class Loop:
     """Frames `start` .. `end` - 1 shown again and again: at `end` the body does what it does at `start`.
 
     apart: metres by which both differ (root mean square over joints, places and velocities, in a window around them);
-    unlike: the same as a share of how far apart any two moments of the motion are; cost: the same with what else speaks against the loop; metres: arc length of once round; strides: how many strides
-    that is, about; ending: how unlike anything in the loop the motion's last moment is, on the scale of `unlike`.
+    unlike: the same as a share of how far apart any two moments of the motion are; cost: the same in metres with what
+    else speaks against the loop; metres: arc length of once round; strides: how many strides that is, about; ending: how
+    unlike anything in the loop the motion's last moment is, on the scale of `unlike`.
     """
 
     start: int

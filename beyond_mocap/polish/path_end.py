@@ -67,6 +67,6 @@ def _again(first: int, count: int, total: int, fps: float, told: tuple[str, ...]
     later = np.arange(total - count)
     shown = np.concatenate([np.arange(count), first + later % (count - first)])
     again = np.arange(count, total, count - first)
-    times = len(again)
-    line = TimedLine(f"the path ends after {count / fps:.1f} s; the motion begins again {times} times", (count / fps,) * 2)
+    times = "once" if len(again) == 1 else f"{len(again)} times"
+    line = TimedLine(f"the path ends after {count / fps:.1f} s; the motion begins again {times}", (count / fps,) * 2)
     return Ending(count, shown, again, (line, *told))

@@ -39,11 +39,13 @@ def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> Polyno
     """The polynomial of a degree that is nearest to places (T, 3) in metres at times (T,) in seconds, by least squares.
 
     Legendre polynomials of time scaled to -1 .. 1 are nearly orthogonal over even frames, so that degree 45 is as exact as
-    degree 2. InputError where the degree is below 1 or there are too few frames for it.
+    degree 2. Where frames are so few for the degree that the polynomial would swing between them, they are filled up by a
+    cubic spline through them. InputError where the degree is below 1 or there are too few frames for it.
     """
     places, times = _checked(places, times)
     if not 1 <= degree <= len(times) - 1:
         raise InputError("path fit", f"degree {degree}", f"1 to {len(times) - 1}, one less than the frames")
+    places, times = _dense(places, times, degree)
     scaled = (2.0 * times - times[0] - times[-1]) / (times[-1] - times[0])
     basis = np.polynomial.legendre.legvander(scaled, degree)
     orthogonal, triangle = np.linalg.qr(basis)
@@ -51,6 +53,18 @@ def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> Polyno
     coefficients = np.linalg.solve(triangle, orthogonal.T @ (places - origin))
     coefficients[0] += origin
     return PolynomialPath(coefficients, (float(times[0]), float(times[-1])))
+
+
+def _dense(places: np.ndarray, times: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places (M, 3) at times (M,), so many that least squares at even times do not swing between them: twice the root of
+    their number is at least the degree (Dahlquist and Björck 1974)."""
+    if degree <= 2.0 * np.sqrt(len(times)):
+        return places, times
+    from scipy.interpolate import CubicSpline
+
+    parts = int(np.ceil(0.35 * degree**2 / (len(times) - 1)))
+    fine = np.interp(np.arange(parts * (len(times) - 1) + 1) / parts, np.arange(len(times)), times)
+    return CubicSpline(times, places)(fine), fine
 
 
 def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) -> SplinePath:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.__main__ import main
+from beyond_mocap.commands.told import Told
 from beyond_mocap.files import bvh
 from beyond_mocap.files.tables import read_provenance
 from beyond_mocap.motion.gait import gait
@@ -185,6 +186,7 @@ def test_a_bad_ground_is_one_line(capfd, place, tmp_path, content, parts):
     (["--delay", "-1"], ["--delay"]),
     (["--avoid", "missing.bvh"], ["missing.bvh"]),
     (["--distance", "0"], ["--distance"]),
+    (["--distance", "1"], ["--distance", "--avoid"]),
     (["--ground", "missing.obj"], ["missing.obj"]),
     (["--report", "nowhere/r.json"], ["nowhere"]),
 ])  # fmt: skip
@@ -206,6 +208,13 @@ def test_files_that_are_not_there_or_meant_twice_are_one_line(capfd, place, tmp_
         assert main(["path", str(place / "walk.bvh"), "--path", str(bend), "--out", str(out)]) == 2
         assert len(capfd.readouterr().err.splitlines()) == 1
     assert (place / "walk.bvh").read_bytes() == before
+
+
+def test_ctrl_c_ends_it_without_a_file(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(Told, "cancelled", lambda self: True)
+    status, said, error = run()
+    assert (status, said) == (130, "") and error == ["beyond-mocap: cancelled"]
+    assert not list(tmp_path.iterdir())
 
 
 def assert_refused(capfd, tmp_path, words, parts):

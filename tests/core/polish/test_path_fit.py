@@ -7,6 +7,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.motion import contacts
+from beyond_mocap.motion.arc_length import ArcLength
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.polish.path_fit import fit, fit_polynomial, fit_spline, places_on_ground
 
@@ -88,3 +89,12 @@ def test_the_ground_under_a_walk_up_a_hill_rises_with_it(slope):
     path = fit(hill, standing)
     times = np.arange(len(hill)) / 30.0
     assert np.abs(path.at(times)[:, 2] - truth)[15:-15].max() < 0.08
+
+
+@pytest.mark.parametrize("frames, degree", ((90, 45), (360, 120), (30, 29)))
+def test_a_high_degree_does_not_swing_between_few_frames(frames, degree):
+    motion = gait(1.4, frames / 30.0, 30.0).frames(0, frames)
+    path = fit(motion, contacts.points(motion), "polynomial", degree)
+    places = path.at(np.arange(frames) / 30.0)
+    assert ArcLength(path).length < 1.03 * np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    assert np.linalg.norm(places - places_on_ground(motion, contacts.points(motion)), axis=1).max() < 0.02
