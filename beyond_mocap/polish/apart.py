@@ -1,10 +1,10 @@
 """Bodies on several paths keep apart: some wait a little before they set out, some go round each other.
 
-A change costs seconds of waiting and metres gone sideways. The earliest collision is taken, and every way to mend it that
-one of the two (or both, each by half, as people do who meet head on) could take is tried by the least amount that
-mends it; the few best sets of changes so far are kept and gone on with until none has a collision left that can be mended.
-At last every change is made as small as the others allow. All of it is arithmetic on the same numbers in the same order:
-the same bodies get the same changes.
+A change costs seconds of waiting and metres gone sideways. The earliest collision is taken, and every way to mend it
+that one of the two (or both, each by half, as people do who meet head on) could take is tried by the least amount that
+mends it; the few best sets of changes so far are kept and gone on with until none has a collision left that can be
+mended. At last every change is made as small as the others allow. All of it is arithmetic on the same numbers in the
+same order: the same bodies get the same changes.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ _TIGHT = 0.3  # a detour on the inside of a bend leaves at least this share of i
 _BIN, _LAG = 0.5, 0.5  # seconds: how finely it is looked at first who may meet; what detours may cost
 _UNMENDED = 10.0  # what a collision that stays costs
 _SHARES = (0.0, 0.5, 0.75, 0.9)
-_PATIENCE = 3.0  # ways are looked for at most for so many times as many collisions as there were: a crowd too dense is told
+_PATIENCE = 3.0  # ways are looked for at most for so many times as many collisions as there were
 _AGAIN = 2  # times that it is gone over where something is left; from what was found it goes on otherwise
 
 
 @dataclass(frozen=True)
 class Limits:
-    """distance, height: metres, see `collisions`. delay: most seconds that anybody waits. detour: most metres to the side.
-    delay_cost, detour_cost: of a second of waiting, and of a metre to the side and back."""
+    """distance, height: metres, see `collisions`. delay: most seconds that anybody waits. detour: most metres to the
+    side. delay_cost, detour_cost: of a second of waiting, and of a metre to the side and back."""
 
     distance: float = DISTANCE
     height: float = HEIGHT
@@ -48,8 +48,8 @@ class Limits:
 
 @dataclass(frozen=True)
 class Resolution:
-    """changes: one for each follower. before: the collisions there were. left: those that could not be mended within the
-    limits, with the numbers of the changed bodies."""
+    """changes: one for each follower. before: the collisions there were. left: those that could not be mended within
+    the limits, with the numbers of the changed bodies."""
 
     changes: tuple[Change, ...]
     before: tuple[Collision, ...]
@@ -77,8 +77,8 @@ class _State:
 def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None) -> Resolution:
     """The changes that keep these bodies apart, least in all.
 
-    changes: what has been asked of them already and shall stay at least (one Change each). Bodies without a path stay as
-    they are; collisions among those alone are nobody's concern here.
+    changes: what has been asked of them already and shall stay at least (one Change each). Bodies without a path stay
+    as they are; collisions among those alone are nobody's concern here.
     """
     search = _Search(followers, limits)
     state = search.begin(tuple(changes or (Change(),) * len(followers)))
@@ -182,7 +182,7 @@ class _Search:
         return self.costs[who, change]
 
     def children(self, state):
-        """The states after the earliest collision is mended in each possible way; the state itself where none is open."""
+        """The states after the earliest collision is mended in each possible way; the state where none is open."""
         collision = state.open()
         if collision is None:
             return [state]
@@ -246,8 +246,9 @@ class _Search:
             return self.gap(beside(collision.first, amounts), beside(collision.second, amounts))
 
         def way(amount):
-            return {who: replace(state.changes[who], detours=state.changes[who].detours
-                                 + _rounded(self.train(who, covers[who], side * amount))) for who, side in sides.items()}
+            trains = {who: _rounded(self.train(who, covers[who], side * amount)) for who, side in sides.items()}
+            changes = state.changes
+            return {who: replace(changes[who], detours=changes[who].detours + train) for who, train in trains.items()}
 
         least = self.least_way(state, collision, gap, way, self.limits.detour)
         return least if least and all(self.possible(who, change) for who, change in least.items()) else None
@@ -297,20 +298,22 @@ class _Search:
         return len(there) >= 2 * _DETOURS
 
     def train(self, who, cover, offset):
-        """Detours that keep a body aside all along: each begins to come back where the next begins to leave, and together
-        they are one long one. offset: a number or an array, and so are theirs."""
+        """Detours that keep a body aside all along: each begins to come back where the next begins to leave, and
+        together they are one long one. offset: a number or an array, and so are theirs."""
         first, last = cover
         width = np.maximum(gentle_width(offset, self.followers[who].speed), (last - first) / 3.0)
         more = np.maximum(np.ceil((last - first - (1.0 - 2.0 * RISE) * width) / ((1.0 - RISE) * width)), 0.0)
         begin, step = 0.5 * (first + last - (1.0 - RISE) * width * more), (1.0 - RISE) * width
-        return tuple((begin + number * step, width, offset * (number <= more)) for number in range(int(np.max(more)) + 1))
+        numbers = range(int(np.max(more)) + 1)
+        return tuple((begin + number * step, width, offset * (number <= more)) for number in numbers)
 
     def possible(self, who, change):
         """Whether a change keeps to the limits and leaves no loop in a bend."""
         way = self.followers[who].way
         aside = way.aside(way.arc, change.detours)
         tight = (1.0 - way.bend * aside < _TIGHT) & (np.abs(aside) > 0.05)
-        return change.delay <= self.limits.delay + 1e-9 and np.abs(aside).max() <= self.limits.detour + 1e-3 and not tight.any()
+        waits, goes = change.delay <= self.limits.delay + 1e-9, np.abs(aside).max() <= self.limits.detour + 1e-3
+        return waits and goes and not tight.any()
 
     def smaller(self, state):
         """The state with each change as small as the others allow: left out, or a part of it."""
@@ -326,7 +329,8 @@ class _Search:
         for share in _SHARES:
             changes = list(state.changes)
             changes[who] = shared(state.changes[who], share)
-            tried = replace(state, changes=tuple(changes), collisions=self.after(tuple(changes), state.collisions, (who,)))
+            left = self.after(tuple(changes), state.collisions, (who,))
+            tried = replace(state, changes=tuple(changes), collisions=left)
             if _trouble(tried) <= _trouble(state) and self.possible(who, changes[who]):
                 return tried
         return state
@@ -350,8 +354,8 @@ def _trouble(state):
 
 
 def _may_meet(search):
-    """For each body the others with which changes within the limits could bring it together, each with the steps (M,) of
-    the clock in which they could; two of which neither can give way are nobody's concern."""
+    """For each body the others with which changes within the limits could bring it together, each with the steps (M,)
+    of the clock in which they could; two of which neither can give way are nobody's concern."""
     limits, followers = search.limits, search.followers
     stride = max(int(round(_BIN * _RATE)), 1)
     begins = np.arange(0, len(search.clock) - 1, stride)

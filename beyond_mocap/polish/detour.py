@@ -39,7 +39,8 @@ def gentle_width(offset, speed: float):
     Its bends are no tighter than a radius of 4 m, and push sideways by no more than 1.5 m/s^2.
     """
     bend = min(0.25, 1.5 / max(speed, 0.1) ** 2)
-    return np.maximum(1.5, np.sqrt(5.7735 * np.abs(offset) / bend) / RISE)  # 10/sqrt(3): the quintic step's largest bend
+    most = 10.0 / np.sqrt(3.0)  # the quintic step's largest bend
+    return np.maximum(1.5, np.sqrt(most * np.abs(offset) / bend) / RISE)
 
 
 def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.ndarray:
@@ -77,15 +78,16 @@ def _steady(heading, sigma, closed):
         padded = np.concatenate([heading[-1 - reach : -1] - turn, heading, heading[1 : reach + 1] + turn])
     else:  # straight on at the ends: point reflection keeps the heading there
         far = np.minimum(np.arange(1, reach + 1), count - 1)
-        padded = np.concatenate([2 * heading[0] - heading[far[::-1]], heading, 2 * heading[-1] - heading[count - 1 - far]])
+        before, after = 2 * heading[0] - heading[far[::-1]], 2 * heading[-1] - heading[count - 1 - far]
+        padded = np.concatenate([before, heading, after])
     return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
 def with_detours(path: Path, detours) -> Path:
     """The path with these detours [(arc, width, offset)], C2 as before, under the same parameters; see above.
 
-    Its ends move where a detour takes them in. Without detours it is `path` itself. InputError where a detour is not three
-    finite numbers, the second positive.
+    Its ends move where a detour takes them in. Without detours it is `path` itself. InputError where a detour is not
+    three finite numbers, the second positive.
     """
     for detour in detours:
         if len(detour) != 3 or not np.isfinite(detour).all() or detour[1] <= 0.0:
@@ -99,7 +101,8 @@ def with_detours(path: Path, detours) -> Path:
     parameters = _parameters(path, length)
     arc = length.at(parameters)
     aside = round_offsets(arc, detours, length.length) if path.closed else offsets(arc, detours)
-    return _through(parameters, path.at(parameters) + aside[:, None] * left_of(_smooth(grid, heading, arc)), path.closed)
+    left = left_of(_smooth(grid, heading, arc))
+    return _through(parameters, path.at(parameters) + aside[:, None] * left, path.closed)
 
 
 def _parameters(path, length):

@@ -17,8 +17,8 @@ _PIECES = 24  # of a detour, when its length is taken
 
 @dataclass(frozen=True)
 class Change:
-    """What is asked of a follower. delay: seconds for which it waits where it begins. detours: ((arc, width, offset), ...)
-    in metres along its path as it was, see `detour`."""
+    """What is asked of a follower. delay: seconds for which it waits where it begins. detours: ((arc, width, offset),
+    ...) in metres along its path as it was, see `detour`."""
 
     delay: float = 0.0
     detours: tuple[tuple[float, float, float], ...] = ()
@@ -28,9 +28,9 @@ class Change:
 class Follower:
     """One body without any change.
 
-    times (T,): seconds, rising, the same clock for all. places (T, 3): metres on the ground. path: what it follows; None:
-    something that cannot be asked to give way. arc (T,): metres it has gone along the path. by_arc: whether it keeps its
-    speed, so that a detour makes it come later; else it is where its path's parameter says.
+    times (T,): seconds, rising, the same clock for all. places (T, 3): metres on the ground. path: what it follows;
+    None: something that cannot be asked to give way. arc (T,): metres it has gone along the path. by_arc: whether it
+    keeps its speed, so that a detour makes it come later; else it is where its path's parameter says.
     """
 
     name: str
@@ -68,8 +68,8 @@ class Follower:
         return beside + self.way.with_detours_at(arc, change.detours, self.by_arc)
 
     def with_more(self, times: np.ndarray, change: Change, train) -> np.ndarray:
-        """Places (A, N, 3) with A trains of more detours: quickly, to a few millimetres. train: detours whose numbers are
-        arrays (A, 1)."""
+        """Places (A, N, 3) with A trains of more detours: quickly, to a few millimetres. train: detours whose numbers
+        are arrays (A, 1)."""
         times, way = times - change.delay, self.way
         arc = way.on_it(np.interp(times, self.times, self.arc), change.detours, self.by_arc)[None]
         old = way.aside(arc, change.detours)

@@ -56,8 +56,8 @@ class Trial:
 
 @dataclass(frozen=True)
 class Kept:
-    """What came out. bodies: names of the riders, in the order of changes. before: how many collisions there were; changes:
-    one `Change` a rider; left: lines about those that stay."""
+    """What came out. bodies: names of the riders, in the order of changes. before: how many collisions there were;
+    changes: one `Change` a rider; left: lines about those that stay."""
 
     bodies: tuple[str, ...]
     before: int
@@ -99,17 +99,16 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
     """Ask riders for these changes, instead of those before, and bring them up to date. InputError, and all as before,
     where one of them cannot follow."""
-    before = [(body.beyond_mocap_ride.delay, body.beyond_mocap_ride.added, body.beyond_mocap_ride.detours) for body in bodies]
+    rides = [body.beyond_mocap_ride for body in bodies]
+    before = [(ride.delay, ride.added, ride.detours) for ride in rides]
     try:
-        for body, change in zip(bodies, changes):
-            ride = body.beyond_mocap_ride
+        for ride, change in zip(rides, changes):
             ride.delay, ride.added = _own_delay(ride) + change.delay, change.delay
             ride.detours = json.dumps([list(detour) for detour in change.detours])
         for body in bodies:
             riders.renew(scene, body)
     except BeyondMocapError:
-        for body, (delay, added, detours) in zip(bodies, before):
-            ride = body.beyond_mocap_ride
+        for ride, (delay, added, detours) in zip(rides, before):
             ride.delay, ride.added, ride.detours = delay, added, detours
         raise
 
@@ -177,7 +176,8 @@ def _whole_frames(change, trial):
 def _asked(name, change) -> str:
     parts = [f"waits {change.delay:.2f} s"] if change.delay else []
     ways = _joined(change.detours)
-    parts += [f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} at {arc:.1f} m" for arc, offset in ways]
+    sides = {True: "left", False: "right"}
+    parts += [f"goes {abs(offset):.2f} m to the {sides[offset > 0]} at {arc:.1f} m" for arc, offset in ways]
     return f"{name} {', '.join(parts)}" if parts else ""
 
 
@@ -193,4 +193,5 @@ def _joined(detours) -> list[tuple[float, float]]:
 
 def _line(hit, names, fps) -> str:
     frames = f"frames {round(hit.start * fps)} to {round(hit.end * fps)}"
-    return f"{names[hit.first]} and {names[hit.second]} still come within {hit.gap:.2f} m at {hit.time:.2f} s ({frames})"
+    both = f"{names[hit.first]} and {names[hit.second]}"
+    return f"{both} still come within {hit.gap:.2f} m at {hit.time:.2f} s ({frames})"

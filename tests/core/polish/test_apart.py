@@ -134,7 +134,8 @@ def test_posts_that_touch_are_nobodys_concern():
 
 
 def test_what_cannot_be_mended_is_told_and_the_rest_is_mended():
-    wall = [Follower(f"post {y}", np.array([0.0, 1.0]), np.tile([0.0, y, 0.0], (2, 1))) for y in np.arange(-2, 2.1, 0.5)]
+    stand = {f"post {y}": np.tile([0.0, y, 0.0], (2, 1)) for y in np.arange(-2, 2.1, 0.5)}
+    wall = [Follower(name, np.array([0.0, 1.0]), places) for name, places in stand.items()]
     away = [walker(line((-10, 20), (10, 20))), walker(line((10, 20), (-10, 20)))]
     found = resolved([walker(EAST), *away, *wall])
     assert {collision.first for collision in found.left} == {0}
