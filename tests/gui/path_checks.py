@@ -1,4 +1,4 @@
-"""Path editing in the window: a control point dragged by the hand while a walk of 600 frames follows, and what goes with it."""
+"""Path editing in the window: a control point dragged while a walk of 600 frames follows, and what goes with it."""
 
 import statistics
 import time
@@ -235,8 +235,8 @@ def check_the_body_follows_a_dragged_point():
     window.picture(PICTURES / "path_drag.png")
     output.say(f"     {FRAMES} frames: one update takes {statistics.median(spent):.0f} ms of work (95 % within "
                f"{spent[int(0.95 * (count - 1))]:.0f}), {statistics.median(updates.spent):.0f} ms of wall clock")
-    output.say(f"     {count} updates in {moves} moves, {count / wall:.1f} a second of wall clock, {count / worked:.1f} a second of the "
-               f"main thread's work; without following this machine draws {free:.1f} moves a second")
+    output.say(f"     {count} updates in {moves} moves, {count / wall:.1f} a second of wall clock, {count / worked:.1f} a second "
+               f"of the main thread's work; without following this machine draws {free:.1f} moves a second")
     output.say(f"     the body is {max(off):.3f} m off the curve at most; it went {np.linalg.norm(pelvis() - before):.2f} m")
     assert np.linalg.norm(pelvis() - before) > 0.2, "the body stayed where it was"
     assert max(off) < 0.15, off
