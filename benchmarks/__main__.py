@@ -2,8 +2,8 @@
 
 Everything of one run is measured in one process on one core; seconds are the best of three. Written to
 benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
-`--compare` measures instead what is decided once, `--paths` recordings on other paths, and writes that section anew. A Blender measures with the numpy that
-it has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
+`--compare` measures instead what is decided once, `--paths` recordings on other paths, and writes that section anew. A
+Blender measures with the numpy that it has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
 """
 
 from __future__ import annotations

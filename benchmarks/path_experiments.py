@@ -302,7 +302,7 @@ def _cut(line: np.ndarray, length: float) -> np.ndarray:
 
 
 def bends():
-    """The same eight as bodies: rigid and upright as in the paper, and planted and leaning; a run in a bend too."""
+    """A run in a bend as bodies: rigid and upright as in the paper, and planted and leaning."""
     figure, axes = plots.canvas(1, 2, tall=5.0)
     for ax, (title, more) in zip(axes[0], (("as in the paper", AS_PAPER), ("planted, leaning into the bend", {}))):
         trial = tried(RUN, _cut(path_shapes.circle(3.0), 4.0), **more)
@@ -362,7 +362,7 @@ def hills():
 
 
 def _standing_frames(trial: Trial) -> np.ndarray:
-    """The middles of stances, at least 0.4 m apart, where a foot ought to be on the ground."""
+    """Frames at least 0.6 m apart in which a foot stands and ought to be on the ground."""
     stands = trial.ridden.standing.all(axis=2).any(axis=1)
     frames = []
     for frame in np.flatnonzero(stands):

@@ -125,16 +125,15 @@ def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
         **_skate("before_", _foot_places(ridden.rigid), points, ridden.motion.fps),
     }
     stood, own_stood = points.all(axis=2), own_points.all(axis=2)
-    correction = None if ridden.correction is None else ridden.correction[points.any(axis=2)]
-    miss = None if ridden.miss is None else float(np.mean(ridden.miss.max(axis=1) > MISSED))
+    correction = ridden.correction[points.any(axis=2)]
     return {
         "skate": skate,
         "ground_mm": {
             **_ground("", mine, stood, ridden.origin, source.motion, ground),
             **_ground("source_", own, own_stood, source.path.at(np.arange(len(own)) / source.motion.fps), source.motion, None),
         },
-        "foot_correction_m": None if correction is None or not len(correction) else _spread(correction),
-        "ik_miss_share": miss,
+        "foot_correction_m": _spread(correction) if len(correction) else None,
+        "ik_miss_share": float(np.mean(ridden.miss.max(axis=1) > MISSED)),
     }
 
 

@@ -232,7 +232,7 @@ class _Search:
     def round(self, state, collision, sides):
         """The smallest detour, to these sides and equal for all who make one, that mends a collision."""
         covers = {who: self.cover(state, collision, who) for who in sides}
-        if any(self.crowded(who, state.changes[who], covers[who]) for who in sides):
+        if any(_crowded(state.changes[who], covers[who]) for who in sides):
             return None
         times = self.around(collision)
 
@@ -292,11 +292,6 @@ class _Search:
             last += follower.way.length
         return first, max(first, last)
 
-    def crowded(self, who, change, cover):
-        """Whether a body makes detours enough there."""
-        there = [detour for detour in change.detours if abs(detour[0] - 0.5 * sum(cover)) < 0.5 * detour[1]]
-        return len(there) >= 2 * _DETOURS
-
     def train(self, who, cover, offset):
         """Detours that keep a body aside all along: each begins to come back where the next begins to leave, and
         together they are one long one. offset: a number or an array, and so are theirs."""
@@ -334,6 +329,12 @@ class _Search:
             if _trouble(tried) <= _trouble(state) and self.possible(who, changes[who]):
                 return tried
         return state
+
+
+def _crowded(change, cover):
+    """Whether a body with this change makes detours enough between (first, last) metres."""
+    there = [detour for detour in change.detours if abs(detour[0] - 0.5 * sum(cover)) < 0.5 * detour[1]]
+    return len(there) >= 2 * _DETOURS
 
 
 def _with_share(change, part, share):

@@ -38,6 +38,7 @@ SEEN = 0.35
 
 _ALSO_GOOD = (1.6, 0.02)  # loops that cost at most so many times the best one's, and metres more, may be taken too
 _KEEPS, _ALIKE = 3.0, 0.3  # how much strides of another length, and loops whose ends differ, count against seams
+_CREEPS = 0.2  # m/s below which a motion stays where it is
 _OTHERS = 3  # times that another loop than the main one is run through, at most
 
 
@@ -105,7 +106,7 @@ _NEXT_STEP = "switch cycling off, take a clip that walks or runs for two strides
 
 def _why_not(residuals: Residuals) -> str:
     metres, seconds = float(residuals.step.sum()), len(residuals) / residuals.fps
-    if metres < 0.3 or not (smooth_speed(residuals) > 0.2).any():
+    if metres < _CREEPS * seconds or not (smooth_speed(residuals) > _CREEPS).any():
         return f"the motion stays where it is ({metres:.2f} m in {seconds:.1f} s)"
     return f"no stretch of the motion ({metres:.2f} m, {seconds:.1f} s) can be repeated"
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path
-from .detour import headings, offsets, left_of, round_offsets
+from .detour import headings, left_of, offsets, round_offsets
 
 _SPACING = 0.1  # metres between the places at which the path is taken
 _PIECES = 24  # of a detour, when its length is taken

@@ -59,11 +59,6 @@ class Loop:
         return self.end - self.start
 
 
-def find_loop(residuals: Residuals) -> Loop | None:
-    """The best loop of a motion, or None where it has none: see `find_loops`."""
-    return next(iter(find_loops(residuals)), None)
-
-
 def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
     """The best loop of each number of strides, the best of all first; () for a motion that does not move on, or moves
     on for less than a stride."""
