@@ -68,7 +68,7 @@ def _lines(asked: RideSettings, settings: RideSettings) -> list[str]:
     return [
         *([f"waits {waits:.2f} s"] if waits else []),
         *(
-            f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} around {arc:.1f} m"
+            f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} {arc:.1f} m along the path"
             for arc, _, offset in asked.detours
         ),
     ]

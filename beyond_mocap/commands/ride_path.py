@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from .numbers import between, positive, whole
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
 
-_FRAMES = ("path", "tangent", "absolute")
+_FRAMES = ("path", "tangent", "absolute")  # those of path_frame, which takes scipy to import
 _FRAME_HELP = "what the recording is taken relative to: the path (default); its full tangent or the world, to compare"
 
 
@@ -161,7 +162,17 @@ def _apart(source, path, settings, ground, options):
     from .keep_apart import clear_of, read_others
 
     others = read_others(options.avoid)
-    return clear_of(others, options.distance or DISTANCE, source, path, settings, ground, options.input.name)
+    with _naming_files(options):
+        return clear_of(others, options.distance or DISTANCE, source, path, settings, ground, options.input.name)
+
+
+@contextmanager
+def _naming_files(options):
+    """A ride does not know its files: errors are told with them."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{options.input} on {options.path}", str(error)) from None
 
 
 def _ridden(source, path, settings, ground, options):
@@ -171,10 +182,8 @@ def _ridden(source, path, settings, ground, options):
     from ..ride import ride
     from ..take import Take
 
-    try:
+    with _naming_files(options):
         ridden = ride(source, path, settings, ground)
-    except InputError as error:
-        raise InputError(f"{options.input} on {options.path}", str(error)) from None
     count = len(ridden.motion)
     take = Take(
         motion=ridden.motion, start_time=0.0, clips=(options.input.name,), clip=np.zeros(count, int),

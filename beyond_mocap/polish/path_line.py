@@ -30,7 +30,7 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     """The path along a polyline (N, 3) in metres, its parameter about metres along it.
 
     name: for messages. Points that repeat each other are dropped; corners are rounded over some `rounding` metres; smooth
-    lines of radius 1 m or more are kept within a millimetre, and an open line's ends exactly. closed: the last point is
+    lines of radius 1 m or more are kept within a millimetre (up to 750 m of them), and an open line's ends exactly. closed: the last point is
     joined to the first. InputError for fewer than two different points, values that are not finite, lines shorter than
     SHORTEST.
     """
