@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -69,6 +70,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`path`: rides it, and writes what was asked for about it."""
     from ..files import bvh
 
+    begun = time.perf_counter()
     inputs = (options.input, options.path, options.ground, *options.avoid)
     check_outputs(options.out, options.report, options.provenance, never=inputs)
     write = writer_of(options.out, writers)
@@ -80,6 +82,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
         raise InputError("--closed", "with --control-points", "one of them", "a B-spline of control points has two ends")
     path, ground = _path(options), _ground(options)
     clip = bvh.read(options.input, options.unit)
+    loaded = time.perf_counter()
     told.check()
     told.progress(0.2, "path")
     source, settings = _prepared(clip.motion, options)
@@ -87,6 +90,8 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     told.check()
     told.progress(0.5, "ride")
     ridden, take = _ridden(source, path, settings, ground, options)
+    done = time.perf_counter()
+    take.seconds.update(load=loaded - begun, construct=done - loaded, total=done - begun)
     told.check()
     report = _report(source, ridden, take, path, ground) if options.report else None
     told.check()
@@ -206,4 +211,6 @@ def _report(source, ridden, take, path, ground) -> dict:
     else:
         report = {"version": 1, "fps": take.motion.fps, "frames": len(take.motion), "duration_s": take.motion.duration}
     report["skate"] = {**report.get("skate", {}), **(ridden_well["skate"] or {})}
+    seams = {name: ridden_well["seam_jerk"][name] for name in ("median", "max")}
+    report["seam_jerk_ratio"] = {**report.get("seam_jerk_ratio", {}), **seams}
     return {**report, "root_error_m": ridden_well["root_error_m"], "path": ridden_well, "warnings": list(take.warnings)}

@@ -76,6 +76,10 @@ def test_rate_names_channels_and_form_stay(run, place, tmp_path):
     assert report["root_error_m"]["mean"] < 0.01 and report["path"]["kept_speed"]["path"]["max"] < 0.01
     assert report["skate"]["contact_cm_s"] <= report["skate"]["source_contact_cm_s"] + 0.2
     assert report["skate"]["before_contact_cm_s"] > 2.0 * report["skate"]["contact_cm_s"]
+    assert report["seconds"]["total"] >= report["seconds"]["construct"] > 0.0
+    assert run("--cycle", "--report", tmp_path / "r.json")[0] == 0
+    cycled = json.loads((tmp_path / "r.json").read_text())
+    assert cycled["seam_jerk_ratio"]["max"] == cycled["path"]["seam_jerk"]["max"] > 0.0
 
 
 def test_the_result_can_be_evaluated(run, tmp_path, capfd):
