@@ -227,7 +227,8 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         under = _ground(path, arc, settings, ground, moving, timing, rows)
         steps, more = _steps(source, rows, moving, timing)
         held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, steps)
-        end = replace(end, told=(*end.told, *more, *_out_of_reach(held.miss, residuals.fps)))
+        more = (*more, *_out_of_reach(held.miss, residuals.fps), *_beside(ground, origin))
+        end = replace(end, told=(*end.told, *more))
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
     ridden = Ridden(
@@ -356,6 +357,14 @@ def _ground(
         return Ground(own, up)
     surface = path_surface(path, arc, timing.arc) if terrain is None else mesh_surface(terrain, moving.origin)
     return Ground(own, up, surface)
+
+
+def _beside(ground: Terrain | None, origin: np.ndarray) -> tuple[str, ...]:
+    """A line where the mesh lies nowhere under the path, origin (T, 3) m: it is elsewhere, or in another unit."""
+    some = origin[::8]
+    if ground is None or np.isfinite(ground.heights(some[:, :2], np.full(len(some), np.inf))[0]).any():
+        return ()
+    return ("the ground lies nowhere under the path: the path's own height counts",)
 
 
 def _own_ground(

@@ -124,6 +124,9 @@ def test_the_ground_lifts_the_body(run, place, tmp_path):
     assert run("--ground", place / "flat.obj")[0] == 0
     raised = bvh.read(tmp_path / "out.bvh", 0.01).motion.root_positions[:, 2]
     assert np.abs(raised - flat - 0.5).max() < 0.03
+    (place / "away.obj").write_text("v 90 0 90\nv 91 0 90\nv 90 0 91\nf 1 2 3\n")
+    status, _, error = run("--ground", place / "away.obj")
+    assert status == 0 and any("nowhere under the path" in line for line in error)
 
 
 def test_a_path_that_ends_stops_the_motion_and_cycling_goes_on(run, tmp_path):

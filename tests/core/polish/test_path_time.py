@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.motion.arc_length import ArcLength
+from beyond_mocap.motion.path import PolynomialPath
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.polish.path_frame import Residuals
-from beyond_mocap.polish.path_time import Way, Wishes, asked_length, by_arc_length, by_way, shown, stretched
+from beyond_mocap.polish.path_time import Way, Wishes, asked_length, by_arc_length, by_time, by_way, shown, stretched
 
 ROWS, FPS, STEP = 301, 30.0, 0.05
 
@@ -65,6 +67,25 @@ def test_climbs_follow_toblers_function(residuals, slope):
     tobler = np.exp(-3.5 * abs(slope + 0.05)) / np.exp(-3.5 * 0.05)
     assert np.diff(timing.arc).mean() == pytest.approx(STEP * tobler, rel=1e-3)
     assert np.diff(timing.at).mean() == pytest.approx(np.sqrt(tobler), rel=1e-3)
+
+
+@pytest.mark.parametrize("radius", [3.0, 1.0, 0.25])
+def test_bends_follow_the_two_thirds_law(residuals, radius):
+    """Speed goes with the third root of the radius below 2 m; steps and tempo share it."""
+    timing = by_way(residuals, own(residuals), level(30.0, bend=1.0 / radius), Wishes(bends=True), 1.0, 0.0, False)
+    law = min((radius / 2.0) ** (1.0 / 3.0), 1.0)
+    assert np.diff(timing.arc).mean() == pytest.approx(STEP * law, rel=1e-3)
+    assert np.diff(timing.at).mean() == pytest.approx(np.sqrt(law), rel=1e-3)
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0])
+def test_by_time_the_whole_path_is_passed_within_the_motion(residuals, speed):
+    """x = u^2 from u = 0 to 3: the place at a share of the time, not of the length."""
+    path = PolynomialPath(np.array([[3.0, 0, 0], [4.5, 0, 0], [1.5, 0, 0]]), (0.0, 3.0))
+    timing = by_time(residuals, path, ArcLength(path), speed, 0.5)
+    share = np.maximum(np.arange(len(timing.arc)) - 15.0, 0.0) * speed / (ROWS - 1)
+    assert len(timing.arc) == 15 + (ROWS - 1) / speed + 1
+    assert np.allclose(timing.arc, 9.0 * share**2, atol=1e-7)
 
 
 def test_what_its_own_path_asked_for_already_is_not_asked_again(residuals):
