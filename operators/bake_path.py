@@ -26,7 +26,7 @@ the file"""
         """All that are meant; of who could not follow lately, the last motion that could be worked out."""
         chosen = meant(context)
         for body in chosen:
-            riders.may_end(body)
+            riders.may_keep(body)
         kept = [riders.keep(context.scene, body) for body in chosen]
         riders.back_to(context, chosen)
         self.report({"INFO"}, f"kept as {', '.join(action.name for action, _ in kept)}")

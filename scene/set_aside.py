@@ -31,8 +31,11 @@ def put_aside(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
 
 def bring_back(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -> None:
     """Let `target` play and stand as before it was put aside; an action of ours that it plays now, told by the custom
-    property `mark`, is removed."""
+    property `mark`, is removed, another one stays in the file."""
     channels.discard(target, mark)
+    now, _ = channels.playing(target)
+    if now is not None and now != before.action and now.users == 1:
+        now.use_fake_user = True
     if not before.animated:
         if target.animation_data is not None:
             target.animation_data.action = None

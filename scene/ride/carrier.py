@@ -110,22 +110,13 @@ class Carrier(ABC):
         return digest.digest()
 
     def ours(self) -> tuple[bpy.types.Action, object]:
-        """Our action and its slot. InputError where the armature plays another."""
+        """Our action and its slot; a copy where another object plays it too: a duplicate of a rider is a rider of its own.
+        InputError where the armature plays another."""
         found, slot = channels.playing(self.body)
         if found is None or not found.get(MARK):
             raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride", "that action",
                              "choose it again in the Action Editor, or press Leave")
         linked.refuse(found)
-        if found.users - found.use_fake_user > 1:  # a copy of the armature plays it too: each has his own
-            identifier, found = slot.identifier, found.copy()
-            slot = next(slot for slot in found.slots if slot.identifier == identifier)
-            channels.assign(self.body, found, slot)
-        return found, slot
-
-
-    def own(self) -> tuple[bpy.types.Action, object]:
-        """The same, a copy where another object plays it too: a duplicate of a rider is a rider of its own."""
-        found, slot = self.ours()
         if found.users - found.use_fake_user < 2:
             return found, slot
         copy = found.copy()

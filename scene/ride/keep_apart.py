@@ -126,7 +126,7 @@ def _trial(scene, body) -> Trial:
     carrier.check()
     settings = RideSettings(**{**wishes(ride), "detours": (), "delay": round(_own_delay(ride), 6)})
     known = source.of(carrier, scene, settings)
-    ground = source.ground_of(scene, ride.ground, source.ground_digest(ride.ground))
+    ground = source.ground_of(scene, ride.ground, source.ground_digest(scene, ride.ground))
     return Trial(body.name, known.read.first, known.core, curve.read(scene, ride.curve).path(), settings, ground)
 
 
@@ -142,7 +142,10 @@ def _others(scene, bodies) -> list:
     found = []
     for body in all_riders(scene):
         if body not in bodies:
-            trial = _trial(scene, body)
+            try:
+                trial = _trial(scene, body)
+            except BeyondMocapError:
+                continue
             asked = Change(body.beyond_mocap_ride.added, wishes(body.beyond_mocap_ride)["detours"])
             found.append(trial.follower(asked, False))
     for player in scene.beyond_mocap.players:

@@ -39,7 +39,7 @@ def _figures(shown, ground) -> dict:
 
 def _ground(scene: bpy.types.Scene, body: bpy.types.Object):
     ground = body.beyond_mocap_ride.ground
-    return source.ground_of(scene, ground, source.ground_digest(ground))
+    return source.ground_of(scene, ground, source.ground_digest(scene, ground))
 
 
 def _keep(body: bpy.types.Object, figures: dict) -> None:
@@ -59,7 +59,8 @@ def _tick() -> float:
         return LOOK
     shown = rides.shown(waiting)
     try:
-        ground = _ground(window.scene, waiting)
+        with bpy.context.temp_override(window=window):  # a timer has none, and the ground is the window's
+            ground = _ground(window.scene, waiting)
     except BeyondMocapError:  # told where the rider is brought up to date
         _failed[waiting.session_uid] = shown.number
         return LOOK

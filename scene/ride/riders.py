@@ -91,10 +91,10 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
         keys.refresh()
     settings, drawn = RideSettings(**wishes(ridden_by)), curve.read(scene, ridden_by.curve)
     known = source.of(carrier, scene, settings)
-    ground = source.ground_digest(ridden_by.ground)
+    ground = source.ground_digest(scene, ridden_by.ground)
     parts = known.digest + drawn.digest + ground + repr(settings).encode()
     digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
-    made = carrier.own()[0]
+    made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
         return False
@@ -209,11 +209,11 @@ def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[bpy.types.Acti
     """The ridden motion becomes an ordinary action of the armature; the original stays in the file. Where it cannot be
     brought up to date, the last that could is kept. Returns the action, and why it is not up to date."""
     ride, carrier, told = body.beyond_mocap_ride, carrier_of(body), ""
+    may_keep(body)
     try:
         renew(scene, body)
     except BeyondMocapError as error:
         told = str(error)
-    may_end(body)
     made = carrier.ours()[0]
     original, drawn = ride.before.action, ride.curve
     carrier.settle()
@@ -230,6 +230,12 @@ def may_end(body: bpy.types.Object) -> None:
     """InputError where an armature's original motion cannot be brought back here."""
     linked.refuse(body)
     channels.check_free(body)
+
+
+def may_keep(body: bpy.types.Object) -> None:
+    """InputError where an armature's ridden motion cannot become its own here."""
+    may_end(body)
+    carrier_of(body).ours()
 
 
 def end(body: bpy.types.Object) -> None:
@@ -313,8 +319,13 @@ def _tell(ride, lines: str, figures: dict | None) -> None:
 
 
 def _over(ride) -> None:
+    """A rider no more; a curve or ground that was deleted is not kept in the file for its sake."""
     ride.on = False
     ride.told = ride.figures = ""
+    for name in ("curve", "ground"):
+        thing = getattr(ride, name)
+        if thing is not None and not thing.users_scene:
+            setattr(ride, name, None)
 
 
 def _along(path) -> np.ndarray:

@@ -64,10 +64,12 @@ def of(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
     return found
 
 
-def ground_digest(ground: bpy.types.Object | None) -> bytes:
-    """Another where the ground's mesh, as it is shown, is another."""
+def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> bytes:
+    """Another where the ground's mesh, as it is shown, is another. InputError where it was deleted."""
     if ground is None:
         return b""
+    if ground.name not in scene.objects:
+        raise InputError("ground", f"{ground.name} is gone from the scene", "a mesh object", "choose another, or none")
     places, corners = _mesh(ground)
     return hashlib.blake2b(places.tobytes() + corners.tobytes(), digest_size=16).digest()
 

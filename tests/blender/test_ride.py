@@ -404,6 +404,37 @@ def test_what_was_ridden_last_can_be_kept_when_its_curve_is_gone(scene, part):
     assert bits(part, body)[2] == before and not body.beyond_mocap_ride.on
 
 
+def test_two_are_kept_together_or_neither(scene):
+    first, other = walker(), walker()
+    choose(first, other)
+    bpy.ops.beyond_mocap.edit_path()
+    other.animation_data.action = bpy.data.actions.new("Chosen by hand")
+    choose(first, other)
+    with pytest.raises(RuntimeError, match="another action"):
+        bpy.ops.beyond_mocap.bake_path()
+    assert first.beyond_mocap_ride.on and other.beyond_mocap_ride.on
+
+
+def test_a_deleted_curve_and_ground_are_not_kept_for_who_rode_them(scene, part):
+    """While they might come back by undo they are told to be gone; who leaves lets go of them."""
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    drawn = bpy.context.object
+    bpy.ops.mesh.primitive_plane_add(size=100.0, location=(0.0, 0.0, 0.3))
+    body.beyond_mocap_ride.ground = bpy.context.object
+    assert live.follow(scene) == 1
+    was = bits(part, body)[:3]
+    bpy.ops.object.delete()
+    assert live.follow(scene) == 0 and "Plane is gone" in body.beyond_mocap_ride.told and bits(part, body)[:3] == was
+    choose(drawn)
+    bpy.ops.object.delete()
+    assert live.follow(scene) == 0 and "curve is gone" in body.beyond_mocap_ride.told and bits(part, body)[:3] == was
+    choose(body)
+    assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
+    assert body.beyond_mocap_ride.curve is None and body.beyond_mocap_ride.ground is None
+
+
 def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
     body = walker()
     bpy.ops.beyond_mocap.edit_path()

@@ -146,14 +146,16 @@ def test_hidden_riders_and_those_not_computed_yet_are_not_drawn(rides, shown, mo
 def test_figures_become_lines_with_what_is_aimed_for():
     lines = import_module(f"{EXTENSION}.scene.ride.figure_lines").lines
     told = lines(json.dumps({
-        "root_error_m": {"mean": 0.004}, "root_error_own_m": {"mean": 0.0041}, "kept_speed": {"path": {"p95": 0.02}},
+        "root_error_m": {"mean": 0.007}, "root_error_own_m": {"mean": 0.0081}, "kept_speed": {"path": {"p95": 0.02}},
         "skate": {"contact_cm_s": 1.5, "source_contact_cm_s": 2.25, "before_contact_cm_s": 9.0}, "ik_miss_share": None,
         "seam_jerk": {"seams": 0, "max": None}, "foot_correction_m": {"p95": float("nan")},
     })).splitlines()
     assert told == [
-        "Off the path: 0.40 cm\t≤ 0.41\tmet", "Speed off: 2.00 %\t≤ 1.00\tmissed", "Feet slide: 1.5 cm/s\t≤ 2.2\tmet",
+        "Off the path: 0.70 cm\t≤ 0.81\tmet", "Speed off: 2.00 %\t≤ 1.00\tmissed", "Feet slide: 1.5 cm/s\t≤ 2.2\tmet",
         "Not planted: 9.0 cm/s\t\t",
     ]
+    close = lines(json.dumps({"root_error_m": {"mean": 0.002}, "root_error_own_m": {"mean": 0.0016}}))
+    assert close == "Off the path: 0.20 cm\t≤ 0.50\tmet"
     assert lines("") == lines("{") == lines("[]") == ""
 
 
