@@ -27,7 +27,7 @@ from .polish.detour import with_detours
 from .polish.foot_ride import LONGEST, Ground, Steps, follow
 from .polish.loops import Loop, find_loops
 from .polish.path_end import Ending, ending
-from .polish.path_fit import fit, fit_polynomial, fit_spline
+from .polish.path_fit import KINDS, fit, fit_polynomial, fit_spline
 from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
 from .polish.path_time import (
     Timing,
@@ -46,7 +46,6 @@ from .polish.path_time import (
 from .polish.underfoot import footing, is_level, mesh_surface, path_surface
 
 ENDS = ("stop", "repeat")
-FITS = ("spline", "polynomial")
 SPEEDS = (0.05, 20.0)
 LEANS_FROM = (0.7, 1.5)
 """m/s below which nobody leans into a bend, and from which on all of it counts: walkers lean too, on a path that is as
@@ -65,9 +64,9 @@ STILL = 0.05
 
 @dataclass(frozen=True)
 class RideSettings:
-    """What a user chooses. fit: kind of the motion's own path, one of FITS, a polynomial of `degree`. by_arc_length: as
-    fast as the motion was, else in as much time. speed: times as fast. end: what happens where the path ends before the
-    motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant, lean, slopes: feet
+    """What a user chooses. fit: kind of the motion's own path, one of `path_fit.KINDS`, a polynomial of `degree`.
+    by_arc_length: as fast as the motion was, else in as much time. speed: times as fast. end: what happens where the
+    path ends before the motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant, lean, slopes: feet
     are held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends slow the motion
     (the two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that it begins later.
     detours: (arc m, width m, offset m to the left) each."""
@@ -91,8 +90,8 @@ class RideSettings:
         check_frame(self.frame)
         if self.end not in ENDS:
             raise InputError("end of path", str(self.end), " or ".join(ENDS))
-        if self.fit not in FITS:
-            raise InputError("path fit", str(self.fit), " or ".join(FITS))
+        if self.fit not in KINDS:
+            raise InputError("path fit", str(self.fit), " or ".join(KINDS))
         if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
             raise InputError("speed", f"{self.speed:g} times", f"{SPEEDS[0]:g} to {SPEEDS[1]:g}")
         if not 0.0 <= self.delay < 86400.0:

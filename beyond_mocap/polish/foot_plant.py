@@ -63,8 +63,7 @@ class Planted:
 class Foot:
     """One foot laid out: hip, heel (the ankle joint) and toe (T, 3) m, rotation (T, 4) in the world, left (T, 3) level
     across it, weight (T, 2) of heel and toe, length (T,) m of its leg and `own`,
-    what it was short of that in the pose that was given; `moves` (T - 1, 2, 2) m of heel and toe over the
-    ground."""
+    what it was short of that in the pose that was given."""
 
     limb: Limb
     hip: np.ndarray
@@ -78,6 +77,7 @@ class Foot:
 
     @property
     def moves(self) -> np.ndarray:
+        """(T - 1, 2, 2) metres that heel and toe go over the ground from frame to frame."""
         return np.stack([np.diff(self.heel[:, :2], axis=0), np.diff(self.toe[:, :2], axis=0)], axis=1)
 
     def moved(self, by: np.ndarray) -> Foot:
@@ -150,6 +150,8 @@ def plant(
 
 
 def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray) -> Foot:
+    """One foot of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known; stands (T, 2) bool
+    of its heel and toe."""
     hip, knee, heel, toe = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
     weight = firmness(stands)
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)

@@ -134,9 +134,10 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
     the ground.
 
     Where the horizontal tangent vanishes (standing still, vertical stretches, cusps) it says nothing, and a body that
-    stands does not spin with it: least squares, sum w |h - a|^2 + |h''|^2 + |h'|^2 with a the tangent's direction and
-    its weight w falling steeply below a slow walk. At a walk and above that is the tangent's own direction. Who sways
-    or shifts his feet about is slow, however fast that is: what counts is how far he comes within a second.
+    stands does not spin with it: least squares over frames, sum w |h - a|^2 + s^4 |h''|^2 + (s^2 / t)^2 |h'|^2 with a
+    the tangent's direction, s = _STIFF, t = _TIGHT, and the weight w falling steeply below a slow walk, _FULL. At a
+    walk and above that is the tangent's own direction. Who sways or shifts his feet about is slow, however fast that
+    is: what counts is how far he comes within a second.
     """
     mean = zero_phase_hann(along[:, :2] * speed[:, None], fps, _COMES) if len(along) > 2 else along[:, :2]
     speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURELY)
