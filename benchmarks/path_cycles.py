@@ -1,8 +1,8 @@
 """Recordings repeated until a longer path is filled: `python -m benchmarks.path_cycles`.
 
-Each recording of `path_editing` rides straight paths of 0.3 to 5 times its own length. Jerk at seams stands over what the
-recording itself has at that speed (its 95th percentile); the foot speed beside it is of standing feet within a quarter of
-a second of a seam.
+Each recording of `path_editing` rides straight paths of 0.3 to 5 times its own length. Jerk at seams stands over what
+the recording itself has at that speed (its 95th percentile); the foot speed beside it is of standing feet within a
+quarter of a second of a seam.
 """
 
 from __future__ import annotations

@@ -200,7 +200,8 @@ def timing() -> str:
 
 
 def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
-    """A line for each kind of recordings that are repeated until 25 m of winding path are filled: jerk at their seams."""
+    """A line for each kind of recordings that are repeated until 25 m of winding path are filled: jerk at their
+    seams."""
     lines = ["Cycled over the winding path, seam jerk against the recording's own at that speed (95th percentile):", ""]
     for kind in kinds:
         ratios, told = [], []

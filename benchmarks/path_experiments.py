@@ -1,8 +1,8 @@
 """The path-editing document's chapter 5 with real clips: `python -m benchmarks.path_experiments [--only NAME ...]`.
 
-Writes docs/pictures/path-*.png, each with the skate of its feet before and after planting, and prints all figures. Clips:
-cmu10 alone. `simple` is train_walking_3, a straight walk; `complex`, of which cmu10 has none, is synthesized from cmu10's
-clips along a winding track.
+Writes docs/pictures/path-*.png, each with the skate of its feet before and after planting, and prints all figures.
+Clips: cmu10 alone. `simple` is train_walking_3, a straight walk; `complex`, of which cmu10 has none, is synthesized
+from cmu10's clips along a winding track.
 """
 
 from __future__ import annotations

@@ -66,10 +66,10 @@ STILL = 0.05
 class RideSettings:
     """What a user chooses. fit: kind of the motion's own path, one of `path_fit.KINDS`, a polynomial of `degree`.
     by_arc_length: as fast as the motion was, else in as much time. speed: times as fast. end: what happens where the
-    path ends before the motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant, lean, slopes: feet
-    are held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends slow the motion
-    (the two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that it begins later.
-    detours: (arc m, width m, offset m to the left) each."""
+    path ends before the motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant,
+    lean, slopes: feet are held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends
+    slow the motion (the two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that
+    it begins later. detours: (arc m, width m, offset m to the left) each."""
 
     fit: str = "spline"
     degree: int = 13

@@ -1,4 +1,5 @@
-"""A rider that keeps clear of bodies that are already moving: it waits a little or goes round, as little as it takes."""
+"""A rider that keeps clear of bodies that are already moving: it waits a little or goes round, as little as it
+takes."""
 
 from __future__ import annotations
 
@@ -30,8 +31,8 @@ def read_others(paths: Sequence[Path]) -> list[Follower]:
 def clear_of(
     others: list[Follower], distance: float, source: RideSource, path, settings: RideSettings, ground, name: str
 ) -> tuple[RideSettings, tuple[str, ...]]:
-    """`settings` with the delay and the detours that keep the rider `distance` metres from `others`; what was asked of it
-    and what could not be mended, one line each. name: of the rider, for the lines."""
+    """`settings` with the delay and the detours that keep the rider `distance` metres from `others`; what was asked of
+    it and what could not be mended, one line each. name: of the rider, for the lines."""
     bare, limits = ride(source, path, replace(settings, plant=False), ground), Limits(distance)
     me = replace(_follower(name, bare), path=path, arc=bare.arc, by_arc=settings.by_arc_length)
     for _ in range(_ROUNDS):

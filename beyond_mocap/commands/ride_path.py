@@ -40,14 +40,14 @@ def add(verbs):
     verb.add_argument("--no-lean", action="store_true", help="do not lean into bends")
     verb.add_argument("--slow-in-bends", action="store_true", help="slow down in tight bends as people do")
     verb.add_argument("--slow-on-slopes", action="store_true", help="slow down on slopes as people do")
-    verb.add_argument("--no-slopes", action="store_true", help="feet do not follow slopes; the body rides up as in a lift")
+    verb.add_argument("--no-slopes", action="store_true", help="feet do not follow slopes, as if in a lift")
     _add_curve(verb)
     verb.add_argument("--delay", type=partial(between, low=0.0, high=3600.0, expected="0 to 3600 seconds"), default=0.0,
                       metavar="SECONDS", help="that it waits before it sets out")  # fmt: skip
     verb.add_argument("--avoid", type=Path, action="append", default=[], metavar="OTHER.bvh",
                       help="a moving body to keep clear of, by waiting or going round; may be repeated")  # fmt: skip
     verb.add_argument("--distance", type=partial(between, low=0.05, high=20.0, expected="0.05 to 20 metres"),
-                      metavar="METRES", help="between the middles of two bodies, with --avoid; default 0.6")  # fmt: skip
+                      metavar="METRES", help="between two bodies' middles, with --avoid; default 0.6")  # fmt: skip
     verb.add_argument("--ground", type=Path, metavar="HILL.obj", help="a mesh for the feet to stand on: metres, Y up")
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--provenance", type=Path, metavar="P.csv")
@@ -79,7 +79,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     if options.distance and not options.avoid:
         raise InputError("--distance", "without --avoid", "both", "add --avoid OTHER.bvh")
     if options.closed and options.control_points:
-        raise InputError("--closed", "with --control-points", "one of them", "a B-spline of control points has two ends")
+        raise InputError("--closed", "with --control-points", "one of them", "a B-spline has two ends")
     path, ground = _path(options), _ground(options)
     clip = bvh.read(options.input, options.unit)
     loaded = time.perf_counter()

@@ -23,8 +23,8 @@ _MOVING = 0.3  # m/s below which a body stands, and no speed is kept
 def figures(source, ridden, path, ground=None) -> dict:
     """All figures, None where nothing is known, as where the skeleton is no human body's. `before`: not yet planted.
 
-    path: the new path. ground: the Terrain that it stood on, None for the path's own height. Of a motion that begins anew
-    with its path only the first time is looked at: the others are the same, with a cut between.
+    path: the new path. ground: the Terrain that it stood on, None for the path's own height. Of a motion that begins
+    anew with its path only the first time is looked at: the others are the same, with a cut between.
     """
     ridden = ridden.once
     pelvis, own = (_pelvis(motion, source.humanoid) for motion in (ridden.motion, source.motion))
@@ -72,8 +72,9 @@ def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndar
 def _filled(line: np.ndarray) -> np.ndarray:
     """Places (M, 2) at most 1 cm apart along a line (T, 2); jumps of more than half a metre are left open."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    shares = [np.linspace(0.0, 1.0, max(int(step / _DENSE), 1), endpoint=False) if step < 0.5 else [0.0] for step in steps]
-    parts = [a + np.asarray(share)[:, None] * (b - a) for a, b, share in zip(line[:-1], line[1:], shares)]
+    counts = np.where(steps < 0.5, np.maximum(steps / _DENSE, 1.0), 1.0).astype(int)
+    shares = [np.arange(count) / count for count in counts]
+    parts = [a + share[:, None] * (b - a) for a, b, share in zip(line[:-1], line[1:], shares)]
     return np.concatenate([*parts, line[-1:]])
 
 
@@ -124,13 +125,14 @@ def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
         **_skate("source_", own, own_points, source.motion.fps, used),
         **_skate("before_", _foot_places(ridden.rigid), points, ridden.motion.fps),
     }
+    way = source.path.at(np.arange(len(own)) / source.motion.fps)
     stood, own_stood = points.all(axis=2), own_points.all(axis=2)
     correction = ridden.correction[points.any(axis=2)]
     return {
         "skate": skate,
         "ground_mm": {
             **_ground("", mine, stood, ridden.origin, source.motion, ground),
-            **_ground("source_", own, own_stood, source.path.at(np.arange(len(own)) / source.motion.fps), source.motion, None),
+            **_ground("source_", own, own_stood, way, source.motion, None),
         },
         "foot_correction_m": _spread(correction) if len(correction) else None,
         "ik_miss_share": float(np.mean(ridden.miss.max(axis=1) > MISSED)),
@@ -172,8 +174,8 @@ def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: 
 def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray, recording: Motion, ground) -> dict:
     """Heights of soles above the surface, mm: the deepest of any foot, the highest and the usual of standing ones.
 
-    The surface is that of `ground` under each foot; without it the path's own height where the path, origin (T, 3) m, is
-    nearest. A sole's height is that of its joints less what they have in the recording while the foot stands flat.
+    The surface is that of `ground` under each foot; without it the path's own height where the path, origin (T, 3) m,
+    is nearest. A sole's height is that of its joints less what they have in the recording while the foot stands flat.
     """
     surface = _surface(places, origin, ground)
     above = places - surface[..., None] * [0.0, 0.0, 1.0]

@@ -32,5 +32,6 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
         what = f"{len(line)} points, all at one place" if len(line) > 1 else f"{len(line)} points"
         raise InputError(path, what, "at least two rows under x_m,y_m[,z_m] that lie apart", "add points")
     if (length := np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) > _LONGEST:
-        raise InputError(path, f"a path of {length / 1000:.0f} km", f"at most {_LONGEST / 1000:.0f} km", "check the unit")
+        most = f"at most {_LONGEST / 1000:.0f} km"
+        raise InputError(path, f"a path of {length / 1000:.0f} km", most, "check the unit")
     return line

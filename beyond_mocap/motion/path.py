@@ -1,4 +1,5 @@
-"""Paths: smooth curves in space with a parameter, that a motion is told relative to and can be laid on (Path editing §3.1).
+"""Paths: smooth curves in space with a parameter, that a motion is told relative to and can be laid on (Path editing
+§3.1).
 
 A path lies on the ground under the body. Its parameter is seconds where it was fitted to a motion, and anything that
 rises along it where it was drawn; `arc_length` turns it into metres.
@@ -18,9 +19,9 @@ from .skeleton import frozen_array
 class Path:
     """A curve in space, twice continuously differentiable, also over the seam where it is closed.
 
-    domain: its first and last parameter. breaks: (K,) rising parameters, the domain's ends among them, between which it is
-    one polynomial. closed: whether it ends where it begins; then parameters beyond the domain go round, else they are
-    taken to its ends.
+    domain: its first and last parameter. breaks: (K,) rising parameters, the domain's ends among them, between which it
+    is one polynomial. closed: whether it ends where it begins; then parameters beyond the domain go round, else they
+    are taken to its ends.
     """
 
     domain: tuple[float, float]
@@ -28,7 +29,8 @@ class Path:
     closed: bool = False
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... how they change with the parameter."""
+        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... how they change with the
+        parameter."""
         raise NotImplementedError
 
     def _inside(self, u: np.ndarray) -> np.ndarray:
@@ -67,8 +69,9 @@ class PolynomialPath(Path):
 class SplinePath(Path):
     """A B-spline.
 
-    knots: (P + degree + 1,) not falling. coefficients: (P, 3) metres, its control points. degree: at least 1 (below 3 it
-    is less smooth than a Path is to be: what a user asks for). closed: the last `degree` control points repeat the first.
+    knots: (P + degree + 1,) not falling. coefficients: (P, 3) metres, its control points. degree: at least 1 (below 3
+    it is less smooth than a Path is to be: what a user asks for). closed: the last `degree` control points repeat the
+    first.
     """
 
     knots: np.ndarray

@@ -1,8 +1,8 @@
 """Smoothing splines: cubic B-splines near many values that pay for every bend (penalized least squares).
 
-Eilers and Marx 1996, with the exact integral of a derivative as the price (O'Sullivan 1986). On every piece of the curve
-value and price are squares of sums over the same four coefficients, so that all of it is one list of rows of four numbers,
-and one banded system.
+Eilers and Marx 1996, with the exact integral of a derivative as the price (O'Sullivan 1986). On every piece of the
+curve value and price are squares of sums over the same four coefficients, so that all of it is one list of rows of four
+numbers, and one banded system.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ def smoothing_spline(
     w |x - v|^2 plus stiff^(2 order) times the mean over the domain of |the derivative of that order|^2.
 
     values: (N, K). at: (N,) parameters, rising. pieces: how many of even width. stiff: in the parameter's unit; waves
-    shorter than some six times it are taken out. order: 2 or 3. weights: (N,), else 1. closed: the end joins the beginning
-    (`domain` then is one round, `pieces` at least 8). ends_met: the first and last value are kept exactly. domain: the
-    first and last parameter, else of `at`.
+    shorter than some six times it are taken out. order: 2 or 3. weights: (N,), else 1. closed: the end joins the
+    beginning (`domain` then is one round, `pieces` at least 8). ends_met: the first and last value are kept exactly.
+    domain: the first and last parameter, else of `at`.
     """
     low, high = domain or (float(at[0]), float(at[-1]))
     knots = _knots(low, high, pieces, closed)

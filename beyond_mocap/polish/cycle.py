@@ -1,12 +1,12 @@
 """A motion made to go on: a stretch of it shown again and again until a path is filled (Path editing §3.2.4).
 
-The document jumps from the last frame to the first (eq. 4.5) and finds the result poor (§5.3). Here the motion begins as
-recorded, jumps back at the end of a loop whose two ends look alike (`loops`), as often as it takes, and ends as recorded.
-At each jump one stretch gives way to the other for FADE_SECONDS on either side (`loop_fade`).
+The document jumps from the last frame to the first (eq. 4.5) and finds the result poor (§5.3). Here the motion begins
+as recorded, jumps back at the end of a loop whose two ends look alike (`loops`), as often as it takes, and ends as
+recorded. At each jump one stretch gives way to the other for FADE_SECONDS on either side (`loop_fade`).
 
 How often, and over which loop, is chosen so that the recorded end falls on the end of the path, with all strides made
-longer or shorter: by at most MOST_SCALE where the motion ends in another way than it goes on (it stops, it kicks), by at
-most KEPT_SCALE where its end is a step like the others. Where that cannot be, it is cut while it goes on steadily.
+longer or shorter: by at most MOST_SCALE where the motion ends in another way than it goes on (it stops, it kicks), by
+at most KEPT_SCALE where its end is a step like the others. Where that cannot be, it is cut while it goes on steadily.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ _OTHERS = 3  # times that another loop than the main one is run through, at most
 
 @dataclass(frozen=True, eq=False)
 class Cycled:
-    """residuals: the motion that goes on; seams (S,): its frames that are the first after a jump; scale: how much longer
-    its strides are than recorded; told: lines for the user."""
+    """residuals: the motion that goes on; seams (S,): its frames that are the first after a jump; scale: how much
+    longer its strides are than recorded; told: lines for the user."""
 
     residuals: Residuals
     seams: np.ndarray
@@ -84,7 +84,8 @@ def _filled(residuals: Residuals, loops: tuple[Loop, ...], wanted: float, most: 
     told = _seen(jumps)
     if length < wanted:
         minutes = len(shown) / residuals.fps / 60.0
-        told += (f"the path is {wanted:.0f} m long: the motion ends after {minutes:.0f} minutes and {length:.0f} m of it",)
+        ends = f"the motion ends after {minutes:.0f} minutes and {length:.0f} m of it"
+        told += (f"the path is {wanted:.0f} m long: {ends}",)
     if exact:
         scale = length / float(shown.step.sum())
         return Cycled(_scaled(shown, scale), seams, scale, (*told, *_other_strides(scale)))
@@ -132,7 +133,8 @@ def _cut(loop: Loop) -> tuple[str, ...]:
 
 
 def _good(residuals: Residuals, loops: tuple[Loop, ...]) -> tuple[Loop, ...]:
-    """The loops that are nearly as good as the best, without those that lead nowhere, as long as they are faded over."""
+    """The loops that are nearly as good as the best, without those that lead nowhere, as long as they are faded
+    over."""
     loops = tuple(loop for loop in loops if loop.metres > 0.1)
     most = _ALSO_GOOD[0] * loops[0].cost + _ALSO_GOOD[1] if loops else 0.0
     return tuple(_as_long_as_faded(residuals, loop) for loop in loops if loop.cost <= most)

@@ -112,12 +112,12 @@ def plant(
 ) -> Planted:
     """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn about
-    the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the pelvis is
-    lowered where that is not enough, by at most `sinks` metres. moves (T, 2, 4): metres by which each foot is moved before
-    that, and radians that its heel is turned up about its toe (`polish.steps`). levels: standing feet are brought to the
-    height of the ground and none goes below it; without, all keep the heights they have (a recording's own floor is uneven
-    by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth).
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn
+    about the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the
+    pelvis is lowered where that is not enough, by at most `sinks` metres. moves (T, 2, 4): metres by which each foot is
+    moved before that, and radians that its heel is turned up about its toe (`polish.steps`). levels: standing feet are
+    brought to the height of the ground and none goes below it; without, all keep the heights they have (a recording's
+    own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth).
     """
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
@@ -185,7 +185,8 @@ def turned_flat(foot: Foot, scale: float) -> Foot:
 def _goal(
     foot: Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m and tilt (T,) radians of the heel."""
+    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m and tilt (T,) radians of the
+    heel."""
     ground, weight = held_shift(foot.moves, weight, scale)
     moved = np.column_stack([ground, lift])
     rise = spread_over(heel_rise(foot, moved) * foot.weight[:, 1], spread) + tilt

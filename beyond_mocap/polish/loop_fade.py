@@ -50,8 +50,8 @@ def faded(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray]
 
 
 def faded_steps(residuals: Residuals, loop: Loop, reach: int) -> np.ndarray:
-    """(2 * reach,) metres since the frame before, such that the body's speed along the path is the mean of both stretches'
-    speeds although its place in the frame goes over from the one's to the other's."""
+    """(2 * reach,) metres since the frame before, such that the body's speed along the path is the mean of both
+    stretches' speeds although its place in the frame goes over from the one's to the other's."""
     both = _Stretches(len(residuals), loop, np.arange(-reach, reach), residuals.fps)
     along = residuals.place[:, 0]
     body = _since_before(residuals.step) + _since_before(np.diff(along, prepend=along[0]))
@@ -82,8 +82,8 @@ def _standing(a: np.ndarray, b: np.ndarray, come: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Stretches:
-    """The two stretches around a jump, each as far as the motion goes and carried on from there: around (R,) frames from
-    the jump on."""
+    """The two stretches around a jump, each as far as the motion goes and carried on from there: around (R,) frames
+    from the jump on."""
 
     count: int
     loop: Loop

@@ -2,8 +2,8 @@
 
 Compared are places and velocities of the main joints as seen from the path's moving frame, travelling with the body, in
 a window around both frames; which soles stand; and how far the body lies off its path. A motion graph (Kovar et al.
-2002) finds its transitions alike. The search is bounded: rough over at most two and a half million pairs, then exact around
-the best two dozen.
+2002) finds its transitions alike. The search is bounded: rough over at most two and a half million pairs, then exact
+around the best two dozen.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class Loop:
 
     apart: metres by which both differ (root mean square over joints, places and velocities, in a window around them);
     unlike: the same as a share of how far apart any two moments of the motion are; cost: the same in metres with what
-    else speaks against the loop; metres: arc length of once round; strides: how many strides that is, about; ending: how
-    unlike anything in the loop the motion's last moment is, on the scale of `unlike`.
+    else speaks against the loop; metres: arc length of once round; strides: how many strides that is, about; ending:
+    how unlike anything in the loop the motion's last moment is, on the scale of `unlike`.
     """
 
     start: int
@@ -123,7 +123,8 @@ def _period(features: np.ndarray, moving: np.ndarray, fps: float) -> float | Non
     if len(lags) < 3:
         return None
     apart = np.array([np.mean(np.sum((shown[lag:] - shown[:-lag]) ** 2, axis=1)) for lag in lags])
-    lowest = (apart[1:-1] <= apart[:-2]) & (apart[1:-1] < apart[2:]) & (apart[1:-1] < 0.25 * 2.0 * shown.var(axis=0).sum())
+    inner, usual = apart[1:-1], 2.0 * shown.var(axis=0).sum()
+    lowest = (inner <= apart[:-2]) & (inner < apart[2:]) & (inner < 0.25 * usual)
     return float(lags[1:-1][lowest][0]) if lowest.any() else None
 
 
@@ -141,7 +142,8 @@ def _features(residuals: Residuals) -> np.ndarray:
 
 
 def _feet(skeleton: Skeleton, features: np.ndarray) -> np.ndarray | None:
-    """(T, 2, 2) metres along and across the path from the pelvis to the left and right foot; None of an unknown body."""
+    """(T, 2, 2) metres along and across the path from the pelvis to the left and right foot; None of an unknown
+    body."""
     try:
         body = identify(skeleton)
     except InputError:
@@ -255,8 +257,8 @@ def _exact(
 def _soles_apart(
     residuals: Residuals, feet: np.ndarray | None, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of frames `start` (N,) and `end` (M,): (N, M) share of the soles that stand at one alone, and metres by which feet
-    that stand at both stand elsewhere under the body; feet (T, 2, 2)."""
+    """Of frames `start` (N,) and `end` (M,): (N, M) share of the soles that stand at one alone, and metres by which
+    feet that stand at both stand elsewhere under the body; feet (T, 2, 2)."""
     soles = residuals.standing.reshape(len(residuals), 4)
     wrong = (soles[start][:, None] != soles[end][None]).mean(axis=2)
     if feet is None:

@@ -38,9 +38,9 @@ def fit(motion: Motion, standing: np.ndarray, kind: str = "spline", degree: int 
 def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> PolynomialPath:
     """The polynomial of a degree that is nearest to places (T, 3) in metres at times (T,) in seconds, by least squares.
 
-    Legendre polynomials of time scaled to -1 .. 1 are nearly orthogonal over even frames, so that degree 45 is as exact as
-    degree 2. Where frames are so few for the degree that the polynomial would swing between them, they are filled up by a
-    cubic spline through them. InputError where the degree is below 1 or there are too few frames for it.
+    Legendre polynomials of time scaled to -1 .. 1 are nearly orthogonal over even frames, so that degree 45 is as exact
+    as degree 2. Where frames are so few for the degree that the polynomial would swing between them, they are filled up
+    by a cubic spline through them. InputError where the degree is below 1 or there are too few frames for it.
     """
     places, times = _checked(places, times)
     if not 1 <= degree <= len(times) - 1:
@@ -56,8 +56,8 @@ def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> Polyno
 
 
 def _dense(places: np.ndarray, times: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places (M, 3) at times (M,), so many that least squares at even times do not swing between them: twice the root of
-    their number is at least the degree (Dahlquist and Björck 1974)."""
+    """Places (M, 3) at times (M,), so many that least squares at even times do not swing between them: twice the root
+    of their number is at least the degree (Dahlquist and Björck 1974)."""
     if degree <= 2.0 * np.sqrt(len(times)):
         return places, times
     from scipy.interpolate import CubicSpline
@@ -68,15 +68,15 @@ def _dense(places: np.ndarray, times: np.ndarray, degree: int) -> tuple[np.ndarr
 
 
 def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) -> SplinePath:
-    """The smooth curve near places (T, 3) in metres at times (T,) in seconds: least squares, and a price on the change of
-    acceleration; what is left over is smoothed again and added, which makes the step from way to sway steeper (Tukey's
-    twicing). seconds: sets where that step is.
+    """The smooth curve near places (T, 3) in metres at times (T,) in seconds: least squares, and a price on the change
+    of acceleration; what is left over is smoothed again and added, which makes the step from way to sway steeper
+    (Tukey's twicing). seconds: sets where that step is.
 
-    A body rides as near to its new path as its own path is to it in the mean over a stride, so this is the root error of
-    all that follows. Measured on 14 recordings (CMU, LAFAN1, Bandai, runs, kicks), root error mean / 95 % in cm, and what
-    a sway of one stride a second loses: price on acceleration, 0.4 s: 0.5 to 9 / 1 to 27, 2 %; 0.2 s: 0.3 to 2 / 0.6 to 8,
-    29 %; this one: 0.2 to 1.2 / 0.3 to 2.5, 8 %. Its heading wobbles by a degree rms about its own mean over 1.5 s in
-    walks. Without the weight on the ends, where there are values on one side only, 0.2 to 1.4 / 0.5 to 4.3.
+    A body rides as near to its new path as its own path is to it in the mean over a stride, so this is the root error
+    of all that follows. Measured on 14 recordings (CMU, LAFAN1, Bandai, runs, kicks), root error mean / 95 % in cm, and
+    what a sway of one stride a second loses: price on acceleration, 0.4 s: 0.5 to 9 / 1 to 27, 2 %; 0.2 s: 0.3 to 2 /
+    0.6 to 8, 29 %; this one: 0.2 to 1.2 / 0.3 to 2.5, 8 %. Its heading wobbles by a degree rms about its own mean over
+    1.5 s in walks. Without the weight on the ends, where there are values on one side only, 0.2 to 1.4 / 0.5 to 4.3.
     """
     places, times = _checked(places, times)
     after, left = times - times[0], times[-1] - times
@@ -133,5 +133,6 @@ def _checked(places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndar
     if len(times) < 2 or not np.all(np.diff(times) > 0.0):
         raise InputError("path fit", f"{len(times)} frames", "two or more, one after the other")
     if not np.isfinite(places).all():
-        raise InputError("path fit", f"frame {np.flatnonzero(~np.isfinite(places).all(axis=1))[0]} is not finite", "metres")
+        wrong = np.flatnonzero(~np.isfinite(places).all(axis=1))[0]
+        raise InputError("path fit", f"frame {wrong} is not finite", "metres")
     return places, times

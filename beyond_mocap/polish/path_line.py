@@ -1,5 +1,5 @@
-"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along; and B-splines by
-their control points (Path editing §4.6.6).
+"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along; and B-splines
+by their control points (Path editing §4.6.6).
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ _ORDER = 3  # the change of the bend is what costs, so that a bend that stays is
 def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: bool = False) -> SplinePath:
     """The path along a polyline (N, 3) in metres, its parameter about metres along it.
 
-    name: for messages. Points that repeat each other are dropped; corners are rounded over some `rounding` metres; smooth
-    lines of radius 1 m or more are kept within a millimetre (up to 750 m of them), and an open line's ends exactly. closed: the last point is
-    joined to the first. InputError for fewer than two different points, values that are not finite, lines shorter than
-    SHORTEST.
+    name: for messages. Points that repeat each other are dropped; corners are rounded over some `rounding` metres;
+    smooth lines of radius 1 m or more are kept within a millimetre (up to 750 m of them), and an open line's ends
+    exactly. closed: the last point is joined to the first. InputError for fewer than two different points, values that
+    are not finite, lines shorter than SHORTEST.
     """
     line = _checked(line, name, closed)
     length = _along(line)[-1]
@@ -51,10 +51,12 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
 
 
 def b_spline(points: np.ndarray, degree: int) -> SplinePath:
-    """The B-spline of control points (P, 3) in metres that begins at the first and ends at the last; its parameter is 0 to 1.
+    """The B-spline of control points (P, 3) in metres that begins at the first and ends at the last; its parameter is 0
+    to 1.
 
-    Knots: each end's repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one, which does
-    not add up). InputError where the degree is below 1 or not below P, and where `through` refuses the control points.
+    Knots: each end's repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one, which
+    does not add up). InputError where the degree is below 1 or not below P, and where `through` refuses the control
+    points.
     """
     points = np.asarray(points, dtype=float)
     _checked(points, "control points", closed=False)
@@ -65,7 +67,8 @@ def b_spline(points: np.ndarray, degree: int) -> SplinePath:
 def control_points(path: Path, count: int, degree: int) -> np.ndarray:
     """The control points (count, 3) in metres of the B-spline nearest to a path, whose ends it meets; see `b_spline`.
 
-    Least squares over even steps of arc length, so that control points lie even too. InputError as there for the degree.
+    Least squares over even steps of arc length, so that control points lie even too. InputError as there for the
+    degree.
     """
     from scipy.interpolate import BSpline
 

@@ -92,8 +92,8 @@ def by_way(
 ) -> Timing:
     """As `by_arc_length`, with the steps that the new path asks for beyond what its own, `own` at every row, did.
 
-    The length s run on the new path, the length S of the motion and its row p at time t follow
-    ds / k(s) = dS / k_own(p), dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two sums and two inversions.
+    The length s run on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS /
+    k_own(p), dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two sums and two inversions.
     """
     k_own, r_own = _steps(own, wishes)
     k, r = _steps(new, wishes)

@@ -1,5 +1,5 @@
-"""Cycling: an exactly periodic gait is found with its period and goes on as if it had never ended; what has no stride is
-told."""
+"""Cycling: an exactly periodic gait is found with its period and goes on as if it had never ended; what has no stride
+is told."""
 
 from dataclasses import replace
 
@@ -22,8 +22,8 @@ PERIOD, FPS = 36, 30.0
 
 
 def planted(count, period=PERIOD, offset=0, drift=0.0):
-    """`count` frames of a gait that repeats every `period` frames exactly, from frame `offset` on; drift: metres a frame
-    by which the body leaves its path."""
+    """`count` frames of a gait that repeats every `period` frames exactly, from frame `offset` on; drift: metres a
+    frame by which the body leaves its path."""
     skeleton = adult_skeleton()
     body = identify(skeleton)
     frames = np.arange(offset, offset + count)

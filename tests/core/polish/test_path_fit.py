@@ -60,7 +60,8 @@ def test_what_cannot_be_fitted_is_refused(places, times):
 
 
 def test_a_sharp_turn_is_followed():
-    """Turns back at 4 m/s, as hard as a foot can push (8 m/s^2): off by a hand where it turns, and smooth again soon."""
+    """Turns back at 4 m/s, as hard as a foot can push (8 m/s^2): off by a hand where it turns, and smooth again
+    soon."""
     speed = np.clip(8.0 * (TIMES - 5.0), -4.0, 4.0)
     line = np.stack([np.cumsum(speed) / 60.0, 0 * TIMES, 0 * TIMES], axis=1)
     path = fit_spline(line + SWAY, TIMES)

@@ -13,7 +13,8 @@ FPS, COUNT = 30.0, 90
 
 @pytest.fixture
 def walking():
-    """Feet (T, 2, 2, 2) that stand for 15 frames and step 1 m ahead in 15, left and right in turn, and when they stand."""
+    """Feet (T, 2, 2, 2) that stand for 15 frames and step 1 m ahead in 15, left and right in turn, and when they
+    stand."""
     at = np.arange(COUNT)
     feet, standing = np.zeros((COUNT, 2, 2, 2)), np.zeros((COUNT, 2, 2), dtype=bool)
     for side, late in enumerate((0, 15)):
