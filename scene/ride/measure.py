@@ -49,12 +49,11 @@ def _keep(body: bpy.types.Object, figures: dict) -> None:
 
 
 def _tick() -> float:
-    window = next(iter(bpy.context.window_manager.windows), None)
-    if window is None or bpy.app.is_job_running("RENDER"):
+    if bpy.app.is_job_running("RENDER"):
         return LOOK
     if _running:
-        return _collect(window.scene)
-    waiting = next((body for body in riders(window.scene) if _waits(body)), None)
+        return _collect()
+    window, waiting = next(((window, body) for window, body in _seen() if _waits(body)), (None, None))
     if waiting is None:
         return LOOK
     shown = rides.shown(waiting)
@@ -68,6 +67,11 @@ def _tick() -> float:
     return WAIT
 
 
+def _seen() -> list[tuple[bpy.types.Window, bpy.types.Object]]:
+    """The riders of all windows' scenes."""
+    return [(window, body) for window in bpy.context.window_manager.windows for body in riders(window.scene)]
+
+
 def _waits(body: bpy.types.Object) -> bool:
     """Whether what is shown of a rider has been the same for a while, and is not measured."""
     shown, uid = rides.shown(body), body.session_uid
@@ -78,12 +82,12 @@ def _waits(body: bpy.types.Object) -> bool:
     return perf_counter() - _since[uid][1] > REST
 
 
-def _collect(scene: bpy.types.Scene) -> float:
+def _collect() -> float:
     job, uid, number = _running[0]
     if not job.poll():
         return WAIT
     _running.clear()
-    body = next((body for body in riders(scene) if body.session_uid == uid), None)
+    body = next((body for _, body in _seen() if body.session_uid == uid), None)
     shown = rides.shown(body) if body is not None else None
     if job.error is not None:
         _failed[uid] = number
