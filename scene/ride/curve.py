@@ -94,7 +94,7 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
         notes.append(f"curve {drawn.name}: its modifiers are not followed")
     if drawn.data.shape_keys is not None:
         notes.append(f"curve {drawn.name}: its shape keys are not followed")
-    if animated := _is_animated(drawn):
+    if animated := is_animated(drawn):
         notes.append(f"curve {drawn.name}: it moves; the motion rides it as it lay when it was edited last")
     world, units = np.array(drawn.matrix_world), units_per_metre(scene)
     points = _control_points(spline)
@@ -147,8 +147,8 @@ def create(
     return made
 
 
-def _is_animated(drawn: bpy.types.Object) -> bool:
-    """Whether a curve object goes elsewhere with the frame, by itself or with what it hangs on."""
+def is_animated(drawn: bpy.types.Object) -> bool:
+    """Whether an object, a curve or the ground, goes elsewhere with the frame, by itself or with what it hangs on."""
     known, waiting = set(), [drawn]
     while waiting:
         thing = waiting.pop()

@@ -27,7 +27,7 @@ class Shown:
     """What was worked out for a rider: plain numbers, in metres of the scene's world.
 
     first: scene frame of the first frame; fps; source, path, ridden: of the core; number: another each time it is worked
-    out.
+    out; told: lines for the user.
     """
 
     first: int
@@ -36,6 +36,7 @@ class Shown:
     path: object
     ridden: object
     number: int
+    told: str = ""
 
     @cached_property
     def source_line(self) -> np.ndarray:
@@ -97,6 +98,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
+        _tell(ridden_by, _shown[body.session_uid][1].told, None)  # what was wrong meanwhile is so no more
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
@@ -104,8 +106,10 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     if anew or not up_to_date:
         carrier.write(scene, known.read, ridden, digest)
     _counted += 1
-    _shown[body.session_uid] = digest, Shown(known.read.first, known.read.motion.fps, known.core, path, ridden, _counted)
-    _tell(ridden_by, "\n".join((*drawn.notes, *known.read.told, *ridden.warnings)), _figures(known.core, ridden))
+    first, fps = known.read.first, known.read.motion.fps
+    told = "\n".join((*drawn.notes, *source.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
+    _shown[body.session_uid] = digest, Shown(first, fps, known.core, path, ridden, _counted, told)
+    _tell(ridden_by, told, _figures(known.core, ridden))
     return True
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.errors import BeyondMocapError, InputError
 from ..measure import units_per_metre
-from . import keys
+from . import curve, keys
 from .carrier import Carrier, Read
 
 MADE_OF = ("fit", "degree", "frame")  # settings that the original's own path and the offsets from it depend on
@@ -28,19 +28,21 @@ class Source:
 
 _sources: dict[int, Source] = {}  # by session_uid of the armature
 _keys: dict[int, tuple[int, bytes]] = {}  # likewise: the original action and its keys' digest, until they may have changed
+_refused: dict[int, tuple[bytes, str]] = {}  # likewise: digest of what could not be read, and why
 _grounds: dict[int, tuple[bytes, object]] = {}  # by session_uid of the mesh object
 
 
 def forget() -> None:
     """Nothing is remembered any more: another file is open."""
     _sources.clear()
-    _keys.clear()
+    unsure()
     _grounds.clear()
 
 
 def unsure() -> None:
-    """Keys of any original may be others: they are looked at again."""
+    """Keys of any original may be others: they are looked at again, those too that could not be read."""
     _keys.clear()
+    _refused.clear()
 
 
 def of(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
@@ -57,15 +59,22 @@ def of(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
     known = _sources.get(uid)
     if known is not None and known.digest == digest:
         return known
+    if _refused.get(uid, (b"", ""))[0] == digest:
+        raise BeyondMocapError(_refused[uid][1])
     keys.refresh()
-    read = carrier.read(scene)
-    found = Source(read, prepare(read.motion, settings, read.standing), digest)
+    try:
+        read = carrier.read(scene)
+        found = Source(read, prepare(read.motion, settings, read.standing), digest)
+    except BeyondMocapError as error:  # to look at a rig is a change of frame: it would be looked at again and again
+        _refused[uid] = digest, str(error)
+        raise
     _sources[uid] = found
     return found
 
 
 def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> bytes:
-    """Another where the ground's mesh, as it is shown, is another. InputError where it was deleted."""
+    """Another where the ground's mesh, as it is shown, is another; not where its object is animated: it counts where it lay
+    when something was edited. InputError where it was deleted."""
     if ground is None:
         return b""
     if ground.name not in scene.objects:
@@ -78,8 +87,15 @@ def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> by
         corners.data.foreach_get("value", found)
         digest.update(found.tobytes() + len(mesh.polygons).to_bytes(8, "little"))
     shown.to_mesh_clear()
-    digest.update(np.array(shown.matrix_world).tobytes())
+    if not curve.is_animated(ground):
+        digest.update(np.array(shown.matrix_world).tobytes())
     return digest.digest()
+
+
+def ground_notes(ground: bpy.types.Object | None) -> tuple[str, ...]:
+    """Lines for the user."""
+    moves = ground is not None and curve.is_animated(ground)
+    return (f"ground {ground.name}: it moves; feet follow it as it lay when it was chosen or edited last",) if moves else ()
 
 
 def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: bytes):

@@ -650,3 +650,55 @@ def test_the_ground_counts_while_it_is_edited(scene, part):
     before = bits(part, body)[:3]
     assert live.follow(scene) == 0 and "without faces" in body.beyond_mocap_ride.told
     assert bits(part, body)[:3] == before
+    body.beyond_mocap_ride.ground = None
+    assert live.follow(scene) == 1 and body.beyond_mocap_ride.told == ""
+
+
+def test_what_was_wrong_is_told_no_more_once_all_is_as_before(scene, part):
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    empty = bpy.data.objects.new("Empty", bpy.data.meshes.new("Empty"))
+    scene.collection.objects.link(empty)
+    for ground, told in ((empty, "without faces"), (None, "")):
+        body.beyond_mocap_ride.ground = ground
+        bpy.context.view_layer.update()
+        assert live.follow(scene) == 0 and (told in body.beyond_mocap_ride.told if told else not body.beyond_mocap_ride.told)
+
+
+def test_a_ground_that_moves_with_time_does_not_change_the_motion_with_the_frame(scene, part):
+    live = part("ride.live")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    bpy.ops.mesh.primitive_plane_add(size=100.0)
+    floor = bpy.context.object
+    for frame, height in ((1, 0.0), (40, 1.0)):
+        floor.location.z = height
+        floor.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    body.beyond_mocap_ride.ground = floor
+    assert live.follow(scene) == 1 and "ground Plane: it moves" in body.beyond_mocap_ride.told
+    was = bits(part, body)[:3]
+    scene.frame_set(30)
+    assert live.follow(scene) == 0 and bits(part, body)[:3] == was
+
+
+def test_what_cannot_be_read_is_not_looked_at_again_and_again(scene, part, monkeypatch):
+    """A rig is looked at by changing frames, and each change is seen: it must not begin anew by itself."""
+    live, carrier, errors = part("ride.live"), part("ride.carrier"), part("ride.source")
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    looks = []
+
+    def fails(*_):
+        looks.append(1)
+        raise errors.InputError("motion", "unreadable")
+
+    monkeypatch.setattr(carrier.PlainCarrier, "read", fails)
+    body.beyond_mocap_ride.fit = "polynomial"
+    for _ in range(3):
+        assert live.follow(scene) == 0 and body.beyond_mocap_ride.told == "motion: unreadable"
+    assert len(looks) == 1
+    monkeypatch.undo()
+    choose(body)
+    assert bpy.ops.beyond_mocap.update_path() == {"FINISHED"} and body.beyond_mocap_ride.told == ""
