@@ -104,7 +104,8 @@ class RideSource:
 
     motion; standing (T, 2, 2) bool, left and right, heel and toe; path with seconds as its parameter; arc: its length;
     moving: its frame at every frame; residuals; frame: the one of FRAMES they are relative to; humanoid: whether it has
-    feet that can be planted; still: whether it goes nowhere; warnings.
+    feet that can be planted; still: whether it goes nowhere; sole: metres that the
+    foremost joint of a flat foot is over the ground; warnings.
     """
 
     motion: Motion
@@ -116,6 +117,7 @@ class RideSource:
     frame: str
     humanoid: bool
     still: bool
+    sole: float = 0.0
     warnings: tuple[str, ...] = ()
 
     @cached_property
@@ -199,7 +201,10 @@ def prepare(
         frames=np.arange(len(motion), dtype=float), turn=np.diff(moving.heading, prepend=moving.heading[:1]),
         under=under, up=up, fps=motion.fps, skeleton=motion.skeleton,
     )  # fmt: skip
-    return RideSource(motion, residuals.standing, path, arc, moving, residuals, settings.frame, humanoid, still, told)
+    sole = contacts.recorded_floor(motion)[1] if humanoid else 0.0
+    return RideSource(
+        motion, residuals.standing, path, arc, moving, residuals, settings.frame, humanoid, still, sole, told
+    )
 
 
 def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain | None = None) -> Ridden:
@@ -225,7 +230,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     if settings.plant and source.humanoid:
         under = _ground(path, arc, settings, ground, moving, timing, rows)
         steps, more = _steps(source, rows, moving, timing)
-        held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, steps)
+        held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, source.sole, steps)
         more = (*more, *_out_of_reach(held.miss, residuals.fps), *_beside(ground, origin))
         end = replace(end, told=(*end.told, *more))
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
@@ -410,6 +415,6 @@ def _fitted_any(motion: Motion, standing: np.ndarray, settings: RideSettings) ->
     """The path of a body without legs: its root's, as high as its lowest joint is in general."""
     places, _ = forward_kinematics(motion)
     line = motion.root_positions.copy()
-    line[:, 2] = np.percentile(places[..., 2].min(axis=1), 2)
+    line[:, 2] = contacts.at_zero(float(np.percentile(places[..., 2].min(axis=1), 2)))
     times = np.arange(len(line)) / motion.fps
     return fit_spline(line, times) if settings.fit == "spline" else fit_polynomial(line, times, settings.degree)

@@ -179,9 +179,8 @@ def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray,
     """
     surface = _surface(places, origin, ground)
     above = places - surface[..., None] * [0.0, 0.0, 1.0]
-    own_floor = foot_contacts.floor_height(recording)
-    rest = feet.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - own_floor
-    toe_rest = foot_contacts.sole_height(recording.skeleton)
+    floor, toe_rest = foot_contacts.recorded_floor(recording)
+    rest = feet.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - floor
     lower = np.minimum(above[..., 1, 2] - toe_rest, above[..., 0, 2] - max(rest, toe_rest))
     standing = lower[flat & np.isfinite(lower)]
     return {

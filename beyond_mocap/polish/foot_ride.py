@@ -14,7 +14,6 @@ from functools import lru_cache
 import numpy as np
 
 from ..motion import quaternion
-from ..motion.contacts import sole_height
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
@@ -95,11 +94,13 @@ def follow(
     standing: np.ndarray,
     fps: float,
     ground: Ground,
+    sole: float,
     steps: Steps | None = None,
 ) -> Planted:
     """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. steps: None where they are as long as they were.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. sole: metres that the foremost joint of a flat foot
+    is above its ground. steps: None where they are as long as they were.
     """
     legs, kept, limbs = _legs(skeleton)
     places, world = pose_kinematics(legs, root, rotations[:, kept])
@@ -108,7 +109,7 @@ def follow(
     if steps is not None:
         feet = [_stretched(foot, root, steps) for foot in feet]
     feet = [turned_flat(foot, scale) for foot in feet]
-    lifts = [_lift(foot, ground.own[:, side], sole_height(skeleton), scale) for side, foot in enumerate(feet)]
+    lifts = [_lift(foot, ground.own[:, side], sole, scale) for side, foot in enumerate(feet)]
     feet = [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)]
     lifted = np.mean(lifts, axis=0)
     firm = [foot.weight for foot in feet]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..motion.contacts import ground_height
+from ..motion.contacts import recorded_floor
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.path import Path, PolynomialPath, SplinePath
@@ -93,16 +93,17 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) 
 def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
     """Where the body is on the ground: (T, 3) metres, the pelvis's x and y and the height of the ground under it.
 
-    standing: (T, 2, 2) bool, left and right, heel and toe. Where the soles that stand lie within a hand's breadth of
+    standing: (T, 2, 2) bool, left and right, heel and toe. Level ground is as high as `contacts.recorded_floor`. Where the soles that stand lie within a hand's breadth of
     height, the ground is flat; else its height is that of the feet that stand, smoothed, and between stances a straight
     line over time.
     """
     body = identify(motion.skeleton)
     positions, _ = forward_kinematics(motion)
     places = positions[:, body.hips].copy()
-    places[:, 2] = ground_height(motion)
+    floor, sole = recorded_floor(motion)
+    places[:, 2] = floor
     feet = [(body.left.foot, body.left.toe_or_foot), (body.right.foot, body.right.toe_or_foot)]
-    heights = _soles(positions[..., 2][:, feet], standing, places[0, 2])
+    heights = _soles(positions[..., 2][:, feet] - sole, standing, floor)
     known = np.flatnonzero(np.isfinite(heights))
     if len(known) < 2 or np.ptp(np.percentile(heights[known], [5, 95])) <= _FLAT:
         return places

@@ -43,8 +43,8 @@ def off_the_ground(ridden, ground):
     """Metres (N,) that toes are above `ground`, a function of x, in feet that stand with their toes on it."""
     toe = foot_joints(ridden.motion.skeleton)[:, 1]
     now, before = (forward_kinematics(motion)[0][:, toe] for motion in (ridden.motion, ridden.rigid))
-    down = ridden.standing.all(axis=2) & (before[..., 2] - ridden.origin[:, 2:] < 0.004)
-    return (now[..., 2] - ground(now[..., 0]))[down]
+    down = ridden.standing.all(axis=2) & (before[..., 2] - ridden.origin[:, 2:] - ridden.source.sole < 0.004)
+    return (now[..., 2] - ground(now[..., 0]) - ridden.source.sole)[down]
 
 
 def along(path):
@@ -158,3 +158,12 @@ def test_who_has_no_legs_rides_all_the_same():
     assert len(ridden.motion) == 40 and any("legs" in told for told in ridden.warnings)
     over = ridden.motion.root_positions[:, 2] - ridden.origin[:, 2]
     assert np.allclose(over, 0.1 - box.moving.origin[0, 2], atol=1e-6)
+
+
+@pytest.mark.parametrize("height", (0.0, 1.0))
+def test_a_path_on_the_floor_leaves_soles_as_high_as_they_were(height, source):
+    """Toe joints are above the soles: a line drawn on the floor is under the shoes, not in them."""
+    low = [np.percentile(forward_kinematics(m)[0][:, foot_joints(m.skeleton)[:, 1], 2], 2) for m in (
+        source.motion, ride(source, line((0, 0, height), (9, 0, height)), RideSettings()).motion
+    )]
+    assert low[1] - height == pytest.approx(low[0], abs=0.003)

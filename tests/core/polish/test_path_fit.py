@@ -9,6 +9,7 @@ from beyond_mocap.errors import InputError
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.arc_length import ArcLength
 from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.motion import place
 from beyond_mocap.polish.path_fit import fit, fit_polynomial, fit_spline, places_on_ground
 
 TIMES = np.arange(600) / 60.0
@@ -43,11 +44,14 @@ def test_a_line_is_its_own_fit():
     assert np.abs(fit_spline(line, TIMES).at(TIMES) - line).max() < 1e-8
 
 
-def test_the_path_of_a_flat_walk_lies_on_its_ground():
-    motion = gait(1.4, 4.0, 30.0)
+@pytest.mark.parametrize("height, floor", [(0.0, 0.0), (0.03, 0.0), (2.0, 2.0), (-0.5, -0.5)])
+def test_the_path_of_a_flat_walk_lies_on_its_ground(height, floor):
+    """A floor at height 0 is where recordings have it; toe joints are some centimetres over it."""
+    motion = place(gait(1.4, 4.0, 30.0), offset=(0.0, 0.0, height))
+    assert contacts.recorded_floor(motion)[0] == pytest.approx(floor, abs=0.025)
     standing = contacts.points(motion)
     places = places_on_ground(motion, standing)
-    assert np.ptp(places[:, 2]) == 0.0 and abs(places[0, 2] - contacts.ground_height(motion)) < 1e-9
+    assert np.ptp(places[:, 2]) == 0.0 and abs(places[0, 2] - contacts.recorded_floor(motion)[0]) < 1e-9
     for path in (fit(motion, standing), fit(motion, standing, "polynomial", 5)):
         assert path.domain == pytest.approx((0.0, motion.duration))
         assert np.linalg.norm(path.at(np.arange(len(motion)) / 30.0) - places, axis=1).max() < 0.1
@@ -81,7 +85,7 @@ def test_the_heading_of_a_fitted_walk_does_not_wobble():
 def test_the_ground_under_a_walk_up_a_hill_rises_with_it(slope):
     motion = gait(1.4, 6.0, 30.0)
     standing = contacts.points(motion)
-    floor = contacts.ground_height(motion)
+    floor = contacts.recorded_floor(motion)[0]
     root = motion.root_positions.copy()
     root[:, 2] += slope * (root[:, 0] - root[0, 0])
     hill = replace(motion, root_positions=root)
