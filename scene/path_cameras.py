@@ -129,8 +129,8 @@ def take(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 
 def give_back(scene: bpy.types.Scene) -> None:
-    """The scene has the camera again that it had before `take`."""
-    before = _kept(scene).get(BEFORE)
+    """The scene has the camera again that it had before `take`, which is remembered no more."""
+    before = _kept(scene).pop(BEFORE, None)
     if before is not None and before.name in scene.objects:
         scene.camera = before
 

@@ -198,10 +198,10 @@ def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(core
     before = whole(part, rig)
     carrier = part("ride.carrier").carrier_of(rig)
     assert type(carrier).__name__ == "RigCarrier"
-    count = len(carrier.read(bpy.context.scene).motion)
+    seen = carrier.read(bpy.context.scene)
     assert whole(part, rig) == before  # looking changes nothing
+    count, first = len(seen.motion), seen.first
     frames = np.arange(0, count, STEP)
-    first = carrier.read(bpy.context.scene).first
     was = shown(rig, first + frames)
     read, _ = ride(rig, bent=False, plant=False, lean=False)
     now = shown(rig, first + frames)
