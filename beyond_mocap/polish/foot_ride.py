@@ -66,6 +66,7 @@ _FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
 _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stairs, in the mean
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004
+_FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recording's floor: waves of half a second pass half; metres
 _BEHIND = 0.1  # seconds by which a rise or drop is spread
 
 
@@ -109,9 +110,7 @@ def follow(
     if steps is not None:
         feet = [_stretched(foot, root, steps) for foot in feet]
     feet = [turned_flat(foot, scale) for foot in feet]
-    lifts = [_lift(foot, ground.own[:, side], sole, scale) for side, foot in enumerate(feet)]
-    feet = [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)]
-    lifted = np.mean(lifts, axis=0)
+    feet, lifted = _on_own_ground(feet, ground.own, sole, scale)
     firm = [foot.weight for foot in feet]
     for turn in range(_ROUNDS + 1):
         shifts = [held_shift(foot.moves, weight, scale, MOST_SHIFT)[0] for foot, weight in zip(feet, firm)]
@@ -172,10 +171,18 @@ def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
     return foot.moved(np.pad((much * ahead)[:, None] * along, ((0, 0), (0, 1))))
 
 
-def _lift(foot: Foot, own: np.ndarray, sole: float, scale: float) -> np.ndarray:
-    """Metres (T,) up that bring a standing foot onto its ground, `own` (T,) m high: the floors of recordings are
-    uneven."""
-    return lift_to_ground(foot.moved(-own[:, None] * _UP), sole, scale)
+def _on_own_ground(
+    feet: list[Foot], own: np.ndarray, sole: float, scale: float
+) -> tuple[list[Foot], np.ndarray]:
+    """Feet on their ground, `own` (T, 2) m high, since the floors of recordings are uneven and drift; metres (T,) by
+    which the body is off it: by as much as the feet that stand, and as they were in the air."""
+    above = [foot.moved(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
+    lifts = [lift_to_ground(foot, sole, scale) for foot in above]
+    weights = [foot.carries for foot in feet]
+    off = settled(sum(w * lift for w, lift in zip(weights, lifts)), sum(weights), scale, _FLOOR)
+    if np.abs(off).max(initial=0.0) > _EVEN:
+        lifts = [off + lift_to_ground(foot.moved(off[:, None] * _UP), sole, scale) for foot in above]
+    return [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)], off
 
 
 def _frames(seconds: float, fps: float) -> int:
@@ -188,7 +195,7 @@ def _on_ground(
     """Feet on their ground, metres (T,) by which the body goes up for that, and metres by which it may go down further;
     lifted (T,) m: by which the feet were lifted before."""
     if ground.surface is None:
-        up = _followed(lifted, fps)
+        up = lifted
         return [replace(foot, hip=foot.hip + up[:, None] * _UP) for foot in feet], up, MOST_DROP
     over = np.stack([np.stack([foot.heel, foot.toe], axis=1) for foot in feet], axis=1)
     clear = over[..., 2].min(axis=2) - ground.own
@@ -196,7 +203,7 @@ def _on_ground(
     rise = under.height - ground.own
     steep = _steepness(under.height, under.normal, fps)
     steeper = np.maximum(steep - _steepness(ground.own, ground.up, fps), 0.0)
-    up = _followed(lifted + rise.mean(axis=1) - SINK_BY_SLOPE * steeper, fps)
+    up = lifted + _followed(rise.mean(axis=1) - SINK_BY_SLOPE * steeper, fps)
     tip = quaternion.between(ground.up, under.normal)
     put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
     return put, up, MOST_DROP + DROP_BY_SLOPE * float(steep.max(initial=0.0))
