@@ -67,6 +67,7 @@ _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stair
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004
 _FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recording's floor: waves of half a second pass half; metres
+_NEAR, _FIRMER = 0.004, 3  # metres off its goal beyond which a standing foot is held more firmly, times in a row
 _BEHIND = 0.1  # seconds by which a rise or drop is spread
 
 
@@ -254,7 +255,13 @@ def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.nd
     room = SPARE * (1.0 - np.exp(-own / SPARE))
     left = room / _FIRM * np.logaddexp(0.0, _FIRM * (foot.length - far) / room)
     more = np.sqrt(left) - np.sqrt(own)
-    weight = np.where(foot.carries > 0.0, 1.0, np.where(more > 0.0, BENT_ALOFT, STRAIGHT_ALOFT))
-    bend = np.sqrt(own) + settled(weight * more, weight, scale, STIFF)
-    bend = 0.5 * (bend + np.sqrt(bend**2 + LEAST_BEND**2))
+    stands = foot.carries > 0.0
+    weight = np.where(stands, 1.0, np.where(more > 0.0, BENT_ALOFT, STRAIGHT_ALOFT))
+    for _ in range(_FIRMER + 1):
+        bend = np.sqrt(own) + settled(weight * more, weight, scale, STIFF)
+        bend = 0.5 * (bend + np.sqrt(bend**2 + LEAST_BEND**2))
+        off = np.where(stands, np.abs(foot.length - bend**2 - far), 0.0) / _NEAR
+        if off.max(initial=0.0) <= 1.0:
+            break
+        weight = weight * np.maximum(off, 1.0) ** 2
     return hip + line * ((foot.length - bend**2) / np.maximum(far, 1e-9))[:, None]
