@@ -29,6 +29,8 @@ from .polish.loops import Loop, find_loops
 from .polish.path_end import Ending, ending
 from .polish.path_fit import KINDS, fit, fit_polynomial, fit_spline
 from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
+from .polish.path_tight import curvature, steep, tight
+from .polish.path_tight import told as tight_told
 from .polish.path_time import (
     Timing,
     Way,
@@ -130,6 +132,11 @@ class RideSource:
         """The slopes and bends of its own path."""
         return way_of(self.path, self.arc)
 
+    @cached_property
+    def bends(self) -> np.ndarray:
+        """(T,) 1/m: how much its own path bends over the ground."""
+        return curvature(self.path, np.arange(len(self.motion)) / self.motion.fps)
+
 
 @dataclass(frozen=True, eq=False)
 class Ridden:
@@ -228,10 +235,11 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         rotations = _leaned(source, rows, moving, timing, rotations, seams)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     if settings.plant and source.humanoid:
+        rows, strained = _released(source, path, at, tangent, timing, rows)
         under = _ground(path, arc, settings, ground, moving, timing, rows)
         steps, more = _steps(source, rows, moving, timing)
         held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, source.sole, steps)
-        more = (*more, *_out_of_reach(held.miss, residuals.fps), *_beside(ground, origin))
+        more = (*strained, *more, *_out_of_reach(held.miss, residuals.fps), *_beside(ground, origin))
         end = replace(end, told=(*end.told, *more))
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
@@ -318,6 +326,21 @@ def _leaned(
         forward = np.clip(INTO_SLOPE * steeper, -MOST_FORWARD, MOST_FORWARD)
         rotations = bent_forward(rows.skeleton, rotations, moving.heading, forward)
     return rotations
+
+
+def _released(
+    source: RideSource, path: Path, at: np.ndarray, tangent: np.ndarray, timing: Timing, rows: Residuals
+) -> tuple[Residuals, tuple[str, ...]]:
+    """The rows with nobody standing where no foot could follow the path, and what is told of that."""
+    if path is source.path or source.still:
+        return rows, ()
+    own = np.interp(rows.frames, np.arange(len(source.bends)), source.bends)
+    slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
+    bent, risen = tight(path, at, timing.arc, own), steep(tangent, timing.arc, slope)
+    free = bent | risen
+    if not free.any():
+        return rows, ()
+    return rows.changed(standing=rows.standing & ~free[:, None, None]), tight_told(bent, risen, rows.fps)
 
 
 def _steps(

@@ -33,7 +33,7 @@ from .foot_plant import (
     spread_over,
     turned_flat,
 )
-from .reach import bent_limb
+from .reach import CLEAR_BEND, bent_limb
 from .underfoot import Footing, Surface, footing
 
 MOST_SHIFT = 0.45
@@ -59,7 +59,7 @@ BENT_ALOFT, STRAIGHT_ALOFT, STIFF = 0.2, 0.01, 0.05
 """Weights of what the goals ask of a leg in the air, bent more or straighter than it was, against 1 on the ground, and
 of a smooth course."""
 
-LEAST_BEND = 0.01
+LEAST_BEND = 0.05
 """Root of the metres that a leg always lacks to its full length."""
 
 _FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
@@ -68,6 +68,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004
 _FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recording's floor: waves of half a second pass half; metres
 _NEAR, _FIRMER = 0.004, 3  # metres off its goal beyond which a standing foot is held more firmly, times in a row
+_MORE_BENT = 0.5  # share of its new bend from which on a leg's own direction counts fully
 _BEHIND = 0.1  # seconds by which a rise or drop is spread
 
 
@@ -132,7 +133,8 @@ def follow(
         hip = foot.hip - drop[:, None] * _UP
         target = _eased(foot, goal, hip, scale)
         joints = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        found, _ = bent_limb(legs, places, world, joints, target, end_rotation=turned, soft=1e-4)
+        clear = _clear_bend(foot, np.linalg.norm(target - hip, axis=1))
+        found, _ = bent_limb(legs, places, world, joints, target, end_rotation=turned, soft=1e-4, clear=clear)
         for joint, local in found.items():
             out[:, kept[joint]] = local
         miss[:, side] = np.where(foot.carries > 0.0, np.linalg.norm(target - goal, axis=1), 0.0)
@@ -240,6 +242,12 @@ def _goal(foot: Foot, spread: int) -> tuple[np.ndarray, np.ndarray]:
     rise = spread_over(heel_rise(foot, np.zeros((1, 3))) * foot.weight[:, 1], spread)
     roll = quaternion.about_axis(foot.left, rise)
     return foot.toe + quaternion.rotate(roll, foot.heel - foot.toe), quaternion.multiply(roll, foot.rotation)
+
+
+def _clear_bend(foot: Foot, far: np.ndarray) -> np.ndarray:
+    """(T,) share of a leg's length by which its knee was to be off the line hip-ankle for its direction to be believed;
+    far (T,) m: how long the leg is to be. Of a leg that bends much more than it did the direction's tremble grows."""
+    return np.maximum(CLEAR_BEND, 0.5 * _MORE_BENT * np.sqrt(np.maximum(1.0 - (far / foot.length) ** 2, 0.0)))
 
 
 def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.ndarray:

@@ -16,7 +16,7 @@ from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 
 # below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
-_CLEAR_BEND = 0.06
+CLEAR_BEND = 0.06
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +72,16 @@ def bent_limb(
     keep_end_rotation: bool = True,
     pole: np.ndarray | None = None,
     soft: float | np.ndarray = 0.01,
+    clear: float | np.ndarray = CLEAR_BEND,
 ) -> tuple[dict[int, np.ndarray], np.ndarray]:
     """As `two_bone`, of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known, those of the limb
-    at least: the new local rotations (T, 4) by joint, and the miss (T,) m."""
+    at least: the new local rotations (T, 4) by joint, and the miss (T,) m. clear, one or (T,): share of the limb's
+    length by which a knee has to be off the line hip-ankle for its direction to be believed."""
     upper, middle, end = joints
     target = np.asarray(target, dtype=float)
     top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
     lengths = (np.linalg.norm(knee - top, axis=-1), np.linalg.norm(ankle - knee, axis=-1))
-    old_pole = _own_pole(top, knee, ankle, world[:, upper])
+    old_pole = _own_pole(top, knee, ankle, world[:, upper], clear)
     swing = quaternion.between(ankle - top, target - top)
     new_pole = quaternion.rotate(swing, old_pole) if pole is None else np.asarray(pole, dtype=float)
     new_knee, new_ankle, new_hinge = limb.bend(top, target, *lengths, new_pole, soft)
@@ -135,7 +137,9 @@ def _frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     return limb.bone_frame(limb.unit(direction, np.array([0.0, 0.0, -1.0])), hinge)
 
 
-def _own_pole(top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray) -> np.ndarray:
+def _own_pole(
+    top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray, clear: float | np.ndarray
+) -> np.ndarray:
     """Direction (T, 3) in which the middle joint points in the given pose, unit, square to the line top-ankle.
 
     A nearly straight limb says little: there the direction is mixed with the mean one of all frames, carried by the
@@ -152,6 +156,6 @@ def _own_pole(top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world:
     steady = limb.unit(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
     # a frame that bends the other way, as blended poses may, is not believed: its knee would flip
     right_way = np.sum(limb.unit(off, steady) * steady, axis=-1, keepdims=True)
-    weight = np.clip(bent / _CLEAR_BEND, 0.0, 1.0) ** 2 * np.clip(2.0 * right_way, 0.0, 1.0)
+    weight = np.clip(bent / np.reshape(clear, (-1, 1)), 0.0, 1.0) ** 2 * np.clip(2.0 * right_way, 0.0, 1.0)
     mixed = weight * limb.unit(off, steady) + (1.0 - weight) * steady
     return limb.unit(mixed, steady)

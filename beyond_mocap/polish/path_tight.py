@@ -1,0 +1,78 @@
+"""Where a path bends more tightly, or climbs more steeply, than feet can follow: nobody is planted there, and it is
+told."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import TimedLine
+from ..motion.path import Path
+from ..motion.runs import runs
+
+TIGHT = 0.3
+"""Metres of radius, about a foot's length, below which a bend is too tight to walk on."""
+
+STEEP = 60.0
+"""Degrees from which on a path is no ground."""
+
+LASTING = 0.5
+"""Metres of path, within a metre, that have to be so: a single corner is only a corner."""
+
+_JOINED = 0.5  # seconds between two such stretches that are told as one
+_AS_OWN = 1.5  # times the own path's curvature up to which a bend is the motion's own
+
+
+def tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """(T,) bool: frames within a tight stretch. at (T,): the path's parameters, arc (T,) m passed until then, own (T,)
+    1/m: how much the motion's own path bends there: what it could do it still can."""
+    bend = curvature(path, at)
+    return _lasting((bend > 1.0 / TIGHT) & (bend > _AS_OWN * own), arc)
+
+
+def steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """(T,) bool: frames within a steep stretch; tangent (T, 3) of any length, own (T,) radians the slope of the motion's
+    own path."""
+    slope = np.arctan2(np.abs(tangent[:, 2]), np.linalg.norm(tangent[:, :2], axis=1))
+    return _lasting((slope > np.radians(STEEP)) & (slope > _AS_OWN * np.abs(own)), arc)
+
+
+def curvature(path: Path, at: np.ndarray) -> np.ndarray:
+    """(T,) 1/m: how much a path bends over the ground at parameters `at` (T,)."""
+    first, second = path.at(at, 1)[:, :2], path.at(at, 2)[:, :2]
+    cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return np.abs(cross) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
+
+
+def told(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:
+    """One line for each kind of stretch, with its seconds; tight and steep (T,) bool."""
+    lines = []
+    for which, what in (
+        (tight, f"the path bends more tightly than {TIGHT:g} m radius"),
+        (steep, f"the path is steeper than {STEEP:g} degrees"),
+    ):
+        spans = [(first / fps, (end - 1) / fps) for first, end in runs(_joined(which, int(_JOINED * fps)))]
+        if spans:
+            more = f" and {len(spans) - 1} times more" if len(spans) > 1 else ""
+            when = f"from {spans[0][0]:.1f} s to {spans[0][1]:.1f} s{more}"
+            lines.append(TimedLine(f"{what} {when}: feet are not planted there; smooth the path", *spans))
+    return tuple(lines)
+
+
+def _lasting(bad: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    """`bad` (T,) where it goes on for LASTING metres within the metre around it."""
+    if not bad.any():
+        return bad
+    step = np.abs(np.diff(arc, prepend=arc[:1]))
+    way, passed = np.cumsum(step * bad), np.cumsum(step)
+    within = np.interp(passed + 0.5, passed, way) - np.interp(passed - 0.5, passed, way)
+    return within >= LASTING
+
+
+def _joined(which: np.ndarray, gap: int) -> np.ndarray:
+    """`which` (T,) with gaps of at most `gap` frames between two true ones filled."""
+    out = which.copy()
+    spans = runs(which)
+    for (_, end), (first, _) in zip(spans[:-1], spans[1:]):
+        if first - end <= gap:
+            out[end:first] = True
+    return out
