@@ -24,12 +24,13 @@ from .motion.track import zero_phase_hann
 from .polish.banking import banked, bent_forward, missing_lean
 from .polish.cycle import cycled
 from .polish.detour import with_detours
+from .polish.foot_plant import Planted
 from .polish.foot_ride import LONGEST, Ground, Steps, follow
 from .polish.loops import Loop, find_loops
 from .polish.path_end import Ending, ending
 from .polish.path_fit import KINDS, fit, fit_polynomial, fit_spline
 from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
-from .polish.path_tight import curvature, steep, tight
+from .polish.path_tight import curvature, share, steep, tight
 from .polish.path_tight import told as tight_told
 from .polish.path_time import (
     Timing,
@@ -235,10 +236,13 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         rotations = _leaned(source, rows, moving, timing, rotations, seams)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     if settings.plant and source.humanoid:
-        rows, strained = _released(source, path, at, tangent, timing, rows)
+        free, strained = _strained(source, path, at, tangent, timing, rows)
         under = _ground(path, arc, settings, ground, moving, timing, rows)
-        steps, more = _steps(source, rows, moving, timing)
+        steps, more = _steps(source, rows, moving, timing, free)
         held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, source.sole, steps)
+        if free.any():
+            held = _let_go(held, root, rotations, free, residuals.fps)
+            rows = rows.changed(standing=rows.standing & ~free[:, None, None])
         more = (*strained, *more, *_out_of_reach(held.miss, residuals.fps), *_beside(ground, origin))
         end = replace(end, told=(*end.told, *more))
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
@@ -328,31 +332,38 @@ def _leaned(
     return rotations
 
 
-def _released(
+def _strained(
     source: RideSource, path: Path, at: np.ndarray, tangent: np.ndarray, timing: Timing, rows: Residuals
-) -> tuple[Residuals, tuple[str, ...]]:
-    """The rows with nobody standing where no foot could follow the path, and what is told of that."""
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Frames (N,) bool in which no foot could follow the path, and what is told of them."""
     if path is source.path or source.still:
-        return rows, ()
+        return np.zeros(len(rows), dtype=bool), ()
     own = np.interp(rows.frames, np.arange(len(source.bends)), source.bends)
     slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
-    bent, risen = tight(path, at, timing.arc, own), steep(tangent, timing.arc, slope)
-    free = bent | risen
-    if not free.any():
-        return rows, ()
-    return rows.changed(standing=rows.standing & ~free[:, None, None]), tight_told(bent, risen, rows.fps)
+    bent = tight(path, at, timing.arc, own, rows.fps)
+    risen = steep(tangent, timing.arc, slope, rows.fps)
+    return bent | risen, tight_told(bent, risen, rows.fps)
+
+
+def _let_go(held: Planted, root: np.ndarray, rotations: np.ndarray, free: np.ndarray, fps: float) -> Planted:
+    """The planted motion, but where it is `free` (N,) bool as it was laid out: root (N, 3) m, rotations (N, J, 4)."""
+    much = share(free, fps)[:, None]
+    turned = quaternion.slerp(held.rotations, rotations, much)
+    miss = np.where(free[:, None], 0.0, held.miss)
+    return Planted(held.root + much * (root - held.root), turned, (1.0 - much) * held.correction, miss)
 
 
 def _steps(
-    source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing
+    source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing, free: np.ndarray
 ) -> tuple[Steps | None, tuple[str, ...]]:
-    """How long steps are on the new path, against their own, and what of that legs cannot do."""
+    """How long steps are on the new path, against their own, and what of that legs cannot do; free (N,) bool: where no
+    feet are planted."""
     slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
     own = rows.step * np.cos(slope)
     times = stretched(np.diff(timing.arc, prepend=timing.arc[:1]) * np.cos(moving.slope), own, rows.fps)
     if times is None:
         return None, ()
-    worst = np.maximum(times / LONGEST[1], LONGEST[0] / np.maximum(times, 1e-3)) > 1.05
+    worst = (np.maximum(times / LONGEST[1], LONGEST[0] / np.maximum(times, 1e-3)) > 1.05) & ~free
     told = []
     for first, end in runs(worst):
         span = first / rows.fps, (end - 1) / rows.fps

@@ -67,7 +67,7 @@ _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stair
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004
 _FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recording's floor: waves of half a second pass half; metres
-_NEAR, _FIRMER = 0.004, 3  # metres off its goal beyond which a standing foot is held more firmly, times in a row
+_NEAR, _FIRMER = 0.004, 8  # metres off its goal beyond which a standing foot is held more firmly, times in a row
 _MORE_BENT = 0.5  # share of its new bend from which on a leg's own direction counts fully
 _BEHIND = 0.1  # seconds by which a rise or drop is spread
 

@@ -4,6 +4,7 @@ told."""
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from ..errors import TimedLine
 from ..motion.path import Path
@@ -18,22 +19,23 @@ STEEP = 60.0
 LASTING = 0.5
 """Metres of path, within a metre, that have to be so: a single corner is only a corner."""
 
-_JOINED = 0.5  # seconds between two such stretches that are told as one
+_JOINED = 0.5  # seconds between two such stretches that are one
+_FADE = 0.12  # seconds, twice of which go by from feet that are planted to feet that are not
 _AS_OWN = 1.5  # times the own path's curvature up to which a bend is the motion's own
 
 
-def tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray) -> np.ndarray:
+def tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
     """(T,) bool: frames within a tight stretch. at (T,): the path's parameters, arc (T,) m passed until then, own (T,)
     1/m: how much the motion's own path bends there: what it could do it still can."""
     bend = curvature(path, at)
-    return _lasting((bend > 1.0 / TIGHT) & (bend > _AS_OWN * own), arc)
+    return _lasting((bend > 1.0 / TIGHT) & (bend > _AS_OWN * own), arc, fps)
 
 
-def steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """(T,) bool: frames within a steep stretch; tangent (T, 3) of any length, own (T,) radians the slope of the motion's
-    own path."""
+def steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) bool: frames within a steep stretch; tangent (T, 3) of any length, own (T,) radians the slope of the
+    motion's own path."""
     slope = np.arctan2(np.abs(tangent[:, 2]), np.linalg.norm(tangent[:, :2], axis=1))
-    return _lasting((slope > np.radians(STEEP)) & (slope > _AS_OWN * np.abs(own)), arc)
+    return _lasting((slope > np.radians(STEEP)) & (slope > _AS_OWN * np.abs(own)), arc, fps)
 
 
 def curvature(path: Path, at: np.ndarray) -> np.ndarray:
@@ -43,6 +45,14 @@ def curvature(path: Path, at: np.ndarray) -> np.ndarray:
     return np.abs(cross) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
 
 
+def share(free: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) from 0 to 1: how far within the stretches `free` (T,) bool a frame is, smoothly from their borders on."""
+    wide = int(round(_FADE * fps))
+    inner = minimum_filter1d(free.astype(float), 2 * wide + 1, mode="nearest")
+    window = np.hanning(2 * wide + 3)[1:-1]
+    return np.convolve(np.pad(inner, wide, mode="edge"), window / window.sum(), mode="valid")
+
+
 def told(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:
     """One line for each kind of stretch, with its seconds; tight and steep (T,) bool."""
     lines = []
@@ -50,7 +60,7 @@ def told(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, .
         (tight, f"the path bends more tightly than {TIGHT:g} m radius"),
         (steep, f"the path is steeper than {STEEP:g} degrees"),
     ):
-        spans = [(first / fps, (end - 1) / fps) for first, end in runs(_joined(which, int(_JOINED * fps)))]
+        spans = [(first / fps, (end - 1) / fps) for first, end in runs(which)]
         if spans:
             more = f" and {len(spans) - 1} times more" if len(spans) > 1 else ""
             when = f"from {spans[0][0]:.1f} s to {spans[0][1]:.1f} s{more}"
@@ -58,19 +68,20 @@ def told(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, .
     return tuple(lines)
 
 
-def _lasting(bad: np.ndarray, arc: np.ndarray) -> np.ndarray:
+def _lasting(bad: np.ndarray, arc: np.ndarray, fps: float) -> np.ndarray:
     """`bad` (T,) where it goes on for LASTING metres within the metre around it."""
     if not bad.any():
         return bad
     step = np.abs(np.diff(arc, prepend=arc[:1]))
     way, passed = np.cumsum(step * bad), np.cumsum(step)
-    within = np.interp(passed + 0.5, passed, way) - np.interp(passed - 0.5, passed, way)
-    return within >= LASTING
+    first = np.clip(passed - 0.5, 0.0, max(passed[-1] - 1.0, 0.0))
+    within = np.interp(first + 1.0, passed, way) - np.interp(first, passed, way)
+    return _joined(within >= LASTING, fps)
 
 
-def _joined(which: np.ndarray, gap: int) -> np.ndarray:
-    """`which` (T,) with gaps of at most `gap` frames between two true ones filled."""
-    out = which.copy()
+def _joined(which: np.ndarray, fps: float) -> np.ndarray:
+    """`which` (T,) with gaps of at most _JOINED seconds between two true ones filled."""
+    out, gap = which.copy(), int(_JOINED * fps)
     spans = runs(which)
     for (_, end), (first, _) in zip(spans[:-1], spans[1:]):
         if first - end <= gap:

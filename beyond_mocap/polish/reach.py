@@ -74,8 +74,8 @@ def bent_limb(
     soft: float | np.ndarray = 0.01,
     clear: float | np.ndarray = CLEAR_BEND,
 ) -> tuple[dict[int, np.ndarray], np.ndarray]:
-    """As `two_bone`, of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known, those of the limb
-    at least: the new local rotations (T, 4) by joint, and the miss (T,) m. clear, one or (T,): share of the limb's
+    """As `two_bone`, of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known, those of the
+    limb at least: the new local rotations (T, 4) by joint, and the miss (T,) m. clear, one or (T,): share of the limb's
     length by which a knee has to be off the line hip-ankle for its direction to be believed."""
     upper, middle, end = joints
     target = np.asarray(target, dtype=float)

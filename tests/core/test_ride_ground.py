@@ -167,3 +167,22 @@ def test_a_path_on_the_floor_leaves_soles_as_high_as_they_were(height, source):
         source.motion, ride(source, line((0, 0, height), (9, 0, height)), RideSettings()).motion
     )]
     assert low[1] - height == pytest.approx(low[0], abs=0.003)
+
+
+def test_a_floor_that_drifts_upwards_in_the_recording_lets_nobody_sink_or_stretch(source):
+    """A recording whose floor rises by 8 cm under a path that does not: on the ground he walks as high as ever."""
+    walk = source.motion
+    rise = 0.08 * np.clip(np.linspace(-1.0, 2.0, len(walk)), 0.0, 1.0)
+    risen = Motion(walk.skeleton, walk.root_positions + rise[:, None] * [0, 0, 1], walk.rotations, walk.fps)
+    drifted = prepare(risen, RideSettings(), source.standing, source.path)
+    level = line((0, 0, 0), (9, 0, 0))
+    asked, found = (ride(of, level, RideSettings(lean=False)) for of in (source, drifted))
+    assert np.abs(found.motion.root_positions - asked.motion.root_positions)[:, 2].max() < 0.02
+    assert found.miss.max() < 0.005
+
+
+@pytest.mark.parametrize("speed", [3.0, 6.0])
+def test_whoever_runs_up_a_hill_reaches_where_he_should_stand(speed):
+    runner = prepare(gait(speed, 3.0, 120.0), RideSettings())
+    ridden = ride(runner, line((0, 0, 0), (6, 0, 1.6), (18, 0, 0)), RideSettings())
+    assert ridden.miss.max() < 0.005

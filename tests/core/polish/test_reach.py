@@ -8,7 +8,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.polish.reach import two_bone
+from beyond_mocap.polish.reach import CLEAR_BEND, bent_limb, two_bone
 
 
 @pytest.fixture(scope="module")
@@ -150,3 +150,27 @@ def test_a_knee_that_bends_backwards_in_one_frame_does_not_flip():
     out = two_bone(motion.skeleton, motion.root_positions, rotations, chain, places[:, limb.foot]).rotations
     knees = pose_kinematics(motion.skeleton, motion.root_positions, out)[0][:, limb.lower_leg]
     assert np.abs(knees - places[:, limb.lower_leg]).max() < 0.08
+
+
+def test_a_leg_that_bends_more_than_it_did_keeps_its_knee_steady():
+    """A leg a centimetre short of straight whose knee trembles by 20 degrees, bent by ten more."""
+    motion = gait(1.4, 2.0, 60.0)
+    places, world = (values.copy() for values in kinematics(motion, motion.rotations))
+    upper, middle, end = leg(motion)
+    lengths = [np.linalg.norm(places[0, b] - places[0, a]) for a, b in ((upper, middle), (middle, end))]
+    count = len(places)
+    trembles = np.radians(20.0) * (-1.0) ** np.arange(count)
+    off = 0.05 * np.stack([np.cos(trembles), np.sin(trembles), np.zeros(count)], axis=1)
+    down = np.array([0.0, 0.0, -1.0])
+    places[:, upper], world[:, upper] = 0.0, quaternion.identity(count)
+    places[:, middle] = off + np.sqrt(lengths[0] ** 2 - 0.05**2) * down
+    places[:, end] = places[:, middle] - off + np.sqrt(lengths[1] ** 2 - 0.05**2) * down
+    target = places[:, end] - 0.1 * down
+    swings = []
+    for clear in (CLEAR_BEND, np.full(count, 0.2)):
+        local, miss = bent_limb(motion.skeleton, places, world, (upper, middle, end), target, soft=1e-4, clear=clear)
+        bone = motion.skeleton.offsets[middle]
+        thigh = quaternion.multiply(world[:, motion.skeleton.parents[upper]], local[upper])
+        swings.append(np.ptp(quaternion.rotate(thigh, np.tile(bone, (count, 1)))[:, 1]))
+        assert miss.max() < 1e-3
+    assert swings[1] < 0.5 * swings[0]
