@@ -10,18 +10,20 @@ from ..errors import InputError
 from .tables import number, read_rows
 
 COLUMNS = ("x_m", "y_m", "z_m")
+_SHORT = {name[0]: name for name in COLUMNS}
 _SAME, _LONGEST = 1e-6, 1e5  # metres
 
 
 def read_curve(path: str | os.PathLike) -> np.ndarray:
     """(N, 3) metres, N >= 2: the points of a CSV file in the order of its rows, in the pitch's frame, z 0 where the
-    column is missing; other columns are ignored.
+    column is missing; other columns are ignored. The columns may also be named x, y and z, and be separated by semicolons
+    or tabs; then numbers may have decimal commas.
 
     InputError, with the line, where a cell is no number or lies beyond 10 km; where fewer than two different points are
     given, or more than 100 km in all.
     """
     names, points = COLUMNS[:2], []
-    for place, row in read_rows(path, names):
+    for place, row in read_rows(path, names, _SHORT, ",;\t"):
         if not points:
             names = COLUMNS if "z_m" in row else names
         points.append([number(row[name], name, place) for name in names])

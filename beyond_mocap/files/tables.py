@@ -10,9 +10,11 @@ import io
 import json
 import math
 import os
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -26,6 +28,8 @@ PROVENANCE_COLUMNS = (
     "frame", "time_s", "clip", "clip_frame", "mirrored", "labels", "contact_left", "contact_right",
 )  # fmt: skip
 _FARTHEST = 1e4  # metres
+_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ": "spaces"}
+_WITH_COMMA = re.compile(r"^([+-]?\d*),(\d*(?:[eE][+-]?\d+)?)$")
 _LATEST = 1e11  # seconds: feeds count from kick-off, some from 1970
 
 
@@ -124,14 +128,22 @@ def plain(value):
     return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
 
 
-def read_rows(path: str | os.PathLike, required: Sequence[str]) -> Iterable[tuple[str, dict[str, str]]]:
+def read_rows(
+    path: str | os.PathLike, required: Sequence[str], others: Mapping[str, str] = MappingProxyType({}),
+    separators: str = ",",
+) -> Iterable[tuple[str, dict[str, str]]]:
     """(place, row) for every row of a CSV file that is not empty; place is `file:line`, names and cells are stripped.
+
+    others: other names that stand for `required` ones, or for more. separators: the first with which the header is one
+    counts; with others than a comma, a comma in a number is its decimal point, as spreadsheets of many countries have it.
 
     InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells.
     """
-    reader = csv.reader(io.StringIO(_text(path), newline=""))
+    text = _text(path)
+    separator = next((one for one in separators if not _missing(_header(text, one, others), required)), ",")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
     try:
-        names = [name.strip() for name in next(reader, [])]
+        names = _named(next(reader, []), others)
         _check_header(names, required, path)
         for cells in reader:
             place = f"{path}:{reader.line_num}"
@@ -139,7 +151,8 @@ def read_rows(path: str | os.PathLike, required: Sequence[str]) -> Iterable[tupl
                 continue
             if len(cells) < len(names):
                 raise InputError(place, f"{len(cells)} cells", f"{len(names)} as in the header", "complete or delete the row")
-            yield place, dict(zip(names, (cell.strip() for cell in cells)))
+            cells = [cell.strip() for cell in cells]
+            yield place, dict(zip(names, cells if separator == "," else map(_with_point, cells)))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
 
@@ -177,11 +190,34 @@ def _text(path: str | os.PathLike) -> str:
         raise InputError(path, "binary content", "a CSV file", "export it as UTF-8 text") from None
 
 
+def _header(text: str, separator: str, others: Mapping[str, str]) -> list[str]:
+    """The names of the columns with this separator."""
+    try:
+        return _named(next(csv.reader(io.StringIO(text, newline=""), delimiter=separator), []), others)
+    except csv.Error:
+        return []
+
+
+def _named(names: Sequence[str], others: Mapping[str, str]) -> list[str]:
+    """Names of columns, stripped; one of `others` is what it stands for, unless that is there itself."""
+    names = [name.strip() for name in names]
+    return [others[name] if name in others and others[name] not in names else name for name in names]
+
+
+def _with_point(cell: str) -> str:
+    return _WITH_COMMA.sub(r"\1.\2", cell)
+
+
+def _missing(names: Sequence[str], required: Sequence[str]) -> list[str]:
+    return [name for name in required if name not in names]
+
+
 def _check_header(names: list[str], required: Sequence[str], path) -> None:
-    missing = [name for name in required if name not in names]
-    if missing:
+    if missing := _missing(names, required):
         shown = ",".join(names)[:80]
         found = f"no column {', '.join(missing)} in {shown!r}"
+        if len(names) == 1 and (separator := next((one for one in _SEPARATORS if one in names[0]), None)):
+            found += f", which is separated by {_SEPARATORS[separator]}"
         raise InputError(f"{path}:1", found, f"a header with {','.join(required)}", "name the columns so, with commas")
     if any(names.count(name) > 1 for name in required):
         raise InputError(f"{path}:1", "a column twice", "each column once")
