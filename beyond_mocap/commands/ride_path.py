@@ -17,6 +17,7 @@ from .told import Told
 
 _FRAMES = ("path", "tangent", "absolute")  # those of path_frame, which takes scipy to import
 _FRAME_HELP = "what the recording is taken relative to: the path (default); its full tangent or the world, to compare"
+_WHOLE = 0.95  # of a path, that is as good as all of it
 
 
 def add(verbs):
@@ -102,10 +103,26 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
         write(take, options.out)
     _write_tables(options, take, report)
     told.end()
-    for note in (*notes, *asked, *ridden.warnings):
+    for note in (*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)):
         told.note(note)
     gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # where it begins anew it is set back
-    print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} m")
+    print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} m{_unit(clip, options)}")
+
+
+def _left_over(source, ridden, path, options) -> list[str]:
+    """A line where the motion ends long before the path."""
+    from ..motion.arc_length import ArcLength
+
+    gone, length = float(ridden.arc[-1]), ArcLength(path).length
+    if options.cycle or options.end == "repeat" or source.still or gone >= _WHOLE * length:
+        return []
+    return [f"the motion ends after {gone:.1f} of {length:.1f} m; --cycle goes on"]
+
+
+def _unit(clip, options) -> str:
+    """What is said of the output's unit where it is not the input's."""
+    same = options.out.suffix.lower() != ".bvh" or np.isclose(clip.form.unit, 0.01)
+    return "" if same else "; positions in centimetres (--unit 0.01)"
 
 
 def _write_tables(options, take, report: dict | None) -> None:

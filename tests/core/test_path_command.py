@@ -99,6 +99,17 @@ def test_a_skeleton_without_legs_rides_and_is_told(run, place, tmp_path):
     assert json.loads((tmp_path / "r.json").read_text())["path"]["skate"] is None
 
 
+def test_a_path_far_longer_than_the_motion_is_told(run):
+    assert any("of 9.4 m; --cycle goes on" in line for line in run()[2])
+    for more, curve in ((["--cycle"], "bend"), ([], "short"), (["--no-arc-length"], "bend"), (["--end", "repeat"], "bend")):
+        assert not any("goes on" in line for line in run(*more, curve=curve)[2]), more
+
+
+def test_the_unit_is_told_where_it_is_not_the_inputs(run):
+    assert "centimetres" not in run()[1]
+    assert "centimetres (--unit 0.01)" in run("--unit", 0.0101)[1]
+
+
 def test_a_motion_that_stands_still_is_placed_and_told(run, tmp_path):
     status, _, error = run(recording="stand")
     assert status == 0 and any("stands still" in line for line in error)
@@ -155,9 +166,9 @@ def test_a_rider_goes_round_a_body_that_moves_already(run, place, tmp_path):
 @pytest.mark.parametrize("content, parts", [
     ("", ["bad.csv", "empty"]),
     ("\0\1\2", ["bad.csv", "binary"]),
-    ("x,y\n0,0\n1,0\n", ["bad.csv:1", "x_m"]),
+    ("a,b\n0,0\n1,0\n", ["bad.csv:1", "x_m"]),
     ("0,0\n1,0\n", ["bad.csv:1"]),
-    ("x_m;y_m\n0;0\n1;0\n", ["commas"]),
+    ("x_m|y_m\n0|0\n1|0\n", ["commas"]),
     ("x_m,y_m\n0,0\n", ["bad.csv", "two"]),
     ("x_m,y_m\n1,1\n1,1\n1,1\n", ["bad.csv", "one place"]),
     ("x_m,y_m\n0,0\n0.05,0\n", ["bad.csv", "m"]),
