@@ -98,7 +98,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
-        _tell(ridden_by, _shown[body.session_uid][1].told, None)  # what was wrong meanwhile is so no more
+        _tell(ridden_by, _lines(scene, _shown[body.session_uid][1]), None)  # what was wrong meanwhile is so no more
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
@@ -108,9 +108,18 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     _counted += 1
     first, fps = known.read.first, known.read.motion.fps
     told = "\n".join((*drawn.notes, *source.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
-    _shown[body.session_uid] = digest, Shown(first, fps, known.core, path, ridden, _counted, told)
-    _tell(ridden_by, told, _figures(known.core, ridden))
+    now = Shown(first, fps, known.core, path, ridden, _counted, told)
+    _shown[body.session_uid] = digest, now
+    _tell(ridden_by, _lines(scene, now), _figures(known.core, ridden))
     return True
+
+
+def _lines(scene: bpy.types.Scene, now: Shown) -> str:
+    """What is told of a rider; also where, other than the original, it goes on beyond the scene's end."""
+    last = now.first + len(now.ridden.motion) - 1
+    if last <= max(scene.frame_end, now.first + len(now.source.motion) - 1):
+        return now.told
+    return "\n".join(filter(None, (now.told, f"goes on to frame {last}, the scene ends at {scene.frame_end}")))
 
 
 def _check_length(known, path, settings) -> None:

@@ -702,3 +702,34 @@ def test_what_cannot_be_read_is_not_looked_at_again_and_again(scene, part, monke
     monkeypatch.undo()
     choose(body)
     assert bpy.ops.beyond_mocap.update_path() == {"FINISHED"} and body.beyond_mocap_ride.told == ""
+
+
+def test_a_motion_longer_than_the_scene_is_told_as_long_as_it_is(scene, part):
+    body, drawn = walker(), circle()
+    scene.frame_end = 250
+    choose(body, drawn)
+    bpy.ops.beyond_mocap.edit_path()
+    ride, follow = body.beyond_mocap_ride, part("ride.live").follow
+    assert "goes on" not in ride.told
+    ride.cycle = True
+    follow(scene)
+    last = int(body.animation_data.action.frame_range[1])
+    assert last > 250 and ride.told.endswith(f"goes on to frame {last}, the scene ends at 250")
+    assert scene.frame_end == 250
+    scene.frame_end = last
+    follow(scene)
+    assert "goes on" not in ride.told
+
+
+def test_a_new_curve_takes_back_the_line_about_the_one_before(scene, part):
+    body = walker()
+    bpy.ops.beyond_mocap.edit_path()
+    ride, follow = body.beyond_mocap_ride, part("ride.live").follow
+    for point in ride.curve.data.splines[0].bezier_points:
+        point.co = point.handle_left = point.handle_right = (0, 0, 0)
+    bpy.context.view_layer.update()
+    follow(scene)
+    assert "all its points are one" in ride.told
+    bpy.ops.beyond_mocap.path_curve(shape="FITTED")
+    follow(scene)
+    assert ride.told == ""
