@@ -11,7 +11,7 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_path_apart(Verb, bpy.types.Operator):
-    """Find where riders would run into each other or into a player, and let them wait a little or make a small detour,
+    """Find where riders would run into each other or another body, and let them wait a little or make a small detour,
 as little as it takes. Of two or more selected riders only those give way; otherwise all do"""
 
     bl_idname = "beyond_mocap.path_apart"

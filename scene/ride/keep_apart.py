@@ -15,12 +15,12 @@ import numpy as np
 from ...beyond_mocap.errors import BeyondMocapError
 from ..measure import frames_per_second
 from . import curve, riders, source
+from .bystanders import bystanders
 from .carrier import carrier_of
 from .settings import riders as all_riders
 from .settings import wishes
 
 _ROUNDS = 2  # the second with room for what the search does not reckon with exactly
-_HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,8 @@ class Trial:
 @dataclass(frozen=True)
 class Kept:
     """What came out. bodies: names of the riders, in the order of changes. before: how many collisions there were;
-    changes: one `Change` a rider; left: lines about those that stay."""
+    changes: one `Change` a rider; left: lines about those that stay, and
+    about who was left out."""
 
     bodies: tuple[str, ...]
     before: int
@@ -68,7 +69,8 @@ class Kept:
 def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limits) -> Kept:
     """What these riders have to do to keep apart within `limits` of the core; the scene stays as it is.
 
-    All other riders and the bodies of players stay where they are. InputError where a rider cannot ride.
+    All other riders stay where they are, and so do those who ride nowhere (see `bystanders`). InputError where a rider
+    cannot ride.
     """
     from ...beyond_mocap.polish.apart import resolved
     from ...beyond_mocap.polish.follower import Change
@@ -77,7 +79,8 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
     context.view_layer.update()
     source.unsure()
     trials = [_trial(scene, body) for body in bodies]
-    fixed = _others(scene, bodies)
+    standing, unread = bystanders(context)
+    fixed = _others(scene, bodies) + standing
     bare, changes, found = [trial.follower(Change()) for trial in trials], (Change(),) * len(trials), None
     wider, before = limits, 0
     for attempt in range(_ROUNDS):
@@ -93,7 +96,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
         wider = replace(wider, distance=wider.distance + max(short) + 0.01)
     names = [follower.name for follower in (*bare, *fixed)]
     lines = tuple(_line(hit, names, frames_per_second(scene)) for hit in left)
-    return Kept(tuple(body.name for body in bodies), before, changes, lines)
+    return Kept(tuple(body.name for body in bodies), before, changes, (*lines, *unread))
 
 
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
@@ -136,8 +139,8 @@ def _own_delay(ride) -> float:
 
 
 def _others(scene, bodies) -> list:
-    """Other riders as they are, and the bodies of players; those that cannot be read stand in nobody's way."""
-    from ...beyond_mocap.polish.follower import Change, Follower
+    """Other riders as they are; those that cannot ride just now, which is told at them, stand in nobody's way."""
+    from ...beyond_mocap.polish.follower import Change
 
     found = []
     for body in all_riders(scene):
@@ -148,16 +151,6 @@ def _others(scene, bodies) -> list:
                 continue
             asked = Change(body.beyond_mocap_ride.added, wishes(body.beyond_mocap_ride)["detours"])
             found.append(trial.follower(asked, False))
-    for player in scene.beyond_mocap.players:
-        body = player.body
-        if body is None or body.beyond_mocap_ride.on or body.name not in scene.objects:
-            continue
-        try:
-            read = carrier_of(body).read(scene)
-        except BeyondMocapError:
-            continue
-        times = (read.first + np.arange(len(read.motion))) / read.motion.fps
-        found.append(Follower(body.name, times, read.motion.root_positions - (0.0, 0.0, _HIPS)))
     return found
 
 

@@ -165,3 +165,82 @@ def test_a_path_that_begins_again_meets_nobody_on_its_way_back(scene, said):  # 
     again.beyond_mocap_ride.end = "repeat"
     bpy.ops.beyond_mocap.path_apart()
     assert said[0].before == 0 and [asked(body) for body in (again, beside)] == [(0.0, [])] * 2
+
+
+def crossing(gone):
+    """Two whose ways cross; gone: what is done to the first, that rides no more then."""
+    first, second = rider((-3.5, 0, 0), (4, 0, 0)), rider((0, -3.5, 0), (0, 4, 0))
+    choose(first)
+    gone(first)
+    choose(second)
+    return first, second
+
+
+def keep(_body):
+    assert bpy.ops.beyond_mocap.bake_path() == {"FINISHED"}
+
+
+def as_strip(body):
+    """Kept, and then played by a strip: no plain armature."""
+    keep(body)
+    action = body.animation_data.action
+    slot = body.animation_data.action_slot
+    body.animation_data.action = None
+    strip = body.animation_data.nla_tracks.new().strips.new("kept", int(action.frame_range[0]), action)
+    strip.action_slot = slot
+
+
+@pytest.mark.parametrize("gone", [keep, as_strip])
+def test_who_was_kept_is_not_run_into(scene, said, gone):  # noqa: F811
+    bodies = crossing(gone)
+    assert nearest(*bodies) < 0.5
+    scene.frame_set(7)
+    bpy.ops.beyond_mocap.path_apart()
+    assert scene.frame_current == 7 and len(bpy.data.scenes) == 1
+    assert said[0].before == 1 and said[0].left == ()
+    assert not bodies[0].beyond_mocap_ride.on and asked(bodies[1]) != (0.0, [])
+    assert nearest(*bodies) > 0.59
+
+
+def test_who_is_hidden_or_shows_a_rider_is_not_counted(scene, said):  # noqa: F811
+    hidden, body = crossing(keep)
+    hidden.hide_set(True)
+    excluded = walker()
+    aside = bpy.data.collections.new("Aside")
+    scene.collection.children.link(aside)
+    for place in list(excluded.users_collection):
+        place.objects.unlink(excluded)
+    aside.objects.link(excluded)
+    bpy.context.view_layer.layer_collection.children["Aside"].exclude = True
+    shadow = walker()
+    for bone in shadow.pose.bones:
+        same = bone.constraints.new("COPY_TRANSFORMS")
+        same.target, same.subtarget = body, bone.name
+    choose(body)
+    bpy.ops.beyond_mocap.path_apart()
+    assert said[0].before == 0 and said[0].left == ()
+
+
+def test_who_cannot_be_looked_at_in_time_is_told(scene, said, part, monkeypatch):  # noqa: F811
+    first, _ = crossing(as_strip)
+    module = part("ride.bystanders")
+    monkeypatch.setattr(module.bystanders, "__defaults__", (0.0,))
+    bpy.ops.beyond_mocap.path_apart()
+    [line] = said[0].left
+    assert line.startswith(f"{first.name} is left out") and "slow" in line
+
+
+def test_a_statue_is_gone_round(scene, said):  # noqa: F811
+    statue = walker()
+    for curve in statue.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
+        while len(curve.keyframe_points) > 1:
+            curve.keyframe_points.remove(curve.keyframe_points[-1], fast=True)
+        curve.update()
+    statue.location = (0, 0, 0)
+    bpy.context.view_layer.update()
+    here = pelvis(statue, 1)
+    body = rider((here[0] - 2, here[1], 0), (here[0] + 2, here[1], 0))
+    assert nearest(statue, body) < 0.3
+    choose(body)
+    bpy.ops.beyond_mocap.path_apart()
+    assert said[0].before == 1 and nearest(statue, body) > 0.55
