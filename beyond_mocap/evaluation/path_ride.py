@@ -179,9 +179,11 @@ def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray,
     """
     surface = _surface(places, origin, ground)
     above = places - surface[..., None] * [0.0, 0.0, 1.0]
-    floor, toe_rest = foot_contacts.recorded_floor(recording)
-    rest = feet.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - floor
-    lower = np.minimum(above[..., 1, 2] - toe_rest, above[..., 0, 2] - max(rest, toe_rest))
+    own_floor, toe_rest = foot_contacts.floor_height(recording), foot_contacts.recorded_floor(recording)[1]
+    ankle = foot_contacts.sole_height(recording.skeleton)  # of a flat foot without toes
+    rest = feet.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - own_floor
+    heel_rest = max(rest, ankle) + toe_rest - ankle
+    lower = np.minimum(above[..., 1, 2] - toe_rest, above[..., 0, 2] - heel_rest)
     standing = lower[flat & np.isfinite(lower)]
     return {
         f"{name}deepest": 1000.0 * float(np.nanmin(lower)) if np.isfinite(lower).any() else None,

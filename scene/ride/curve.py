@@ -29,6 +29,7 @@ _NURBS_PIECES = 48
 _COUNTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 60, 80)
 _CLOSE = 0.03  # metres from the path that a fitted curve may be
 _APART = 5.0  # metres that points are apart at most, so that there is always one to pull
+_NEAREST, _MOST = 0.08, 240  # metres that Bezier points are apart at least, and how many there are at most
 _SPARE = 0.002  # metres by which a fitted curve is longer than the path, so that the motion does not end early
 
 
@@ -199,6 +200,8 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
         points = _lengthened(path_line.straight(path, count or max(4, degree + 1)), path)
         third = (points[1] - points[0]) / 3.0
         return points, (points - third, points + third)
+    if kind == "BEZIER" and not count:
+        return _chain(path)
     points = path_line.control_points(path, count + more, degree) if count else _close_enough(path, degree)
     if kind != "BEZIER":
         return points, ()
@@ -208,6 +211,48 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
     gaps = np.diff(knots)[:, None] / 3.0
     before, after = np.concatenate([gaps[:1], gaps]), np.concatenate([gaps, gaps[-1:]])
     return places, (places - pull * before, places + pull * after)
+
+
+def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Bezier points (P, 3) on the path and their left and right handles, closer together where it bends, so that they are
+    within _CLOSE of it. Corners that were cut would make the motion run ahead of itself from there on."""
+    from ...beyond_mocap.motion.arc_length import ArcLength
+
+    arc = ArcLength(path)
+    pieces = max(int(np.ceil(arc.length / _APART)), 3)
+    nodes = np.linspace(0.0, arc.length, pieces + 1)
+    while len(nodes) < _MOST:
+        gap = np.diff(nodes)
+        split = (_beside(path, arc, nodes) > _CLOSE) & (gap > 2.0 * _NEAREST)
+        if not split.any():
+            break
+        worst = np.flatnonzero(split)[: _MOST - len(nodes)]
+        nodes = np.sort(np.concatenate([nodes, nodes[worst] + 0.5 * gap[worst]]))
+    places, pull = _nodes(path, arc, nodes)
+    third = np.diff(nodes)[:, None] / 3.0
+    before, after = np.concatenate([third[:1], third]), np.concatenate([third, third[-1:]])
+    if path.closed:  # the first point is the last one too
+        return places[:-1], ((places - pull * np.concatenate([third[-1:], third]))[:-1], (places + pull * after)[:-1])
+    return places, (places - pull * before, places + pull * after)
+
+
+def _nodes(path: Path, arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (N, 3) and unit tangents (N, 3) at arc lengths s (N,) m."""
+    u = arc.parameter(s)
+    pull = path.at(u, 1)
+    return path.at(u), pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1e-9)
+
+
+def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:
+    """(N - 1,) m that the Bezier segments between nodes (N,) m are off the path at the same lengths along it."""
+    places, pull = _nodes(path, arc, nodes)
+    gap = np.diff(nodes)[:, None, None]
+    t = np.linspace(0.0, 1.0, 9)[1:-1, None]
+    a, d = places[:-1, None], places[1:, None]
+    b, c = a + pull[:-1, None] * gap / 3.0, d - pull[1:, None] * gap / 3.0
+    drawn = (1 - t) ** 3 * a + 3 * t * (1 - t) ** 2 * b + 3 * t**2 * (1 - t) * c + t**3 * d
+    s = nodes[:-1, None] + gap[..., 0] * t[:, 0]
+    return np.linalg.norm(drawn - path.at(arc.parameter(s.ravel())).reshape(drawn.shape), axis=2).max(axis=1)
 
 
 def _close_enough(path: Path, degree: int) -> np.ndarray:

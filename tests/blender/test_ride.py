@@ -459,6 +459,22 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
     assert own.name in bpy.data.objects
 
 
+@pytest.mark.parametrize("closed", (False, True))
+def test_a_new_curve_goes_round_every_corner_of_the_path(scene, part, extension, closed):
+    """A corner that the curve cut would make whoever rides it run ahead of the original from there on."""
+    core = importlib.import_module(f"{extension.__name__}.beyond_mocap.polish.path_line")
+    length = importlib.import_module(f"{extension.__name__}.beyond_mocap.motion.arc_length").ArcLength
+    turn = np.linspace(-np.pi / 2, np.pi / 2, 20)
+    bow = np.stack([15.0 + 0.3 * np.cos(turn), 0.3 + 0.3 * np.sin(turn), 0 * turn], axis=1)
+    path = core.through(np.concatenate([[[0.0, 0.0, 0.0]], bow, [[0.0, 0.6, 0.0]]]), "hairpin", closed=closed)
+    drawn = part("ride.curve").read(scene, part("ride.curve").create(bpy.context, "Hairpin", path)).path()
+    assert drawn.closed == closed
+    own, made = length(path), length(drawn)
+    s = np.linspace(0.0, min(own.length, made.length), 200)
+    apart = np.linalg.norm(path.at(own.parameter(s)) - drawn.at(made.parameter(s)), axis=1)
+    assert apart[:-1].max() < 0.06
+
+
 def test_a_picked_curve_is_active_where_the_one_before_was(scene, part):
     body = walker()
     bpy.ops.beyond_mocap.edit_path()
