@@ -102,8 +102,8 @@ def follow(
 ) -> Planted:
     """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. sole: metres that the foremost joint of a flat foot
-    is above its ground. steps: None where they are as long as they were.
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. sole: metres that the foremost joint of a flat
+    foot is above its ground. steps: None where they are as long as they were.
     """
     legs, kept, limbs = _legs(skeleton)
     places, world = pose_kinematics(legs, root, rotations[:, kept])
