@@ -6,21 +6,15 @@ import bpy
 
 from ..scene.ride import riders
 from ..scene.ride.settings import meant
-from .verb import Verb
+from .rider_verb import RiderVerb
 
 
-class BEYOND_MOCAP_OT_bake_path(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_bake_path(RiderVerb, bpy.types.Operator):
     """Keep the motion on its new path as an ordinary action with a key on every frame. The original action and the curve stay in
 the file"""
 
     bl_idname = "beyond_mocap.bake_path"
     bl_label = "Keep"
-
-    @classmethod
-    def poll(cls, context):
-        """A rider."""
-        cls.poll_message_set("Select an armature that rides a path, or its curve")
-        return bool(meant(context))
 
     def do(self, context):
         """All that are meant; of who could not follow lately, the last motion that could be worked out."""

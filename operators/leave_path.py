@@ -6,20 +6,14 @@ import bpy
 
 from ..scene.ride import riders
 from ..scene.ride.settings import meant
-from .verb import Verb
+from .rider_verb import RiderVerb
 
 
-class BEYOND_MOCAP_OT_leave_path(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_leave_path(RiderVerb, bpy.types.Operator):
     """Give the armature its original motion back, exactly as it was. The curve stays, and Edit Path takes it up again"""
 
     bl_idname = "beyond_mocap.leave_path"
     bl_label = "Leave"
-
-    @classmethod
-    def poll(cls, context):
-        """A rider."""
-        cls.poll_message_set("Select an armature that rides a path, or its curve")
-        return bool(meant(context))
 
     def do(self, context):
         """All that are meant."""

@@ -6,20 +6,14 @@ import bpy
 
 from ..scene.ride import measure, riders
 from ..scene.ride.settings import meant
-from .verb import Verb
+from .rider_verb import RiderVerb
 
 
-class BEYOND_MOCAP_OT_update_path(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
     """Work out the rider's motion anew: after edits of the original action, while Live is off, or in a script"""
 
     bl_idname = "beyond_mocap.update_path"
     bl_label = "Update Path"
-
-    @classmethod
-    def poll(cls, context):
-        """A rider."""
-        cls.poll_message_set("Select an armature that rides a path, or its curve")
-        return bool(meant(context))
 
     def do(self, context):
         """All that are meant."""
