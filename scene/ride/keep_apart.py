@@ -16,7 +16,7 @@ from ...beyond_mocap.errors import BeyondMocapError
 from ..measure import frames_per_second
 from . import curve, riders, source
 from .bystanders import bystanders
-from .carrier import carrier_of
+from .carrier import MARK, carrier_of
 from .settings import riders as all_riders
 from .settings import wishes
 
@@ -102,18 +102,23 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
     """Ask riders for these changes, instead of those before, and bring them up to date. InputError, and all as before,
     where one of them cannot follow."""
+    from ...beyond_mocap.polish.follower import Change
+
     rides = [body.beyond_mocap_ride for body in bodies]
-    before = [(ride.delay, ride.added, ride.detours) for ride in rides]
+    before = [(ride.delay, ride.added, ride.detours, ride.agreed) for ride in rides]
     try:
         for ride, change in zip(rides, changes):
-            ride.delay, ride.added = _own_delay(ride) + change.delay, change.delay
+            ride.delay, ride.added, ride.agreed = _own_delay(ride) + change.delay, change.delay, ""
             ride.detours = json.dumps([list(detour) for detour in change.detours])
         for body in bodies:
             riders.renew(scene, body)
     except BeyondMocapError:
-        for ride, (delay, added, detours) in zip(rides, before):
-            ride.delay, ride.added, ride.detours = delay, added, detours
+        for ride, (delay, added, detours, agreed) in zip(rides, before):
+            ride.delay, ride.added, ride.detours, ride.agreed = delay, added, detours, agreed
         raise
+    if any(change != Change() for change in changes):
+        for body, ride in zip(bodies, rides):
+            ride.agreed = str(carrier_of(body).ours()[0][MARK])
 
 
 def lines_of(kept: Kept) -> list[str]:

@@ -98,7 +98,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
-        _tell(ridden_by, _lines(scene, _shown[body.session_uid][1]), None)  # what was wrong meanwhile is so no more
+        _tell(ridden_by, _lines(scene, ridden_by, digest, _shown[body.session_uid][1]), None)  # what was wrong meanwhile is so no more
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
@@ -110,16 +110,19 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     told = "\n".join((*drawn.notes, *source.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
     now = Shown(first, fps, known.core, path, ridden, _counted, told)
     _shown[body.session_uid] = digest, now
-    _tell(ridden_by, _lines(scene, now), _figures(known.core, ridden))
+    _tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
     return True
 
 
-def _lines(scene: bpy.types.Scene, now: Shown) -> str:
-    """What is told of a rider; also where, other than the original, it goes on beyond the scene's end."""
-    last = now.first + len(now.ridden.motion) - 1
-    if last <= max(scene.frame_end, now.first + len(now.source.motion) - 1):
-        return now.told
-    return "\n".join(filter(None, (now.told, f"goes on to frame {last}, the scene ends at {scene.frame_end}")))
+def _lines(scene: bpy.types.Scene, ride, digest: str, now: Shown) -> str:
+    """What is told of a rider; also where, other than the original, it goes on beyond the scene's end, and where it is
+    another than when riders were asked to keep apart."""
+    lines, last = [now.told] if now.told else [], now.first + len(now.ridden.motion) - 1
+    if last > max(scene.frame_end, now.first + len(now.source.motion) - 1):
+        lines.append(f"goes on to frame {last}, the scene ends at {scene.frame_end}")
+    if ride.agreed not in ("", digest):
+        lines.append("changed since Keep Apart: press it again")
+    return "\n".join(lines)
 
 
 def _check_length(known, path, settings) -> None:

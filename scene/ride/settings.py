@@ -103,6 +103,7 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
         name="Detours", default="[]",
         description="Lateral detours as JSON: [arc in metres, width in metres, offset in metres to the left] each",
     )
+    agreed: StringProperty(name="Agreed", options={"HIDDEN"}, description="Digest of what it was when riders were asked to keep apart")
     ground: PointerProperty(
         name="Ground", type=bpy.types.Object, poll=is_mesh,
         description="A mesh whose surface the feet follow; none: the height of the path itself",

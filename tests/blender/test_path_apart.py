@@ -244,3 +244,24 @@ def test_a_statue_is_gone_round(scene, said):  # noqa: F811
     choose(body)
     bpy.ops.beyond_mocap.path_apart()
     assert said[0].before == 1 and nearest(statue, body) > 0.55
+
+
+def test_a_rider_that_is_changed_afterwards_says_so_until_it_is_pressed_again(scene, part):  # noqa: F811
+    first, second = two()
+    bpy.ops.beyond_mocap.path_apart()
+    follow = part("ride.live").follow
+    told = [first.beyond_mocap_ride, second.beyond_mocap_ride]
+    follow(scene)
+    assert not any("Keep Apart" in ride.told for ride in told)
+    first.beyond_mocap_ride.curve.location.y += 0.2
+    bpy.context.view_layer.update()
+    follow(scene)
+    assert ["changed since Keep Apart" in ride.told for ride in told] == [True, False]
+    bpy.ops.beyond_mocap.path_apart()
+    assert not any("Keep Apart" in ride.told for ride in told)
+    first.beyond_mocap_ride.curve.location.y += 0.2
+    bpy.context.view_layer.update()
+    follow(scene)
+    bpy.ops.beyond_mocap.path_apart(clear=True)
+    follow(scene)
+    assert not any("Keep Apart" in ride.told for ride in told)
