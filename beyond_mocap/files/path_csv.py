@@ -16,8 +16,8 @@ _SAME, _LONGEST = 1e-6, 1e5  # metres
 
 def read_curve(path: str | os.PathLike) -> np.ndarray:
     """(N, 3) metres, N >= 2: the points of a CSV file in the order of its rows, in the pitch's frame, z 0 where the
-    column is missing; other columns are ignored. The columns may also be named x, y and z, and be separated by semicolons
-    or tabs; then numbers may have decimal commas.
+    column is missing; other columns are ignored. The columns may also be named x, y and z, and be separated by
+    semicolons or tabs; then numbers may have decimal commas.
 
     InputError, with the line, where a cell is no number or lies beyond 10 km; where fewer than two different points are
     given, or more than 100 km in all.

@@ -1,5 +1,5 @@
-"""Bystanders: bodies of a scene that ride no path, such as kept ones and players; where they are when, for riders to keep clear
-of them."""
+"""Bystanders: bodies of a scene that ride no path, such as kept ones and players; where they are when, for riders to keep
+clear of them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ def _is_animated(body) -> bool:
 
 def _hangs_on_rider(body) -> bool:
     """Whether it shows what a rider does, as a character does that was retargeted from it."""
-    holders = [getattr(one, "target", None) for thing in (body, *body.pose.bones) for one in thing.constraints if not one.mute]
+    constraints = [one for thing in (body, *body.pose.bones) for one in thing.constraints if not one.mute]
+    holders = [getattr(one, "target", None) for one in constraints]
     while body.parent is not None:
         body = body.parent
         holders.append(body)
@@ -107,4 +108,5 @@ def _frames(scene, body) -> np.ndarray:
 
 
 def _late() -> InputError:
-    return InputError("its rig", "too slow to be looked at as well", "a quick one", "hide what is not needed, or bake its motion")
+    found, expected = "too slow to be looked at as well", "a quick one"
+    return InputError("its rig", found, expected, "hide what is not needed, or bake its motion")
