@@ -301,6 +301,11 @@ def _own_way(source: RideSource, residuals: Residuals) -> Way:
     return way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
 
 
+def _own_slope(source: RideSource, rows: Residuals) -> np.ndarray:
+    """(N,) radians that the motion's own path rises at every row."""
+    return np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
+
+
 def _parameters(
     source: RideSource, path: Path, arc: ArcLength, timing: Timing, rows: Residuals, settings: RideSettings
 ) -> np.ndarray:
@@ -318,7 +323,7 @@ def _leaned(
     """The body leant into bends, and its trunk into slopes, as far as the motion did not do so on its own path."""
     fps = rows.fps
     since = np.diff(timing.arc, prepend=timing.arc[:1])
-    own_slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
+    own_slope = _own_slope(source, rows)
     own_speed = np.column_stack([rows.step * np.cos(own_slope) * fps, np.zeros(len(rows))])
     lean = missing_lean(
         since * np.cos(moving.slope) * fps, moving.heading, own_speed, rows.turn, seams, fps, LEANS_FROM
@@ -339,9 +344,8 @@ def _strained(
     if path is source.path or source.still:
         return np.zeros(len(rows), dtype=bool), ()
     own = np.interp(rows.frames, np.arange(len(source.bends)), source.bends)
-    slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
     bent = tight(path, at, timing.arc, own, rows.fps)
-    risen = steep(tangent, timing.arc, slope, rows.fps)
+    risen = steep(tangent, timing.arc, _own_slope(source, rows), rows.fps)
     return bent | risen, tight_told(bent, risen, rows.fps)
 
 
@@ -358,8 +362,7 @@ def _steps(
 ) -> tuple[Steps | None, tuple[str, ...]]:
     """How long steps are on the new path, against their own, and what of that legs cannot do; free (N,) bool: where no
     feet are planted."""
-    slope = np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
-    own = rows.step * np.cos(slope)
+    own = rows.step * np.cos(_own_slope(source, rows))
     times = stretched(np.diff(timing.arc, prepend=timing.arc[:1]) * np.cos(moving.slope), own, rows.fps)
     if times is None:
         return None, ()

@@ -18,8 +18,5 @@ class BEYOND_MOCAP_OT_leave_path(RiderVerb, bpy.types.Operator):
     def do(self, context):
         """All that are meant."""
         chosen = meant(context)
-        for body in chosen:
-            riders.may_end(body)
-        for body in chosen:
-            riders.end(body)
+        riders.leave(*chosen)
         riders.back_to(context, chosen)

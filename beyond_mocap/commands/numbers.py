@@ -16,10 +16,10 @@ def rate(text: str) -> float:
     return between(text, 1.0, 480.0, "1 to 480 frames per second")
 
 
-def between(text: str, low: float, high: float, expected: str) -> float:
-    """The number that an option's text says, where it lies from `low` to `high`."""
+def between(text: str, low: float, high: float, expected: str, kind: type = float) -> float:
+    """The number of a kind, float or int, that an option's text says, where it lies from `low` to `high`."""
     with contextlib.suppress(ValueError):
-        value = float(text)
+        value = kind(text)
         if low <= value <= high:
             return value
     raise argparse.ArgumentTypeError(f"{text!r} is not {expected}")
@@ -27,8 +27,4 @@ def between(text: str, low: float, high: float, expected: str) -> float:
 
 def whole(text: str, low: int, high: int, expected: str) -> int:
     """The whole number that an option's text says, where it lies from `low` to `high`."""
-    with contextlib.suppress(ValueError):
-        value = int(text)
-        if low <= value <= high:
-            return value
-    raise argparse.ArgumentTypeError(f"{text!r} is not {expected}")
+    return between(text, low, high, expected, int)

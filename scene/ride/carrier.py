@@ -130,8 +130,13 @@ class PlainCarrier(Carrier):
 
     def check(self) -> None:
         super().check()
-        if self.source()[0] is None:
+        self._original()
+
+    def _original(self) -> tuple[bpy.types.Action, object]:
+        found, slot = self.source()
+        if found is None:
             raise InputError(f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action")
+        return found, slot
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
         body, bones = self.body, self.body.data.bones
@@ -143,9 +148,7 @@ class PlainCarrier(Carrier):
         return hashlib.blake2b(where + form.encode(), digest_size=16).digest()
 
     def read(self, scene: bpy.types.Scene) -> Read:
-        found, slot = self.source()
-        if found is None:
-            raise InputError(f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action")
+        found, slot = self._original()
         motion = action.read(self.body, scene, found, slot)
         if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
             raise InputError(f"action {found.name}", "a key that is no number", "numbers", "delete that key")

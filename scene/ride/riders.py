@@ -98,7 +98,8 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
-        _tell(ridden_by, _lines(scene, ridden_by, digest, _shown[body.session_uid][1]), None)  # what was wrong meanwhile is so no more
+        lines = _lines(scene, ridden_by, digest, _shown[body.session_uid][1])
+        _tell(ridden_by, lines, None)  # what was wrong meanwhile is so no more
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
