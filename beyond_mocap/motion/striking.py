@@ -104,12 +104,14 @@ def faster_middle(found: Sequence[Surface], places: np.ndarray, rotations: np.nd
     return max(middles, key=lambda way: float(np.linalg.norm(way[-1] - way[0])))
 
 
-def ball_gap(line: tuple[np.ndarray, np.ndarray], radius: float, ball: np.ndarray) -> np.ndarray:
+def ball_gap(
+    line: tuple[np.ndarray, np.ndarray], radius: float, ball: np.ndarray, ball_radius: float = BALL_RADIUS
+) -> np.ndarray:
     """Signed gap (...,) m between a surface and the ball's, negative where they overlap.
 
     line: the surface's two ends (..., 3) m, world; radius: the surface's, m; ball (..., 3): the ball's centre, m.
     """
-    return np.linalg.norm(ball - nearest_on(line, ball), axis=-1) - radius - BALL_RADIUS
+    return np.linalg.norm(ball - nearest_on(line, ball), axis=-1) - radius - ball_radius
 
 
 def nearest_on(line: tuple[np.ndarray, np.ndarray], place: np.ndarray) -> np.ndarray:
