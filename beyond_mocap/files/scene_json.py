@@ -1,0 +1,276 @@
+"""SCENE.json: a passing scene as a file (docs/passes.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+
+from ..ball.contact import Tool
+from ..ball.pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
+from ..errors import InputError
+
+LARGEST = 10_000_000
+"""Bytes of a file above which it is no scene."""
+
+_OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "error")
+
+
+def read_scene(path: str | os.PathLike) -> PassScene:
+    """The scene that a file holds. InputError, which names the file and the place in it, for whatever is wrong."""
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(path, error.strerror or "cannot be read", "a SCENE.json", "check the path") from None
+    if len(data) > LARGEST:
+        raise InputError(path, f"{len(data)} bytes", "a scene of some kilobytes", "give the scene, not what came of it")
+    try:
+        return parse_scene(data.decode("utf-8-sig"), str(path))
+    except UnicodeDecodeError:
+        raise InputError(path, "no text", "JSON in UTF-8", "save it as UTF-8") from None
+
+
+def parse_scene(text: str, name: str = "scene") -> PassScene:
+    """The scene in a text; `name` stands before what is wrong with it, as InputError."""
+    try:
+        whole = json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{name}:{error.lineno}:{error.colno}", error.msg, "JSON", "see docs/passes.md") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(name, str(error) or "nested too deep", "JSON", "see docs/passes.md") from None
+    try:
+        return _scene(whole)
+    except InputError as error:
+        raise InputError(name, str(error)) from None
+
+
+def scene_text(scene: PassScene) -> str:
+    """The scene as `parse_scene` reads it; what is as usual is left out."""
+    usual = PassScene(scene.players, scene.passes)
+    out: dict = {"players": [_player_out(one) for one in scene.players], "passes": [_pass_out(one) for one in scene.passes]}
+    for name in ("repeat", "fps", "seed", "transition", "lead_in", "lead_out", "directions", "watch"):
+        if getattr(scene, name) != getattr(usual, name):
+            out[name] = getattr(scene, name)
+    if scene.ball != usual.ball:
+        out["ball"] = {"kind": scene.ball.kind, **scene.ball.changes} if scene.ball.changes else scene.ball.kind
+    if scene.net is not None:
+        out["net"] = {"from": list(scene.net.start), "to": list(scene.net.end), "height": scene.net.height}
+    if scene.serve is not None:
+        out["serve"] = scene.serve if isinstance(scene.serve, str) else list(scene.serve)
+    if scene.missed or scene.dropped:
+        out["errors"] = {"missed": scene.missed, "dropped": scene.dropped}
+    if scene.weights != usual.weights:
+        told = {entry.name: getattr(scene.weights, entry.name) for entry in fields(Weights)}
+        out["weights"] = {**told, "bones": dict(scene.weights.bones)}
+    return json.dumps(out, indent=1, ensure_ascii=False) + "\n"
+
+
+def _player_out(one: Player) -> dict:
+    out: dict = {"name": one.name, "place": list(one.place)}
+    if one.facing is not None:
+        out["facing"] = math.degrees(one.facing)
+    for name in ("part", "side", "height"):
+        if getattr(one, name) != getattr(Player, name):
+            out[name] = getattr(one, name)
+    if one.tool is not None:
+        out["tool"] = {"near": one.tool.near, "far": one.tool.far, "radius": one.tool.radius}
+        if one.tool.direction is not None:
+            out["tool"]["direction"] = list(one.tool.direction)
+    return out
+
+
+def _pass_out(one: Pass) -> dict:
+    out: dict = {"from": one.giver, "to": one.receiver}
+    for name in _OF_PASS:
+        value = getattr(one, name)
+        if value != getattr(Pass, name):
+            out[name] = list(value) if name == "at" else value
+    if one.example is not None:
+        told = {"clip": one.example.clip, "from": one.example.start, "to": one.example.end}
+        out["example"] = {name: value for name, value in told.items() if value is not None}
+    return out
+
+
+# -- reading
+
+
+def _once(pairs) -> dict:
+    """An object in which no name comes twice."""
+    out = dict(pairs)
+    if len(out) != len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"{next(name for name in names if names.count(name) > 1)!r} twice in one object")
+    return out
+
+
+def _no_number(text: str):
+    raise ValueError(f"{text}, which is no number")
+
+
+def _scene(whole) -> PassScene:
+    read = {
+        "players": _list_of(_player), "repeat": _whole, "fps": _number, "seed": _whole, "ball": _ball, "net": _net,
+        "serve": _serve, "transition": _number, "lead_in": _number, "lead_out": _number, "directions": _whole,
+        "watch": _truth, "weights": _weights,
+    }  # fmt: skip
+    known = {*read, "passes", "defaults", "errors"}
+    _check_names(whole, "the scene", known, ("players", "passes"))
+    found = {name: of(whole[name], name) for name, of in read.items() if name in whole}
+    usual = _settings(whole.get("defaults", {}), "defaults")
+    passes = _list_of(lambda value, where: _pass(value, where, usual))(whole["passes"], "passes")
+    return PassScene(passes=passes, **found, **_errors(whole.get("errors", {}), "errors"))
+
+
+def _player(value, where: str) -> Player:
+    read = {"name": _text, "place": _place, "facing": _angle, "part": _text, "side": _text, "tool": _tool, "height": _number}
+    _check_names(value, where, read, ("name", "place"))
+    return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
+
+
+def _pass(value, where: str, usual: Mapping) -> Pass:
+    _check_names(value, where, ("from", "to", *_OF_PASS), ("from", "to"))
+    settings = _settings({name: value[name] for name in value if name in _OF_PASS}, where)
+    giver, receiver = (_text(value[name], f"{where}: {name}") for name in ("from", "to"))
+    return Pass(giver, receiver, **{**usual, **settings})
+
+
+def _settings(value, where: str) -> dict:
+    """What a pass may say beside its players."""
+    read = {
+        "kind": _text, "bounces": _whole, "part": _text, "side": _text, "seconds": _number, "at": _place,
+        "example": _example, "error": _text,
+    }  # fmt: skip
+    _check_names(value, where, read, ())
+    return {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
+
+
+def _example(value, where: str) -> Example:
+    _check_names(value, where, ("clip", "from", "to"), ("clip",))
+    found = {new: _number(value[old], f"{where}: {old}") for old, new in (("from", "start"), ("to", "end")) if old in value}
+    return Example(_text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
+
+
+def _tool(value, where: str) -> Tool:
+    read = {"near": _number, "far": _number, "radius": _number, "direction": _triple}
+    _check_names(value, where, read, ())
+    found = {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
+    try:
+        return Tool(**found)
+    except InputError as error:
+        raise InputError(where, str(error)) from None
+
+
+def _ball(value, where: str) -> BallChoice:
+    if isinstance(value, str):
+        return BallChoice(value)
+    _check_object(value, where)
+    numbers = {name: _ball_number(one, f"{where}: {name}") for name, one in value.items() if name != "kind"}
+    return BallChoice(_text(value.get("kind", BallChoice.kind), f"{where}: kind"), numbers)
+
+
+def _ball_number(value, where: str):
+    return tuple(_number(one, where) for one in value) if isinstance(value, list) else _number(value, where)
+
+
+def _net(value, where: str) -> Net:
+    _check_names(value, where, ("from", "to", "height"), ("from", "to", "height"))
+    ends = (_place(value[name], f"{where}: {name}") for name in ("from", "to"))
+    return Net(*ends, _number(value["height"], f"{where}: height"))
+
+
+def _serve(value, where: str):
+    return _triple(value, where) if isinstance(value, list) else _text(value, where)
+
+
+def _errors(value, where: str) -> dict[str, float]:
+    _check_names(value, where, ("missed", "dropped"), ())
+    return {name: _number(one, f"{where}: {name}") for name, one in value.items()}
+
+
+def _weights(value, where: str) -> Weights:
+    names = [entry.name for entry in fields(Weights)]
+    _check_names(value, where, names, ())
+    bones = value.get("bones", {})
+    _check_object(bones, f"{where}: bones")
+    found = Weights(**{name: _number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"})
+    return replace(found, bones={name: _number(one, f"{where}: {name}") for name, one in bones.items()})
+
+
+def _list_of(read: Callable) -> Callable:
+    def lines(value, where: str) -> tuple:
+        if not isinstance(value, list):
+            raise InputError(where, _shown(value), "a list [...]")
+        one = {"players": "player", "passes": "pass"}[where]
+        return tuple(read(entry, f"{one} {number}") for number, entry in enumerate(value, start=1))
+
+    return lines
+
+
+def _check_object(value, where: str) -> None:
+    if not isinstance(value, dict):
+        raise InputError(where, _shown(value), "an object {...}")
+
+
+def _check_names(value, where: str, known, needed) -> None:
+    _check_object(value, where)
+    for name in needed:
+        if name not in value:
+            raise InputError(where, f"no {name!r}", f"{', '.join(needed)}")
+    for name in value:
+        if name not in known:
+            raise InputError(where, _shown(name), f"one of {', '.join(known)}", "check the spelling")
+
+
+def _number(value, where: str) -> float:
+    try:
+        good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        good = False
+    if not good:
+        raise InputError(where, _shown(value), "a number")
+    return float(value)
+
+
+def _whole(value, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) and _number(value, where) != int(value):
+        raise InputError(where, _shown(value), "a whole number")
+    return int(value)
+
+
+def _angle(value, where: str) -> float:
+    return math.radians(_number(value, where))
+
+
+def _truth(value, where: str) -> bool:
+    if not isinstance(value, bool):
+        raise InputError(where, _shown(value), "true or false")
+    return value
+
+
+def _text(value, where: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(where, _shown(value), "a text")
+    return value
+
+
+def _place(value, where: str) -> tuple[float, float]:
+    return _numbers(value, where, 2, "[x, y] in metres")
+
+
+def _triple(value, where: str) -> tuple[float, float, float]:
+    return _numbers(value, where, 3, "[x, y, z]")
+
+
+def _numbers(value, where: str, count: int, expected: str) -> tuple:
+    if not isinstance(value, list) or len(value) != count:
+        raise InputError(where, _shown(value), expected)
+    return tuple(_number(one, where) for one in value)
+
+
+def _shown(value) -> str:
+    """A value as it stands in the file, shortened."""
+    text = json.dumps(value, ensure_ascii=True)
+    return text if len(text) <= 40 else text[:37] + "..."
