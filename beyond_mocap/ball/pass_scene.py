@@ -234,6 +234,7 @@ def _check_passes(scene: PassScene) -> None:
     names = [one.name for one in scene.players]
     for number, one in enumerate(scene.passes, start=1):
         _check_pass(one, f"pass {number}", names, scene)
+    _check_meetings(scene)
     ends = [*scene.passes, *(scene.passes[:1] if scene.repeat > 1 else ())]
     for number, (before, after) in enumerate(zip(ends, ends[1:]), start=1):
         if after.giver != before.receiver:
@@ -267,6 +268,16 @@ def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> No
     far = math.dist(scene.player(one.giver).place, goal)
     if far > FAR:
         raise InputError(where, f"{one.receiver} is {far:.0f} m away", f"{FAR:.0f} m at most", "move one of them nearer")
+
+
+def _check_meetings(scene: PassScene) -> None:
+    """Nobody goes to meet a ball where another one stands by then."""
+    places = {one.name: one.place for one in scene.players}
+    for number, one in enumerate(scene.passes, start=1):
+        places[one.receiver] = one.at or places[one.receiver]
+        for other, place in places.items():
+            if other != one.receiver and math.dist(place, places[one.receiver]) < LEAST_APART:
+                raise InputError(f"pass {number}: at", f"{other} stands there", f"{LEAST_APART} m or more between them")
 
 
 def _check_numbers(scene: PassScene) -> None:

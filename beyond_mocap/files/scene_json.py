@@ -76,9 +76,7 @@ def _player_out(one: Player) -> dict:
         if getattr(one, name) != getattr(Player, name):
             out[name] = getattr(one, name)
     if one.tool is not None:
-        out["tool"] = {"near": one.tool.near, "far": one.tool.far, "radius": one.tool.radius}
-        if one.tool.direction is not None:
-            out["tool"]["direction"] = list(one.tool.direction)
+        out["tool"] = {entry.name: getattr(one.tool, entry.name) for entry in fields(Tool)}
     return out
 
 
@@ -154,7 +152,7 @@ def _example(value, where: str) -> Example:
 
 
 def _tool(value, where: str) -> Tool:
-    read = {"near": _number, "far": _number, "radius": _number, "direction": _triple}
+    read = {"name": _text, "length": _number, "radius": _number, "reach": _number}
     _check_names(value, where, read, ())
     found = {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
     try:

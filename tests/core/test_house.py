@@ -29,7 +29,7 @@ ROOMS = {
     "annotation": ["motion"],
     "plan": ["motion", "annotation"],
     "take": ["motion", "annotation", "plan", "synthesis.edit_list"],
-    "files": ["motion", "annotation", "take", "plan"],
+    "files": ["motion", "annotation", "take", "plan", "ball.pass_scene", "ball.contact"],
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "polish": ["motion"],
