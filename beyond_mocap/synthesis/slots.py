@@ -89,7 +89,7 @@ def _pieces_of(library: Library, wanted: Wanted, edges: np.ndarray, number: int,
     rows = []
     for choice, option in enumerate(key.choices):
         entry, leave = np.maximum(needed(library, option), AROUND)
-        for rate in KEY_RATES:
+        for rate in key.rates or KEY_RATES:
             first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
             first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))

@@ -27,14 +27,15 @@ Words = frozenset[str] | None
 @dataclass(frozen=True)
 class WantedKey:
     """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may
-    serve it (empty: locomotion stands in), the words used where the asked ones are lacking, and whether the feed
-    measured the ball's height then."""
+    serve it (empty: locomotion stands in), the words used where the asked ones are lacking, whether the feed measured
+    the ball's height then, and the rates at which its clip may be played (none: `slots.KEY_RATES`)."""
 
     asked: KeyMoment
     frame: float
     choices: tuple[Key, ...]
     used_instead: tuple[str, ...] | None
     ball_height_known: bool = False
+    rates: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

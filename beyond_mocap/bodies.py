@@ -1,0 +1,267 @@
+"""The recipe of one player of a passing scene: his hit motions where and when they were ordered, and what he does between.
+
+The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
+`ball.way` says where he goes and faces; feet are held or step (`lay_out.footed`); his head follows the ball
+(`polish.gaze`), and the striking part is brought to it (`polish.strike_at`). The ball is never moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from .annotation import Timeline, automatic_gaits
+from .annotation.gaze import wanted_offset
+from .annotation.timeline import KeyMoment
+from .ball.contact import WORDS, striking_surface
+from .ball.orders import HitOrder, Stance
+from .ball.way import Placed, needed, way
+from .errors import InputError
+from .lay_out import faced, footed, smoothed
+from .library.automatic import automatic_words
+from .library.keys import Key
+from .library.library import Library
+from .motion import quaternion
+from .motion.motion import Motion
+from .motion.track import BALL_RADIUS, SampledTrack, Track
+from .motion.track.sampling import travel_direction
+from .plan import Plan
+from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
+from .polish.strike import Touch
+from .polish.strike_at import Meeting, met_at
+from .synthesis.footage import Footage, fetch
+from .synthesis.path_search import PathSearch
+from .synthesis.wanted import Wanted, WantedKey
+from .synthesize import look_of, sources_shown, words_shown
+from .take import BallPath, Take
+
+TRANSITION = 0.4
+"""Seconds over which one piece of clip gives way to the next."""
+
+_WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip's own turning
+
+
+@dataclass(frozen=True)
+class BodySettings:
+    """transition: seconds of a fade between pieces of clips. watch: whether the head follows the ball. seed: of the
+    take's record; nothing here is left to chance."""
+
+    transition: float = TRANSITION
+    watch: bool = True
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class PlayerMotion:
+    """One player of a passing scene. take: his motion with contacts, provenance and all, as `synthesize` gives it. gaps
+    (K,) m between part and ball at each order's strike, NaN where he misses; moved (K,) m that the part was moved for it.
+    warnings: what could not be as ordered."""
+
+    take: Take
+    gaps: np.ndarray
+    moved: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def player_motion(
+    library: Library,
+    stance: Stance,
+    orders: Sequence[HitOrder],
+    ball: BallPath,
+    ball_radius: float = BALL_RADIUS,
+    frames: int | None = None,
+    fps: float = 30.0,
+    settings: BodySettings = BodySettings(),
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> PlayerMotion:
+    """The motion of a player who begins at `stance` and strikes as `orders` say.
+
+    ball: its path at `fps` over the whole scene, whose first time is the motion's; frames: how many (all of the ball's).
+    The same input gives the same bits. InputError for orders outside the scene or two at once; Cancelled.
+    """
+    from threadpoolctl import threadpool_limits
+
+    count = len(ball.times) if frames is None else frames
+    orders = sorted(orders, key=lambda order: order.time)
+    _check(orders, ball.times, fps)
+    with threadpool_limits(limits=1):
+        return _Body(library, stance, orders, ball, ball_radius, count, fps, settings).made(progress, cancelled)
+
+
+def least_seconds(library: Library, before: HitOrder | Stance, after: HitOrder) -> float:
+    """Seconds from one strike (or from standing) to the next that the body needs in haste: to come out of the one
+    motion, to go over and turn, and to begin the other."""
+    then = Placed.of(library, after)
+    into = after.time - then.start
+    end = (0.0, then.path(np.array([then.start]))[0], then.velocity(then.start))
+    if isinstance(before, Stance):
+        state, out = (0.0, np.array(before.place, float), np.zeros(2)), 0.0
+    else:
+        hit = Placed.of(library, before)
+        out = hit.end - before.time
+        state = (0.0, hit.path(np.array([hit.end]))[0], hit.velocity(hit.end))
+    still = np.linalg.norm(end[1] - state[1]) < 0.15 and max(np.linalg.norm(end[2]), np.linalg.norm(state[2])) < 0.3
+    turn = abs(float(quaternion.wrapped(after.facing - before.facing)))
+    return out + into + max(turn / 2.0, 0.2 if still else needed(state, end))
+
+
+def _check(orders: Sequence[HitOrder], times: np.ndarray, fps: float) -> None:
+    for order in orders:
+        if not times[0] - 0.5 / fps <= order.time <= times[-1] + 0.5 / fps:
+            raise InputError("strike", f"at {order.time:g} s", f"within the scene, {times[0]:g} to {times[-1]:g} s")
+    for before, after in zip(orders, orders[1:]):
+        if after.time - before.time < 2.0 / fps:
+            raise InputError("strike", f"two of one player at {after.time:g} s", "one at a time")
+
+
+class _Body:
+    """One player on his way to his motion."""
+
+    def __init__(self, library, stance, orders, ball, ball_radius, count, fps, settings):
+        self.library, self.orders, self.fps, self.settings = library, orders, fps, settings
+        self.ball_radius, self.stance = ball_radius, stance
+        self.hits = [Placed.of(library, order) for order in orders]
+        self.start = float(ball.times[0])
+        self.times = self.start + np.arange(count) / fps
+        self.ball = np.stack([np.interp(self.times, ball.times, column) for column in ball.positions.T], axis=1)
+
+    def made(self, progress, cancelled) -> PlayerMotion:
+        report = progress or (lambda fraction, text: None)
+        count = max(int(np.floor((self.times[-1] - self.start) * self.library.fps + 1e-6)) + 1, 2)
+        order = self._wanted(self.start + np.arange(count) / self.library.fps)
+        edit = PathSearch(self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled).run()
+        index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
+        raw = fetch(self.library, edit, index, self.fps)
+        track, path = self._track(self.times, self.fps)
+        plan = self._plan(track)
+        report(0.75, "Laying out")
+        shown = smoothed(self.library, plan, raw)
+        angle = self._angle(track, path.facing, shown)
+        ground = root_with_sway(path.positions, shown.sway, angle)
+        root = np.column_stack([ground, shown.height])
+        planted, taken = footed(
+            self.library, plan, track, root, faced(shown.pose, angle), shown.standing, self._touches(),
+        )
+        body = Motion(self.library.skeleton, planted.root, planted.rotations, self.fps)
+        body = self._watching(body)
+        struck = met_at(body, taken.standing.any(axis=2), self._meetings())
+        take = Take(
+            motion=struck.motion, start_time=self.start, clips=(), clip=raw.clip, clip_frame=raw.clip_frame,
+            mirrored=np.array([self.library.clips[clip].mirrored for clip in raw.clip]),
+            words=words_shown(self.library, raw), contacts=taken.contacts, seams=raw.seams, timeline=Timeline(), keys=(),
+            ball=BallPath(self.times, self.ball, np.ones(len(self.times), bool)), method="path", seed=self.settings.seed,
+            correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=plan, edit=edit,
+        )
+        report(1.0, "Done")
+        return PlayerMotion(_with_sources(take, self.library, raw), struck.gap, struck.moved, self._warnings(struck))
+
+    def _wanted(self, times: np.ndarray) -> Wanted:
+        """What the search is asked for, at the library's rate."""
+        library = self.library
+        track, _ = self._track(times, library.fps)
+        speeds = np.array([gait.speed for gait in library.gaits])
+        gait = automatic_gaits(track.speed, library.fps, speeds, library.gait_thresholds)
+        words = [frozenset(words) for words in automatic_words(library, gait, track)]
+        keys = tuple(self._key(hit, (hit.order.time - self.start) * library.fps) for hit in self.hits)
+        for hit in self.hits:
+            for frame in np.flatnonzero((times >= hit.start) & (times <= hit.end)):
+                words[frame] = None
+        allowed = np.ones(len(library.clips), bool)
+        return Wanted(track, tuple(words), gait, Timeline(), keys, allowed, ())
+
+    def _key(self, hit: Placed, frame: float) -> WantedKey:
+        order, hit_motion = hit.order, hit.order.hit
+        words = frozenset({WORDS.get(order.part, "kick"), order.side} - {""})
+        key = Key(order.clip, float(order.strike_frame), float(hit_motion.first), float(hit_motion.last), words)
+        return WantedKey(KeyMoment(order.time, tuple(sorted(words))), frame, (key,), None, True, (1.0,))
+
+    def _track(self, times: np.ndarray, fps: float):
+        """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""
+        path = way(self.stance, self.hits, times)
+        velocity = np.gradient(path.positions, 1.0 / fps, axis=0)
+        ball = np.stack([np.interp(times, self.times, column) for column in self.ball.T], axis=1)
+        track = SampledTrack(
+            times=times, positions=path.positions, raw=path.positions, velocity=velocity,
+            speed=np.linalg.norm(velocity, axis=1), direction=travel_direction(velocity, fps),
+            valid=np.ones(len(times), bool), ball=ball, ball_measured=np.ones(len(times), bool), fps=float(fps),
+        )
+        return track, path
+
+    def _plan(self, track: SampledTrack) -> Plan:
+        """What stands in a take's plan: the little track."""
+        return Plan(
+            track=Track(track.times, track.positions, track.ball), library=self.library.folder, fps=self.fps,
+            seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False,
+        )
+
+    def _angle(self, track: SampledTrack, kept: np.ndarray, shown: Footage) -> np.ndarray:
+        """(T,) rad: as recorded in his hit motions, and between them the compromise of `on_track.facing`, turning the
+        short way round."""
+        known = np.flatnonzero(np.isfinite(kept))
+        rough = np.interp(np.arange(len(kept)), known, kept[known])
+        own_speed = np.linalg.norm(shown.velocity, axis=1)
+        moving = [np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0) for speed in (track.speed, own_speed)]
+        going = moving[0] ** 2 * moving[1] ** 2
+        travel = track.direction - np.arctan2(shown.velocity[:, 1], shown.velocity[:, 0])
+        watch = track.direction + wanted_offset(track)
+        weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
+        goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)
+        trust = weights.sum(axis=0) + 1e-6
+        goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
+        given = np.isfinite(kept)
+        goal, trust = np.where(given, kept, goal), np.where(given, 1e6, trust)
+        return _followed(goal, trust, shown.turn)
+
+    def _touches(self) -> list[Touch]:
+        """The hit motions as stretches in which no steps are added."""
+        return [
+            Touch(
+                (hit.order.time - self.start) * self.fps, ("kick",), (hit.order.time - hit.start) * self.fps,
+                (hit.end - hit.order.time) * self.fps,
+            ) for hit in self.hits
+        ]  # fmt: skip
+
+    def _watching(self, body: Motion) -> Motion:
+        return body
+
+    def _meetings(self) -> list[Meeting]:
+        skeleton, out = self.library.skeleton, []
+        for hit in self.hits:
+            order = hit.order
+            surface = striking_surface(skeleton, order.part, order.side, order.tool)
+            frame = (order.time - self.start) * self.fps
+            entry, leave = (frame - (hit.start - self.start) * self.fps, (hit.end - self.start) * self.fps - frame)
+            ball = np.array(order.ball) if order.touches else np.full(3, np.nan)
+            out.append(Meeting(frame, surface, ball, self.ball_radius, entry, leave))
+        return out
+
+    def _warnings(self, struck) -> tuple[str, ...]:
+        told = []
+        for order, gap in zip(self.orders, struck.gap):
+            if gap > 0.005:
+                told.append(f"{order.time:.2f} s: the {order.part} is {100.0 * gap:.1f} cm off the ball")
+        return tuple(told)
+
+
+def _followed(goal: np.ndarray, trust: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """(T,) rad: least squares of sum trust (a - goal)^2 + TURN_WEIGHT (a' - turn)^2, goals without jumps of whole
+    turns."""
+    diagonal, right = trust.copy(), trust * goal
+    diagonal[1:] += TURN_WEIGHT
+    diagonal[:-1] += TURN_WEIGHT
+    right[1:] += TURN_WEIGHT * turn[1:]
+    right[:-1] -= TURN_WEIGHT * turn[1:]
+    band = np.zeros((2, len(goal)))
+    band[0], band[1, :-1] = diagonal, -TURN_WEIGHT
+    return solveh_banded(band, right, lower=True) if len(goal) > 1 else goal
+
+
+def _with_sources(take: Take, library: Library, shown: Footage) -> Take:
+    sources = sources_shown(library, shown)
+    names = tuple(dict.fromkeys(sources))
+    number = {name: i for i, name in enumerate(names)}
+    return replace(take, clips=names, clip=np.array([number[source] for source in sources]))
