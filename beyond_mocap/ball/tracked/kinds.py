@@ -1,0 +1,73 @@
+"""What a touch was: the part that met the ball, and a word for what it did."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...motion.track import BALL_RADIUS
+
+KINDS = ("kick", "receive", "dribble", "header", "chest", "throw-in", "hand", "save", "deflection")
+CHEST, HEAD = 0.95, 1.45  # m of the ball's centre from which the chest, the head meets it
+_FAST = 7.0  # m/s relative to the player, more than a dribble's touch
+_STOPPED = 4.0  # m/s, less than a pass
+_TURN = np.cos(np.radians(50.0))  # a deflection keeps to its way within this
+_LINE = 1.2  # m, beyond or before the touch line, where a throw-in is taken
+_STILL = 1.0  # s between the touch before and a throw-in
+
+
+def part_of(height: float | None) -> str:
+    """The part of a body that meets a ball at `height` m, None where unknown."""
+    if height is None or not np.isfinite(height) or height < CHEST:
+        return "foot"
+    return "chest" if height < HEAD else "head"
+
+
+def kind_of(part: str, before: np.ndarray, after: np.ndarray, same_next: bool, same_before: bool) -> str:
+    """The word for a touch by foot, chest or head: before, after (3,) m/s relative to the player.
+
+    same_next, same_before: whether the same player has the next touch, had the one before.
+    """
+    fast_in, fast_out = np.linalg.norm(before[:2]), np.linalg.norm(after[:2])
+    if part == "head":
+        return "header"
+    if _is_deflection(before, after, fast_in, fast_out, same_next):
+        return "deflection"
+    if part == "chest" and fast_out < _FAST:
+        return "chest"
+    if same_next and fast_out < _FAST:
+        return "dribble" if same_before and fast_in < _STOPPED else "receive"
+    return "kick"
+
+
+def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
+    if same_next or fast_in < 8.0 or fast_out < 0.35 * fast_in or fast_out > 1.1 * fast_in:
+        return False
+    return float(before[:2] @ after[:2]) > _TURN * fast_in * fast_out
+
+
+def is_throw_in(place: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
+    """Whether a ball that lay still or was away for `since` s and now leaves from `place` (3,) is thrown in."""
+    side = np.sign(place[1])
+    inward = -side * after[1] > 0.0
+    return bool(abs(place[1]) > width / 2.0 - _LINE and since > _STILL and inward and np.linalg.norm(after[:2]) > 3.0)
+
+
+def keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:
+    """For each team the player who stands deepest on the whole (index): its goalkeeper."""
+    found = {}
+    middle = np.array([_middle(path) for path in positions])
+    for team in dict.fromkeys(teams):
+        own = [index for index, name in enumerate(teams) if name == team and np.isfinite(middle[index])]
+        if len(own) > 3:
+            found[team] = max(own, key=lambda index: abs(middle[index] - np.median(middle[own])))
+    return found
+
+
+def _middle(path: np.ndarray) -> float:
+    there = path[np.isfinite(path[:, 0]), 0]
+    return float(np.median(there)) if len(there) else np.nan
+
+
+def ground_height(height: float) -> float:
+    """The height of the ball's centre: some feeds say 0 for a ball on the ground."""
+    return max(float(height), BALL_RADIUS) if np.isfinite(height) else BALL_RADIUS

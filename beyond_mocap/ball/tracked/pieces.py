@@ -1,0 +1,108 @@
+"""Pieces of the ball's path: smooth curves of third degree through runs of samples, many at once.
+
+A piece is x(t) = p + v t + a t^2 / 2 + j t^3 / 6 from its first moment on. Friction and drag make accelerations of some
+m/s^2, so a and j are held near zero by their usual size: a short piece is nearly a line, a long one bends as far as its
+samples ask.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+USUAL_SPEED, USUAL_ACCELERATION, USUAL_JERK = 20.0, 7.0, 6.0  # m/s, m/s^2 (gravity among them), m/s^3
+_CHUNK = 400  # starts worked out at once
+
+
+@dataclass(frozen=True, eq=False)
+class Fits:
+    """K pieces over samples first[k] .. last[k] (inclusive).
+
+    begin: (K,) s, the origin of each. coefficients: (K, 4, D): p, v, a/2, j/6. cost: (K,) half the weighted squares.
+    inverse: (K, 4, 4) covariance of one coordinate's coefficients.
+    """
+
+    first: np.ndarray
+    last: np.ndarray
+    begin: np.ndarray
+    coefficients: np.ndarray
+    cost: np.ndarray
+    inverse: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def take(self, which) -> Fits:
+        """Some of them."""
+        return Fits(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+    def position(self, time: np.ndarray, which=slice(None)) -> np.ndarray:
+        """(n, D) m at `time` (n,), each of its own piece."""
+        return np.einsum("ni,nid->nd", powers(time - self.begin[which]), self.coefficients[which])
+
+    def velocity(self, time: np.ndarray, which=slice(None)) -> np.ndarray:
+        """(n, D) m/s at `time` (n,), each of its own piece."""
+        return np.einsum("ni,nid->nd", slopes(time - self.begin[which]), self.coefficients[which])
+
+    def spread(self, time: np.ndarray, which=slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Variances (n,) of one coordinate's position and velocity at `time` (n,)."""
+        since = time - self.begin[which]
+        place, speed, inverse = powers(since), slopes(since), self.inverse[which]
+        return (np.einsum("ni,nij,nj->n", place, inverse, place), np.einsum("ni,nij,nj->n", speed, inverse, speed))
+
+
+def powers(since: np.ndarray) -> np.ndarray:
+    """(n, 4): 1, t, t^2, t^3."""
+    return since[:, None] ** np.arange(4)
+
+
+def slopes(since: np.ndarray) -> np.ndarray:
+    """(n, 4): the derivatives of `powers`."""
+    one = np.ones_like(since)
+    return np.stack([0.0 * one, one, 2.0 * since, 3.0 * since**2], axis=1)
+
+
+def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts: np.ndarray, longest: float,
+                steps: int | None = None) -> Fits:  # fmt: skip
+    """Pieces between all pairs of cuts that are at most `longest` seconds (and `steps` cuts) apart.
+
+    times: (N,) s. points: (N, D) m, any number where weights (N,) (1 / m^2) are zero. cuts: (C,) growing indices; a
+    piece between cuts a and b has the samples a .. b - 1. Neighbouring cuts always make a piece.
+    """
+    parts = []
+    for low in range(0, len(cuts) - 1, _CHUNK):
+        starts = np.arange(low, min(low + _CHUNK, len(cuts) - 1))
+        end = np.searchsorted(times[np.minimum(cuts, len(times) - 1)], times[cuts[starts]] + longest, "right") - 1
+        if steps is not None:
+            end = np.minimum(end, starts + steps)
+        end = np.maximum(np.minimum(end, len(cuts) - 1), starts + 1)
+        counts = end - starts
+        begin = np.repeat(starts, counts)
+        upto = begin + 1 + np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        parts.append(_solve(times, points, weights, cuts, begin, upto))
+    names = Fits.__dataclass_fields__
+    return Fits(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _solve(times, points, weights, cuts, begin, upto) -> Fits:
+    """The pieces between cuts begin[k] and upto[k], whose starts are a few neighbouring cuts."""
+    starts = np.unique(begin)
+    length = int((cuts[upto] - cuts[begin]).max())
+    index = np.minimum(cuts[starts][:, None] + np.arange(length), len(times) - 1)
+    since = times[index] - times[cuts[starts]][:, None]
+    weight = weights[index]
+    powered = weight[..., None] * since[..., None] ** np.arange(7)
+    moments = np.cumsum(powered, axis=1)
+    value = points[index]
+    cross = np.cumsum(powered[..., :4, None] * value[..., None, :], axis=1)
+    square = np.cumsum(weight * (value**2).sum(axis=2), axis=1)
+    row, column = np.searchsorted(starts, begin), cuts[upto] - cuts[begin] - 1
+    normal = moments[row, column][:, np.add.outer(np.arange(4), np.arange(4))]
+    rigid = np.array([1e-6, USUAL_SPEED**-2, 4.0 * USUAL_ACCELERATION**-2, 36.0 * USUAL_JERK**-2])
+    normal = normal + np.diag(rigid)
+    right = cross[row, column]
+    inverse = np.linalg.inv(normal)
+    found = inverse @ right
+    cost = 0.5 * (square[row, column] - (found * right).sum(axis=(1, 2)))
+    return Fits(cuts[begin], cuts[upto] - 1, times[cuts[begin]], found, np.maximum(cost, 0.0), inverse)

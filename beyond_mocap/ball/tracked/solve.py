@@ -1,0 +1,288 @@
+"""The ball solved from samples: touches, the path between them, and where play ends.
+
+1. `samples`: what the feed filled in, what is wrong, how far the rest scatters.
+2. `cuts`: all places where the course may change. 3. `touches`: which of them are touches, which are none, in one
+search that weighs how the velocity changes against who is near. 4. `who`: one chain of players. 5. `kinds`, `ends`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import Cancelled
+from ...motion.runs import runs
+from ...motion.skeleton import frozen_array
+from ...motion.track import BALL_RADIUS
+from . import cuts as cutting
+from . import kinds, touches, who
+from .ends import BallEnd, ball_ends
+from .path import BallPiece, SolvedPath
+from .samples import Samples, read_samples
+
+PITCH = (105.0, 68.0)
+_GAP = 1.5  # s without a sample, over which nothing is solved
+_SHORTEST = 0.3  # s that can be solved
+_TOGETHER = 0.06  # s in which samples err together: they count as one
+_STEP = 0.04  # s between the knots of a path
+_BLEND = 0.2  # s over which a path is brought to the place of a touch
+_HEIGHTS = 0.8  # share of samples with a height from which heights are used
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedTouch:
+    """Somebody changed the ball's course.
+
+    time: s; uncertainty: s, standard deviation. player: id, "" where nobody tracked was near. part: "foot", "head",
+    "chest" or "hand". kind: one of `kinds.KINDS`. position: (3,) m, the ball's centre. before, after: (3,) m/s of the
+    ball. confidence: 0 to 1, that there was a touch and that it was this player's.
+    """
+
+    time: float
+    uncertainty: float
+    player: str
+    part: str
+    kind: str
+    position: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    confidence: float
+
+    def __post_init__(self):
+        for name in ("position", "before", "after"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name)))
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedBall:
+    """What was solved from N samples.
+
+    times: (N,) s of the samples. touches: in order. ball: the path, `.at(times)`, with its pieces. filled, outlier,
+    measured: (N,) bool. residuals: (N,) m over the ground from each sample to the path, NaN where unknown. ends: where
+    the ball left the pitch. confidence: 0 to 1, the touches' mean. notes: lines for people.
+    """
+
+    times: np.ndarray
+    touches: tuple[SolvedTouch, ...]
+    ball: SolvedPath
+    filled: np.ndarray
+    outlier: np.ndarray
+    measured: np.ndarray
+    residuals: np.ndarray
+    ends: tuple[BallEnd, ...]
+    confidence: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def pieces(self) -> tuple[BallPiece, ...]:
+        """The pieces of the path."""
+        return self.ball.pieces
+
+    def touches_of(self, player: str) -> tuple[SolvedTouch, ...]:
+        """One player's, in order."""
+        return tuple(touch for touch in self.touches if touch.player == player)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The touches of one window before they have players: cuts, and the touches' indices in them."""
+
+    cuts: touches.Cuts
+    samples: Samples
+
+
+def solve(
+    times: np.ndarray,
+    ball: np.ndarray,
+    positions: np.ndarray,
+    players: Sequence[str],
+    teams: Sequence[str] = (),
+    pitch: tuple[float, float] = PITCH,
+    where: str = "ball",
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> SolvedBall:
+    """Solves a feed: times (N,) s, ball (N, 3) m with NaN where unknown, positions (P, N, 2) m of the `players`.
+
+    teams: (P,) names, () where unknown. pitch: length, width m. where: the feed's name, for messages. InputError where
+    the ball has fewer than five samples.
+    """
+    samples = read_samples(times, ball, where)
+    kept = np.isin(np.asarray(times, float), samples.times)
+    positions = np.asarray(positions, float)[:, kept][:, : len(samples.times)]
+    stranger = who.STRANGER if len(players) > 1 else who.ALONE
+    windows = _windows(samples)
+    found = []
+    for number, window in enumerate(windows):
+        if cancelled is not None and cancelled():
+            raise Cancelled("solving the ball")
+        if progress is not None:
+            progress(number / len(windows), "touches")
+        found.append(_solve_window(samples, window, positions, stranger))
+    path = SolvedPath(tuple(piece for window, cuts in zip(windows, found) for piece in _pieces(samples, window, cuts)))
+    solved = _named(samples, found, positions, players, teams, pitch, stranger)
+    ends = ball_ends(samples.times, path.at(samples.times), *pitch)
+    residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
+    sure = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
+    return SolvedBall(
+        times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled, outlier=samples.outlier,
+        measured=frozen_array(samples.measured, bool), residuals=frozen_array(residuals),
+        ends=tuple(_by_whom(end, solved) for end in ends), confidence=sure,
+    )  # fmt: skip
+
+
+def _windows(samples: Samples) -> list[slice]:
+    """The stretches in which the ball is known, gaps of up to _GAP bridged."""
+    there = np.flatnonzero(samples.used)
+    breaks = np.flatnonzero(np.diff(samples.times[there]) > _GAP)
+    firsts, lasts = [there[0], *there[breaks + 1]], [*there[breaks], there[-1]]
+    spans = [slice(int(first), int(last) + 1) for first, last in zip(firsts, lasts)]
+    kept = [s for s in spans if samples.times[s.stop - 1] - samples.times[s.start] >= _SHORTEST and s.stop - s.start >= 5]
+    return kept or [spans[0]]
+
+
+def _bridged(samples: Samples, window: slice) -> np.ndarray:
+    """(n, 2 or 3) m of a window, gaps and wrong samples bridged; heights where the feed has them."""
+    points, used = samples.positions[window], samples.used[window]
+    heights = np.isfinite(points[:, 2])
+    axes = 3 if np.count_nonzero(heights & used) > _HEIGHTS * np.count_nonzero(used) else 2
+    there = np.flatnonzero(used & heights) if axes == 3 else np.flatnonzero(used)
+    every = np.arange(len(points))
+    return np.stack([np.interp(every, there, points[there, axis]) for axis in range(axes)], axis=1)
+
+
+def _solve_window(samples: Samples, window: slice, positions: np.ndarray, stranger: float) -> touches.Cuts:
+    times, points = samples.times[window], _bridged(samples, window)
+    weights = samples.used[window] / samples.scatter[window] ** 2 * min(1.0, samples.interval / _TOGETHER)
+    places = cutting.promising(times, points, samples.used[window], samples.interval)
+    chosen = cutting.choose_cuts(times, points, weights, places)
+    cost = _reach_cost(times, points, positions[:, window], chosen, stranger)
+    return touches.solve_cuts(times, points, weights, chosen, cost)
+
+
+def _reach_cost(times, points, positions, cuts, stranger) -> np.ndarray:
+    """(C,) nats of the nearest player touching between the samples before and after each cut."""
+    costs = []
+    for near in (cuts - 1, cuts):
+        index = np.clip(near, 0, len(times) - 1)
+        away = who.distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
+        costs.append(who.reach_cost(away, points[index, 2] if points.shape[1] == 3 else None, stranger))
+    return np.minimum(*costs)
+
+
+def _pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPiece]:
+    """The path of one window, its ends brought to the places of the cuts."""
+    times = samples.times[window]
+    edges = np.concatenate([[times[0]], cuts.time, [times[-1]]])
+    edges = np.maximum.accumulate(edges)
+    out = []
+    for index in range(len(cuts.pieces)):
+        start, end = edges[index], edges[index + 1]
+        if end - start < 1e-6:
+            continue
+        count = max(2, int(np.ceil((end - start) / _STEP)) + 1)
+        at = np.linspace(start, end, count)
+        which = np.full(count, index)
+        places, speeds = cuts.pieces.position(at, which), cuts.pieces.velocity(at, which)
+        for edge, place in ((index - 1, 0), (index, -1)):
+            if 0 <= edge < len(cuts.time):
+                miss = cuts.place[edge] - places[place]
+                near = np.maximum(0.0, 1.0 - np.abs(at - at[place]) / min(_BLEND, end - start))
+                places = places + near[:, None] ** 2 * miss
+        out.append(_piece(samples, at, *_lifted(places, speeds)))
+    return out
+
+
+def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Three coordinates, the ball's centre never below its radius."""
+    if places.shape[1] == 2:
+        places = np.pad(places, ((0, 0), (0, 1)), constant_values=BALL_RADIUS)
+        return places, np.pad(speeds, ((0, 0), (0, 1)))
+    low = places[:, 2] < BALL_RADIUS
+    places = np.where(low[:, None] * [False, False, True], BALL_RADIUS, places)
+    return places, np.where(low[:, None] * [False, False, True], 0.0, speeds)
+
+
+def _piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
+    part = slice(*np.searchsorted(samples.times, [at[0], at[-1]]))
+    seen = samples.measured[part]
+    piece = SolvedPath((BallPiece(at, places, speeds, "", np.zeros(3), np.nan, np.zeros(0)),))
+    off = piece.residuals(samples.times[part], samples.positions[part])[seen]
+    fast, high = np.linalg.norm(speeds[:, :2], axis=1).max(), places[:, 2].max()
+    kind = "flight" if high > 0.5 else "still" if fast < 0.3 else "roll"
+    residual = float(np.sqrt(np.mean(off**2))) if len(off) else np.nan
+    return BallPiece(at, places, speeds, kind, np.zeros(3), residual, np.zeros(0))
+
+
+def _named(samples, found, positions, players, teams, pitch, stranger) -> list[SolvedTouch]:
+    """The touches with their players, parts and kinds."""
+    fields = ("time", "spread", "margin", "place", "before", "after")
+    rows = [tuple(_three(getattr(cuts, name)[cuts.touch]) for name in fields) for cuts in found]
+    time, spread, margin, place, before, after = (np.concatenate(column) for column in zip(*rows))
+    if not len(time):
+        return []
+    away = who.distances(samples.times, place[:, :2], positions, time)
+    chosen = who.choose(away, time, _between(samples, positions, time), stranger)
+    order = sorted(range(len(time)), key=lambda k: time[k])
+    known_height = np.isfinite(samples.positions[:, 2]).mean() > _HEIGHTS
+    out = []
+    for k in order:
+        player = int(chosen[k])
+        moving = _player_velocity(samples, positions, player, time[k])
+        part = kinds.part_of(place[k, 2] if known_height else None)
+        same_next = k + 1 < len(time) and chosen[k + 1] == player and time[k + 1] - time[k] < 3.0
+        same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
+        kind = kinds.kind_of(part, before[k] - moving, after[k] - moving, same_next, same_before)
+        since = time[k] - time[k - 1] if k else np.inf
+        if part != "head" and kinds.is_throw_in(place[k], after[k], since, pitch[1]):
+            part, kind = "hand", "throw-in"
+        sure = _sure(margin[k], away[:, k], player)
+        centre = np.array([place[k, 0], place[k, 1], kinds.ground_height(place[k, 2])])
+        name = players[player] if player >= 0 else ""
+        out.append(SolvedTouch(float(time[k]), float(spread[k]), name, part, kind, centre, before[k], after[k], sure))
+    return out
+
+
+def _three(values: np.ndarray) -> np.ndarray:
+    """Rows of two coordinates with a zero third."""
+    return np.pad(values, ((0, 0), (0, 1))) if values.ndim == 2 and values.shape[1] == 2 else values
+
+
+def _between(samples: Samples, positions: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """(P, K) m, each player's mean distance from the samples since the touch before."""
+    ball = samples.positions[:, :2]
+    away = np.linalg.norm(positions - ball, axis=2)
+    seen = np.isfinite(away)
+    total = np.pad(np.cumsum(np.where(seen, away, 0.0), axis=1), ((0, 0), (1, 0)))
+    count = np.pad(np.cumsum(seen, axis=1), ((0, 0), (1, 0)))
+    at = np.searchsorted(samples.times, time)
+    before = np.concatenate([[0], at[:-1]])
+    return (total[:, at] - total[:, before]) / np.maximum(count[:, at] - count[:, before], 1)
+
+
+def _player_velocity(samples: Samples, positions: np.ndarray, player: int, time: float) -> np.ndarray:
+    """(3,) m/s of a player's middle around `time`; zero where he is not known."""
+    if player < 0:
+        return np.zeros(3)
+    ends = np.array([time - 0.2, time + 0.2])
+    path, there = positions[player], np.isfinite(positions[player, :, 0])
+    if np.count_nonzero(there) < 2:
+        return np.zeros(3)
+    place = [np.interp(ends, samples.times[there], path[there, axis]) for axis in range(2)]
+    return np.array([*((p[1] - p[0]) / 0.4 for p in place), 0.0])
+
+
+def _sure(margin: float, away: np.ndarray, player: int) -> float:
+    """0 to 1: that it was a touch, times that it was this player's."""
+    touch = 1.0 / (1.0 + np.exp(-margin))
+    if player < 0:
+        return float(0.5 * touch)
+    worth = np.exp(-who.reach_cost(away, None) - away / who.STRAY)
+    return float(touch * worth[player] / max(worth.sum(), 1e-12))
+
+
+def _by_whom(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
+    earlier = [touch.player for touch in solved if touch.time < end.time]
+    return BallEnd(end.time, end.kind, end.x, end.y, earlier[-1] if earlier else "")

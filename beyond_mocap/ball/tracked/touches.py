@@ -1,0 +1,163 @@
+"""Which cuts of the ball's path are touches, and by whom: one search over all of them at once.
+
+Between two cuts lies a smooth piece. A cut is one of three things, each with a probability of what is seen there:
+**touch**: a player is near enough, and the velocity changes by any amount; **free**: a bounce, the beginning of rolling,
+a corner that the feed made: the ball slows a little and keeps its way; **nothing**: the cut is left out, and one piece
+goes through. The dearest explanation loses. Costs are negative logarithms of probabilities (nats).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .pieces import Fits, fit_between
+
+USUAL_CHANGE = 9.0  # m/s, the mean change of velocity by a touch
+TOUCH, FREE = 4.5, 3.5  # nats for a cut of either kind beside what is seen there
+_LONGEST = 6.0  # seconds of one piece
+_STEPS = 14  # cuts that one piece may leave out
+_JOINT = 0.12  # m by which neighbouring pieces may miss each other
+
+
+@dataclass(frozen=True, eq=False)
+class Cuts:
+    """The cuts that remain, in order, C of them, and the C + 1 pieces around them.
+
+    time: (C,) s between two samples. spread: (C,) s. touch: (C,) bool, else free. margin: (C,) nats by which the other
+    kind is dearer. before, after: (C, D) m/s; place: (C, D) m.
+    """
+
+    time: np.ndarray
+    spread: np.ndarray
+    touch: np.ndarray
+    margin: np.ndarray
+    place: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    pieces: Fits
+
+
+def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
+    """The likeliest choice among `cuts` (growing sample indices, the first 0 and the last N).
+
+    player_cost: (len(cuts),) nats for the nearest player being the one who touches there.
+    """
+    pieces = fit_between(times, points, weights, cuts, _LONGEST, _STEPS)
+    begin = np.searchsorted(cuts, pieces.first)
+    upto = np.searchsorted(cuts, pieces.last + 1)
+    by_begin = np.searchsorted(begin, np.arange(len(cuts) + 1))
+    ending = np.argsort(upto, kind="stable")
+    by_end = np.searchsorted(upto[ending], np.arange(len(cuts) + 1))
+    left, right = _pairs(ending, by_end, by_begin, len(cuts))
+    knot = _knots(pieces, left, right, times, cuts, upto, player_cost)
+    price = np.minimum(knot.touch, knot.free)
+    best = np.where(begin == 0, pieces.cost, np.inf)
+    back = np.full(len(pieces), -1)
+    offset = 0
+    for cut in range(1, len(cuts) - 1):
+        into, outof = ending[by_end[cut] : by_end[cut + 1]], slice(by_begin[cut], by_begin[cut + 1])
+        shape = len(into), outof.stop - outof.start
+        count = shape[0] * shape[1]
+        total = best[into][:, None] + price[offset : offset + count].reshape(shape)
+        choice = total.argmin(axis=0)
+        best[outof] = pieces.cost[outof] + total[choice, np.arange(shape[1])]
+        back[outof] = into[choice]
+        offset += count
+    last = ending[by_end[len(cuts) - 1] :]
+    way = [int(last[best[last].argmin()])]
+    while back[way[-1]] >= 0:
+        way.append(int(back[way[-1]]))
+    way = np.array(way[::-1])
+    return _chosen(pieces.take(way), times, cuts, player_cost)
+
+
+def _pairs(ending, by_end, by_begin, count) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of all neighbouring pieces (left ends where right begins), cut by cut, row by row."""
+    left, right = [np.zeros(0, int)], [np.zeros(0, int)]
+    for cut in range(1, count - 1):
+        into, outof = ending[by_end[cut] : by_end[cut + 1]], np.arange(by_begin[cut], by_begin[cut + 1])
+        left.append(np.repeat(into, len(outof)))
+        right.append(np.tile(outof, len(into)))
+    return np.concatenate(left), np.concatenate(right)
+
+
+@dataclass(frozen=True, eq=False)
+class _Knots:
+    time: np.ndarray
+    spread: np.ndarray
+    place: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    touch: np.ndarray
+    free: np.ndarray
+
+
+def _knots(pieces: Fits, left, right, times, cuts, upto, player_cost) -> _Knots:
+    """What neighbouring pieces say of the cut between them, and the costs of both kinds."""
+    cut = upto[left]
+    first, second = times[cuts[cut] - 1], times[np.minimum(cuts[cut], len(times) - 1)]
+    middle, step = 0.5 * (first + second), np.maximum(second - first, 1e-3)
+    before, after = pieces.velocity(middle, left), pieces.velocity(middle, right)
+    gap = pieces.position(middle, left) - pieces.position(middle, right)
+    change = after - before
+    size = (change**2).sum(axis=1)
+    shift = np.clip((gap * change).sum(axis=1) / np.maximum(size, 1e-6), -0.75 * step, 0.75 * step)
+    time = middle + shift
+    before, after = pieces.velocity(time, left), pieces.velocity(time, right)
+    here, there = pieces.position(time, left), pieces.position(time, right)
+    place_left, speed_left = pieces.spread(time, left)
+    place_right, speed_right = pieces.spread(time, right)
+    axes = before.shape[1]
+    miss = ((here - there) ** 2).sum(axis=1) / (_JOINT**2 + place_left + place_right)
+    speed_var = speed_left + speed_right
+    change = after - before
+    size = np.sqrt((change**2).sum(axis=1))
+    joint = 0.5 * miss
+    touch = TOUCH + joint + player_cost[cut] + _log_touch(size, speed_var, axes)
+    free = FREE + joint + _free_cost(before, change, here, speed_var)
+    place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
+    spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
+    return _Knots(time, np.minimum(spread, step), place, before, after, touch, free)
+
+
+def _log_touch(size, variance, axes) -> np.ndarray:
+    """Cost of a change of velocity by a touch: its length falls off exponentially, its direction is any."""
+    size = np.sqrt(size**2 + variance)
+    return size / USUAL_CHANGE + np.log(USUAL_CHANGE * 2.0 * np.pi * np.maximum(size, 0.3))
+
+
+def _free_cost(before, change, place, variance) -> np.ndarray:
+    """Cost of a change of velocity without a touch: along the way a little slower, across hardly, upward at the
+    ground."""
+    flat = before[:, :2]
+    speed = np.linalg.norm(flat, axis=1)
+    way = flat / np.maximum(speed, 1e-6)[:, None]
+    along = (change[:, :2] * way).sum(axis=1)
+    across = change[:, 0] * way[:, 1] - change[:, 1] * way[:, 0]
+    slower = np.where(along < 0.0, 0.5 + 0.12 * speed, 0.5) ** 2 + variance
+    aside = (0.4 + 0.02 * speed) ** 2 + variance
+    cost = 0.5 * (_heavy(along**2 / slower) + _heavy(across**2 / aside) + np.log(4.0 * np.pi**2 * slower * aside))
+    if change.shape[1] == 3:
+        upward = change[:, 2]
+        bounces = (place[:, 2] < 0.5) & (before[:, 2] < 0.0) & (upward > 0.0)
+        room = np.where(bounces, 2.0 + np.abs(before[:, 2]), 1.0) ** 2 + variance
+        cost = cost + 0.5 * _heavy(upward**2 / room)
+    return cost
+
+
+def _heavy(squares: np.ndarray) -> np.ndarray:
+    """Squares (in deviations) that grow more slowly beyond three deviations: feeds err more than a bell curve does."""
+    return np.where(squares < 9.0, squares, 6.0 * np.sqrt(np.maximum(squares, 9.0)) - 9.0)
+
+
+def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
+    upto = np.searchsorted(cuts, pieces.last + 1)
+    left = np.arange(len(pieces) - 1)
+    knots = _knots(pieces, left, left + 1, times, cuts, upto, player_cost)
+    return Cuts(
+        time=knots.time, spread=knots.spread, touch=knots.touch < knots.free,
+        margin=np.abs(knots.touch - knots.free), place=knots.place, before=knots.before, after=knots.after,
+        pieces=pieces,
+    )  # fmt: skip

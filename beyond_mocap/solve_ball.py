@@ -1,0 +1,39 @@
+"""The recipe for the ball of a tracked match, or of one player's track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .ball.tracked.solve import PITCH, SolvedBall, solve
+from .errors import InputError
+from .files.tracking import Match
+from .motion.track import Track
+
+
+def solve_ball(
+    source: Match | Track,
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    start: float | None = None,
+    end: float | None = None,
+) -> SolvedBall:
+    """Touches and the path of the ball in `source`, or from `start` to `end` seconds of it.
+
+    A track has one player: touches of others have the player "". InputError where the source has no ball then.
+    """
+    low, high = -np.inf if start is None else start, np.inf if end is None else end
+    part = (source.times >= low) & (source.times <= high)
+    if not part.any():
+        raise InputError("times", f"no sample from {start} to {end} s", f"{source.times[0]:g} to {source.times[-1]:g} s")
+    if isinstance(source, Track):
+        ball = np.where([True, True, False], source.ball, np.where(source.ball_height_known, source.ball[:, 2], np.nan)[:, None])
+        return solve(
+            source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
+            pitch=PITCH, progress=progress, cancelled=cancelled,
+        )  # fmt: skip
+    return solve(
+        source.times[part], source.ball[part], source.positions[:, part], [player.id for player in source.players],
+        [player.team for player in source.players], (source.length, source.width), source.provider, progress, cancelled,
+    )  # fmt: skip
