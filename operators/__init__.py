@@ -31,6 +31,7 @@ from . import (
     export_motion,
     export_words,
     go_to_moment,
+    hit_analysis,
     import_clip,
     import_clips,
     import_tracking,
@@ -69,6 +70,7 @@ from . import (
     show_video,
     split_span,
     synthesize,
+    take_ball,
     track_object,
     update,
     update_live,
@@ -155,6 +157,11 @@ CLASSES = (
     path_apart.BEYOND_MOCAP_OT_path_apart,
     bake_path.BEYOND_MOCAP_OT_bake_path,
     leave_path.BEYOND_MOCAP_OT_leave_path,
+    hit_analysis.BEYOND_MOCAP_OT_hit_analysis,
+    hit_analysis.BEYOND_MOCAP_OT_go_to_hit,
+    hit_analysis.BEYOND_MOCAP_OT_clear_hits,
+    take_ball.BEYOND_MOCAP_OT_take_ball,
+    take_ball.BEYOND_MOCAP_OT_free_ball,
 )
 
 

@@ -6,7 +6,7 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, library, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline, video, view,
+    annotate, ball, library, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline, video, view,
 )
 
 CLASSES = (
@@ -23,6 +23,10 @@ CLASSES = (
     result.BEYOND_MOCAP_PT_result,
     quality.BEYOND_MOCAP_PT_quality,
     path.BEYOND_MOCAP_PT_path,
+    ball.BEYOND_MOCAP_UL_passers,
+    ball.BEYOND_MOCAP_UL_passes,
+    ball.BEYOND_MOCAP_UL_touches,
+    ball.BEYOND_MOCAP_PT_ball,
     view.BEYOND_MOCAP_PT_view,
     timeline.BEYOND_MOCAP_MT_choose_player,
     timeline.BEYOND_MOCAP_PT_timeline,

@@ -23,6 +23,7 @@
 - `rig`, `bone_maps`, `rig_controls`, `rig_bake`, `rig_copy`   a motion onto somebody's own rig, by a map of its bones
 - `key_reduction`   keys that curves do not need are left out
 - `ride`        path editing: armatures whose motion rides a curve
+- `passes`      the ball and who keeps it going: hit analysis, passing scenes, who carries the ball, the solved ball
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -35,6 +36,8 @@ from . import (
     background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, result, rig,
     session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
+from .passes import hits_shown
+from .passes import settings as passes
 from .ride import live as ride_live
 from .ride import measure as ride_measure
 from .ride.settings import BeyondMocapRide
@@ -42,6 +45,7 @@ from .ride.settings import BeyondMocapRide
 CLASSES = (
     *result.CLASSES,
     BeyondMocapRide,
+    *passes.CLASSES,
     video.BeyondMocapVideo,
     view_settings.BeyondMocapView,
     view_settings.BeyondMocapPlayhead,
@@ -65,7 +69,10 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_lanes", lanes.BeyondMocapLanes),
     ("Object", "beyond_mocap_dot", dots.BeyondMocapDot),
     ("Object", "beyond_mocap_ride", BeyondMocapRide),
+    ("Object", "beyond_mocap_hits", passes.BeyondMocapHits),
+    ("Object", "beyond_mocap_ball", passes.BeyondMocapBall),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
+    ("Scene", "beyond_mocap_passes", passes.BeyondMocapPasses),
     ("WindowManager", "beyond_mocap_problems", word_checks.BeyondMocapProblems),
     ("WindowManager", "beyond_mocap_work", settings.BeyondMocapWork),
     ("WindowManager", "beyond_mocap_playhead", view_settings.BeyondMocapPlayhead),
@@ -90,10 +97,12 @@ def register():
     live.register()
     ride_live.register()
     ride_measure.register()
+    hits_shown.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    hits_shown.unregister()
     ride_measure.unregister()
     ride_live.unregister()
     live.unregister()

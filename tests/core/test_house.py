@@ -47,7 +47,8 @@ LAZY = {
 EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
-    "panels": ["panels", "scene.settings", "scene.preferences", "scene.ride.settings", "scene.ride.figure_lines"],
+    "panels": ["panels", "scene.settings", "scene.preferences", "scene.ride.settings", "scene.ride.figure_lines",
+               "scene.passes.settings", "scene.passes.graph"],
 }
 
 

@@ -1,0 +1,149 @@
+"""Ball & Passes: where a body can strike, who passes to whom, who carries the ball, and the ball of a tracking file."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.passes import graph
+from ..scene.passes.settings import active_row, ball_of, subject, told_lines
+from .tab import Step, paragraph
+
+PART_ICONS = {"foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"}
+KIND_ICONS = {"toss": "IPO_SINE", "pass": "IPO_QUAD", "attack": "IPO_EXPO"}
+LINE = 20.0  # pixels of a line of the interface, at a scale of 1
+
+
+class BEYOND_MOCAP_UL_passers(bpy.types.UIList):
+    """The players of a passing scene."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One player."""
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False)
+        row.label(text="", icon=PART_ICONS[item.part])
+        shirt = row.row()
+        shirt.ui_units_x = 1.0
+        shirt.prop(item, "shirt", text="")
+        if item.place is None:
+            row.label(text="", icon="ERROR")
+
+
+class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
+    """The passes, one after the other."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One pass."""
+        row = layout.row(align=True)
+        row.label(text=f"{item.who} to {item.to}", icon=KIND_ICONS[item.kind])
+        bounces = row.row(align=True)
+        bounces.ui_units_x = 3.2
+        bounces.prop(item, "bounces", text="", emboss=False, icon="TRACKING_REFINE_FORWARDS")
+        if item.error != "none":
+            row.label(text="", icon="CANCEL")
+
+
+class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
+    """Touches that were solved from tracking."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One touch."""
+        row = layout.row(align=True)
+        row.prop(item, "use", text="")
+        row.label(text=f"{item.time:.2f} s  {item.name or 'nobody'}: {item.kind} {item.part}")
+        row.label(text=f"{item.confidence:.0%}")
+
+
+class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
+    """The ball and the players who keep it going."""
+
+    bl_label = "Ball & Passes"
+    bl_order = 8
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """Five parts, each folded until it is wanted."""
+        layout = self.layout
+        section(layout, "scene", "Passing Scene", lambda opened: passing(self, opened, context))
+        section(layout, "hits", "Hit Analysis", lambda opened: hits(opened, context))
+        section(layout, "hold", "Carried Ball", lambda opened: carried(opened, context))
+
+
+def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
+    """A part that can be folded."""
+    header, body = layout.panel(f"beyond_mocap_ball_{name}", default_closed=closed)
+    header.label(text=title)
+    if body:
+        draw(body)
+
+
+def split(layout):
+    """A column of named values."""
+    column = layout.column()
+    column.use_property_split, column.use_property_decorate = True, False
+    return column
+
+
+def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
+    """A list with what adds to it, takes away and moves."""
+    row = layout.row()
+    row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active, rows=3)
+    column = row.column(align=True)
+    for what, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
+        button = column.operator(f"beyond_mocap.{verb}", text="", icon=icon)
+        button.rows, button.what = rows, what
+
+
+def passing(panel, layout, context) -> None:
+    """Players, passes, ball, and what comes of them."""
+    settings = context.scene.beyond_mocap_passes
+
+
+def hits(layout, context) -> None:
+    """What to look for, the graph, and a line for each strike that goes there."""
+    body = subject(context)
+    if body is None:
+        paragraph(layout, "Select an armature with a motion", "INFO")
+        return
+    found = body.beyond_mocap_hits
+    layout.label(text=body.name, icon="ARMATURE_DATA")
+    row = layout.row(align=True)
+    row.prop(found, "part", text="")
+    row.prop(found, "side", text="")
+    column = split(layout)
+    column.prop_search(found, "bone", body.data, "bones")
+    column.prop(found, "threshold")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.hit_analysis", icon="GRAPH")
+    if not found.found:
+        return
+    row.operator("beyond_mocap.clear_hits", text="", icon="X")
+    if icon := graph.icon_of(found):
+        width = context.region.width / context.preferences.system.ui_scale - 2.5 * LINE
+        layout.template_icon(icon, scale=max(6.0, min(width / LINE, 16.0)))
+    for frame, text in told_lines(found.lines):
+        layout.operator("beyond_mocap.go_to_hit", text=f"{frame}: {text}", icon="KEYTYPE_EXTREME_VEC").frame = frame
+    if not found.lines:
+        paragraph(layout, "No strike found: try the other side, another part or a threshold", "INFO")
+
+
+def carried(layout, context) -> None:
+    """Who carries the ball and when."""
+    settings, body, ball = context.scene.beyond_mocap_passes, subject(context), ball_of(context)
+    layout.label(text=ball.name if ball is not None else "No ball: select one", icon="SPHERE" if ball is not None else "INFO")
+    layout.label(text=body.name if body is not None else "No armature: select one", icon="ARMATURE_DATA" if body is not None else "INFO")
+    row = layout.row(align=True)
+    row.prop(settings, "hold_part", text="")
+    row.prop(settings, "hold_side", text="")
+    row = layout.row(align=True)
+    row.prop(settings, "hold_first")
+    row.prop(settings, "hold_last")
+    layout.row().prop(settings, "hold_how", expand=True)
+    take = layout.operator("beyond_mocap.take_ball", icon="CON_CHILDOF")
+    take.part, take.side, take.how = settings.hold_part, settings.hold_side, settings.hold_how
+    take.first, take.last = settings.hold_first, settings.hold_last
+    if ball is None:
+        return
+    for number, hold in enumerate(ball.beyond_mocap_ball.holds):
+        row = layout.row(align=True)
+        row.label(text=f"{hold.first} to {hold.last}: {hold.body.name if hold.body else 'gone'}, {hold.bone}")
+        row.operator("beyond_mocap.free_ball", text="", icon="X").number = number

@@ -1,0 +1,7 @@
+"""The ball and the players who keep it going, as Blender's data.
+
+- `settings`   what the panel shows: players, passes, the ball, weights; what an armature keeps of its hit analysis
+- `hits_shown` hit analysis of an armature: figures for the panel, markers on its action
+- `graph`      its curves as a small picture
+- `possession` a ball carried by a bone for a while, without a jump at either end
+"""

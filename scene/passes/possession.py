@@ -1,0 +1,248 @@
+"""Possession: a bone carries the ball for a while, by a Child Of constraint whose influence is keyed.
+
+The ball's own action is put aside; it plays one that is made of it and of all stretches in which it is carried, so that
+any of them can be changed or taken back. Where a stretch begins, the ball is where it was. Where it ends, the ball is on
+its own way again, if that goes on, else it stays where it was let go. In between it is rigid with the bone, but for the
+frames at either end in which it comes to where it is carried and back.
+
+With T the bone's matrix in the world, W the ball's own way and L = T^-1 W the ball as the bone sees it, the constraint
+shows T inv own. Its inverse is that of T on the first frame, so own = T(first) L there, which is W: no jump.
+"""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Quaternion, Vector
+
+from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.motion.humanoid import identify
+from .. import armature, channels, linked
+from ..measure import units_per_metre
+from ..ride.rig_look import alone
+from ..set_aside import bring_back, put_aside
+from .settings import KEPT, BeyondMocapHold
+
+CONSTANT = 0  # Keyframe.interpolation as foreach_set takes it
+JUST_BEFORE = 0.02  # frames; Blender takes keys within 0.01 for one
+SURFACE = {"hand": 0.03, "foot": 0.045, "head": 0.1, "chest": 0.12}  # metres from a bone to the skin over it
+_TURNS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+
+
+def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> str:
+    """The bone of a part; InputError where the skeleton lacks it."""
+    skeleton = armature.skeleton_of(body, scene)
+    found = identify(skeleton)
+    limb = getattr(found, side)
+    joint = {"foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": found.head, "chest": found.chest}[part]
+    if joint is None:
+        raise InputError(f"armature {body.name}", f"no bone for {part}", "a humanoid", "choose another part, or name the bone")
+    return skeleton.names[joint]
+
+
+def take(
+    scene: bpy.types.Scene, ball: bpy.types.Object, body: bpy.types.Object, bone: str, first: int, last: int,
+    how: str = "KEEP", settle: int = 4, skin: float = 0.03,
+) -> BeyondMocapHold:
+    """Let a bone carry the ball from frame `first` until it is let go on `last`; how: one of `settings.HOLDS`; settle:
+    frames within which it comes to where it is carried; skin: metres from the bone to what touches. InputError, and
+    nothing changed, where it cannot be carried."""
+    _check(ball, body, bone, first, last)
+    for other in ball.beyond_mocap_ball.holds:
+        if first < other.last and other.first < last:
+            raise InputError(f"ball {ball.name}", f"carried by {_name(other)} on frames {other.first} to {other.last} already",
+                             "other frames", "free the ball there first")
+    if not ball.beyond_mocap_ball.before.kept:
+        put_aside(ball.beyond_mocap_ball.before, ball)
+    hold = ball.beyond_mocap_ball.holds.add()
+    hold.body, hold.bone, hold.first, hold.last = body, bone, first, last
+    hold.how, hold.settle, hold.skin = how, settle, skin
+    constraint = ball.constraints.new("CHILD_OF")
+    constraint.name = f"Carried by {body.name}"
+    constraint.target, constraint.subtarget = body, bone
+    constraint.use_scale_x = constraint.use_scale_y = constraint.use_scale_z = False
+    constraint.influence = 0.0
+    hold.name = constraint.name
+    rebuild(scene, ball)
+    return hold
+
+
+def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = None) -> None:
+    """Take back one stretch in which the ball is carried, or all; after the last one it plays its own action again."""
+    linked.refuse(ball)
+    channels.check_free(ball)
+    own = ball.beyond_mocap_ball
+    for index in reversed(range(len(own.holds)) if number is None else [number]):
+        constraint = ball.constraints.get(own.holds[index].name)
+        if constraint is not None:
+            ball.constraints.remove(constraint)
+        own.holds.remove(index)
+    if len(own.holds):
+        rebuild(scene, ball)
+    elif own.before.kept:
+        bring_back(own.before, ball, KEPT)
+
+
+def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
+    """Make the ball's action anew, of its own way and of who carries it."""
+    holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if hold.body is not None), key=lambda hold: hold.first)
+    frames, way, ends = own_way(scene, ball, holds)
+    own, lets_go = list(way), []
+    for hold in holds:
+        a, b = hold.first - frames[0], hold.last - frames[0]
+        bones = _bones(scene, hold)
+        seen = _carried(scene, hold, bones, own[a], own[b] if ends is not None and ends[1] > hold.last else None, ball)
+        inverse = bones[0]
+        ball.constraints[hold.name].inverse_matrix = inverse.inverted()
+        lets_go.append((hold, inverse @ seen[-1]))
+        if ends is None or ends[1] <= hold.last:  # it stays where it was let go
+            own[b:] = [bones[-1] @ seen[-1]] * (len(own) - b)
+        own[a:b] = [inverse @ place for place in seen[:-1]]
+    _write(ball, frames, own, lets_go)
+
+
+def own_way(scene: bpy.types.Scene, ball: bpy.types.Object, holds) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
+    """Frames (F,), the ball's own place on each, and the first and last frame on which its own action has a key; None
+    where it has none."""
+    before = ball.beyond_mocap_ball.before
+    slot = None if before.action is None else next((s for s in before.action.slots if s.identifier == before.slot), None)
+    curves = channels.curves(before.action, slot) if slot is not None else {}
+    ends = channels.keyed_range(curves)
+    first, last = min(hold.first for hold in holds) - 1, max(hold.last for hold in holds) + 1
+    if ends is not None:
+        first, last = min(first, ends[0]), max(last, ends[1])
+    frames, stance = np.arange(first, last + 1), json.loads(before.stance)[""]
+    mode, still = stance[0], dict(zip(("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle"), stance[1:]))
+
+    def values(path: str) -> np.ndarray:
+        columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
+                   for i, value in enumerate(still[path])]
+        return np.stack(columns, axis=1)
+
+    places, turns = values("location"), values(_TURNS.get(mode, "rotation_euler"))
+    way = [Matrix.LocRotScale(place, _turn(mode, turn), None) for place, turn in zip(places, turns)]
+    return frames, way, ends
+
+
+def _check(ball, body, bone: str, first: int, last: int) -> None:
+    linked.refuse(ball)
+    channels.check_free(ball)
+    if bone not in body.data.bones:
+        raise InputError(f"armature {body.name}", f"no bone {bone!r}", "one of its bones", "look at their names in pose mode")
+    if last <= first:
+        raise InputError("possession", f"from frame {first} to {last}", "a last frame behind the first", "set From and To")
+    if ball.parent is not None:
+        raise InputError(f"ball {ball.name}", f"a child of {ball.parent.name}", "an object without a parent",
+                         "clear its parent with Alt-P, Clear and Keep Transformation")
+    playing = ball.animation_data
+    if playing is not None and playing.use_nla and any(not track.mute and len(track.strips) for track in playing.nla_tracks):
+        raise InputError(f"ball {ball.name}", "it plays NLA strips", "an action of its own", "bake them: NLA editor, Edit, Bake Action")
+    if ball == body or ball.type == "ARMATURE":
+        raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball beside the armature")
+
+
+def _bones(scene, hold) -> list[Matrix]:
+    """The bone's places in the world on the frames of a stretch, without scale."""
+    found = []
+    with alone(hold.body, scene) as side:
+        for frame in range(hold.first, hold.last + 1):
+            side.frame_set(frame)
+            shown = hold.body.evaluated_get(side.view_layers[0].depsgraph)
+            place, turn, _ = (shown.matrix_world @ shown.pose.bones[hold.bone].matrix).decompose()
+            found.append(Matrix.LocRotScale(place, turn, None))
+    return found
+
+
+def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None, ball) -> list[Matrix]:
+    """The ball as the bone sees it, on each frame of a stretch: from `start` to where it is carried, and to `end`, both
+    in the world; None: it ends where it is carried."""
+    begins = bones[0].inverted() @ start
+    held = begins if hold.how == "KEEP" else _touching(scene, hold, begins, ball)
+    ends = held if end is None else bones[-1].inverted() @ end
+    count = len(bones) - 1
+    settle = max(1, min(hold.settle, count // 2)) if hold.how != "KEEP" or end is not None else 0
+    found = []
+    for row in range(count + 1):
+        place = held
+        if hold.how != "KEEP" and row < settle:
+            place = _between(begins, held, row / settle)
+        if end is not None and row > count - settle:
+            place = _between(held, ends, (row - count + settle) / settle)
+        found.append(place)
+    return found
+
+
+def _touching(scene, hold, begins: Matrix, ball) -> Matrix:
+    """The ball where it touches the bone, on the side on which it is."""
+    units = units_per_metre(scene)
+    length = hold.body.pose.bones[hold.bone].length * float(np.mean(hold.body.matrix_world.to_scale()))
+    centre = begins.to_translation()
+    nearest = Vector((0.0, min(max(centre.y, 0.0), length), 0.0))
+    away = centre - nearest
+    away = away.normalized() if away.length > 1e-6 else Vector((0.0, 0.0, 1.0))
+    reach = 0.5 * max(ball.dimensions) + hold.skin * units
+    return Matrix.LocRotScale(nearest + reach * away, begins.to_quaternion(), None)
+
+
+def _between(one: Matrix, other: Matrix, share: float) -> Matrix:
+    """From one place to another, smoothly."""
+    smooth = share * share * (3.0 - 2.0 * share)
+    place = one.to_translation().lerp(other.to_translation(), smooth)
+    return Matrix.LocRotScale(place, one.to_quaternion().slerp(other.to_quaternion(), smooth), None)
+
+
+def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
+    """Keys on every frame, and one more just before each on which the ball is let go, after which nothing moves until
+    then: own places are the constraint's before, the world's afterwards."""
+    rows = [(float(frame), place) for frame, place in zip(frames, own)]
+    rows += [(hold.last - JUST_BEFORE, place) for hold, place in lets_go]
+    rows.sort(key=lambda row: row[0])
+    at = np.array([frame for frame, _ in rows])
+    mode = ball.rotation_mode
+    path = _TURNS.get(mode, "rotation_euler")
+    curves = {"location": ("Object Transforms", np.array([place.to_translation() for _, place in rows])),
+              path: ("Object Transforms", _turns(mode, [place.to_quaternion() for _, place in rows]))}
+    for hold, _ in lets_go:
+        held = (at >= hold.first) & (at < hold.last)
+        influence = f'constraints["{bpy.utils.escape_identifier(hold.name)}"].influence'
+        curves[influence] = ("Possession", held[:, None].astype(float))
+    channels.discard(ball, KEPT)
+    made = channels.animate(ball, f"{ball.name} carried", at, curves)
+    made[KEPT] = True
+    ends = np.isin(at, [hold.last - JUST_BEFORE for hold, _ in lets_go])
+    for (name, _), curve in channels.curves(made, ball.animation_data.action_slot).items():
+        still = np.ones(len(at), bool) if name.endswith("influence") else ends
+        curve.keyframe_points.foreach_set("interpolation", np.where(still, CONSTANT, channels.LINEAR).astype(np.int32))
+        curve.update()
+
+
+def _turn(mode: str, values: np.ndarray) -> Quaternion:
+    """A rotation from the values of its channel in a rotation mode."""
+    from ..ride.rig_look import turns
+
+    return Quaternion(turns(mode, values[None])[0])
+
+
+def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
+    """The values (F, n) of the channel of a rotation mode, each next to the one before."""
+    found, before = [], None
+    for turn in quaternions:
+        if mode == "QUATERNION":
+            turn = turn.copy()
+            if before is not None:
+                turn.make_compatible(before)
+            found.append(tuple(turn))
+            before = turn
+        elif mode == "AXIS_ANGLE":
+            axis, angle = turn.to_axis_angle()
+            found.append((angle, *axis))
+        else:
+            before = turn.to_euler(mode, before) if before is not None else turn.to_euler(mode)
+            found.append(tuple(before))
+    return np.array(found)
+
+
+def _name(hold) -> str:
+    return hold.body.name if hold.body is not None else "somebody"
