@@ -61,9 +61,8 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Five parts, each folded until it is wanted."""
+        """Its parts, each folded until it is wanted."""
         layout = self.layout
-        section(layout, "scene", "Passing Scene", lambda opened: passing(self, opened, context))
         section(layout, "hits", "Hit Analysis", lambda opened: hits(opened, context))
         section(layout, "hold", "Carried Ball", lambda opened: carried(opened, context))
 
@@ -91,11 +90,6 @@ def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> Non
     for what, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
         button = column.operator(f"beyond_mocap.{verb}", text="", icon=icon)
         button.rows, button.what = rows, what
-
-
-def passing(panel, layout, context) -> None:
-    """Players, passes, ball, and what comes of them."""
-    settings = context.scene.beyond_mocap_passes
 
 
 def hits(layout, context) -> None:

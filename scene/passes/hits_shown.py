@@ -89,7 +89,8 @@ def mark(played: bpy.types.Action, found: "Hits", first: int) -> None:
     for one in found.motions:
         low, high = one.ball_stretch
         for frame, text in ((low, f"{MARKER} from"), (high, f"{MARKER} to"), (one.key, f"{MARKER} {name}")):
-            played.pose_markers.new(text).frame = int(first + frame)
+            marker = played.pose_markers.new(text)
+            marker.frame, marker.beyond_mocap.shown = int(first + frame), marker.name
 
 
 def unmark(played: bpy.types.Action) -> None:
@@ -99,8 +100,9 @@ def unmark(played: bpy.types.Action) -> None:
 
 
 def is_ours(marker: bpy.types.TimelineMarker) -> bool:
-    """Whether a hit analysis has set it."""
-    return marker.name.split(" ")[0] == MARKER and marker.beyond_mocap.kind == "none"
+    """Whether a hit analysis has set it, and nobody has renamed it since."""
+    record = marker.beyond_mocap
+    return record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER)
 
 
 @persistent

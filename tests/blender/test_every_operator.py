@@ -119,6 +119,24 @@ def ride_asked():
     rider.delay = rider.added = 1.0
 
 
+def a_ball(carried=False):
+    """A ball beside the active body, which carries it already or not."""
+    body = bpy.context.object
+    ball = bpy.data.objects.new("Ball of mine", bpy.data.meshes.new("Ball of mine"))
+    bpy.context.scene.collection.objects.link(ball)
+    worlds.choose(ball, body)
+    if carried:
+        bpy.ops.beyond_mocap.take_ball(first=5, last=9)
+
+
+def carry():
+    a_ball(carried=True)
+
+
+def analyse():
+    bpy.ops.beyond_mocap.hit_analysis()
+
+
 def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
@@ -163,6 +181,7 @@ ROWS = {
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
     "choose_player": Row("imported", lambda places: {"player": "player2"}),
+    "clear_hits": Row("accepted", prepare=analyse),
     "delete_moment": Row("imported", prepare=pick_a_moment),
     "discard": Row("synthesized"),
     "draw_track": Row("imported"),
@@ -172,7 +191,10 @@ ROWS = {
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
     "export_motion": Row("accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
+    "free_ball": Row("accepted", prepare=carry),
+    "go_to_hit": Row("accepted", lambda places: {"frame": 7}, analyse),
     "go_to_moment": Row("imported", lambda places: {"strip": "Moments", "index": 0}),
+    "hit_analysis": Row("accepted"),
     "import_clip": Row("imported", prepare=list_clips),
     "import_clips": Row("imported", lambda places: {"filepath": f"{places.clips}/walking_1_2.bvh"}),
     "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
@@ -215,6 +237,7 @@ ROWS = {
     "show_video": Row("video", changes=False),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
     "synthesize": Row("imported"),
+    "take_ball": Row("accepted", lambda places: {"first": 3, "last": 8}, a_ball),
     "track_object": Row("imported", prepare=draw),
     "unbake": Row("rig", prepare=bake_it),
     "update": Row("synthesized"),
