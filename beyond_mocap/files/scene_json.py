@@ -33,22 +33,32 @@ def read_scene(path: str | os.PathLike) -> PassScene:
         raise InputError(path, "no text", "JSON in UTF-8", "save it as UTF-8") from None
 
 
-def parse_scene(text: str, name: str = "scene") -> PassScene:
-    """The scene in a text; `name` stands before what is wrong with it, as InputError."""
-    try:
-        whole = json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
-    except json.JSONDecodeError as error:
-        raise InputError(f"{name}:{error.lineno}:{error.colno}", error.msg, "JSON", "see docs/passes.md") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(name, str(error) or "nested too deep", "JSON", "see docs/passes.md") from None
+def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
+    """The scene in a text, or in the object that it stands for; `name` stands before what is wrong with it, as
+    InputError."""
+    whole = _object_of(said, name) if isinstance(said, str) else said
     try:
         return _scene(whole)
     except InputError as error:
         raise InputError(name, str(error)) from None
 
 
+def _object_of(text: str, name: str):
+    try:
+        return json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{name}:{error.lineno}:{error.colno}", error.msg, "JSON", "see docs/passes.md") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(name, str(error) or "nested too deep", "JSON", "see docs/passes.md") from None
+
+
 def scene_text(scene: PassScene) -> str:
-    """The scene as `parse_scene` reads it; what is as usual is left out."""
+    """The scene as `read_scene` reads it."""
+    return json.dumps(scene_dict(scene), indent=1, ensure_ascii=False) + "\n"
+
+
+def scene_dict(scene: PassScene) -> dict:
+    """The scene as the object that stands in a file; what is as usual is left out."""
     usual = PassScene(scene.players, scene.passes)
     out: dict = {"players": [_player_out(one) for one in scene.players], "passes": [_pass_out(one) for one in scene.passes]}
     for name in ("repeat", "fps", "seed", "transition", "lead_in", "lead_out", "directions", "watch"):
@@ -65,7 +75,7 @@ def scene_text(scene: PassScene) -> str:
     if scene.weights != usual.weights:
         told = {entry.name: getattr(scene.weights, entry.name) for entry in fields(Weights)}
         out["weights"] = {**told, "bones": dict(scene.weights.bones)}
-    return json.dumps(out, indent=1, ensure_ascii=False) + "\n"
+    return out
 
 
 def _player_out(one: Player) -> dict:
@@ -170,7 +180,7 @@ def _ball(value, where: str) -> BallChoice:
 
 
 def _ball_number(value, where: str):
-    return tuple(_number(one, where) for one in value) if isinstance(value, list) else _number(value, where)
+    return tuple(_number(one, where) for one in value) if isinstance(value, (list, tuple)) else _number(value, where)
 
 
 def _net(value, where: str) -> Net:
@@ -180,7 +190,7 @@ def _net(value, where: str) -> Net:
 
 
 def _serve(value, where: str):
-    return _triple(value, where) if isinstance(value, list) else _text(value, where)
+    return _triple(value, where) if isinstance(value, (list, tuple)) else _text(value, where)
 
 
 def _errors(value, where: str) -> dict[str, float]:
@@ -199,7 +209,7 @@ def _weights(value, where: str) -> Weights:
 
 def _list_of(read: Callable) -> Callable:
     def lines(value, where: str) -> tuple:
-        if not isinstance(value, list):
+        if not isinstance(value, (list, tuple)):
             raise InputError(where, _shown(value), "a list [...]")
         one = {"players": "player", "passes": "pass"}[where]
         return tuple(read(entry, f"{one} {number}") for number, entry in enumerate(value, start=1))
@@ -263,12 +273,12 @@ def _triple(value, where: str) -> tuple[float, float, float]:
 
 
 def _numbers(value, where: str, count: int, expected: str) -> tuple:
-    if not isinstance(value, list) or len(value) != count:
+    if not isinstance(value, (list, tuple)) or len(value) != count:
         raise InputError(where, _shown(value), expected)
     return tuple(_number(one, where) for one in value)
 
 
 def _shown(value) -> str:
     """A value as it stands in the file, shortened."""
-    text = json.dumps(value, ensure_ascii=True)
+    text = json.dumps(value, ensure_ascii=True, default=str)
     return text if len(text) <= 40 else text[:37] + "..."

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.ball.pass_scene import GROUND, Example, PassScene, served_by
+from beyond_mocap.ball.sample_scenes import SAMPLES as KEPT
 from beyond_mocap.errors import InputError
-from beyond_mocap.files.scene_json import parse_scene, read_scene, scene_text
+from beyond_mocap.files.scene_json import parse_scene, read_scene, scene_dict, scene_text
 
 SAMPLES = sorted((Path(__file__).resolve().parents[3] / "sample_blend" / "passes").glob("*.json"))
 THREE = {
@@ -72,6 +73,12 @@ def test_defaults_are_every_pass_that_does_not_say_otherwise():
 def test_samples_are_read_and_written_back(path):
     scene = read_scene(path)
     assert parse_scene(scene_text(scene)) == scene
+    assert parse_scene(scene_dict(scene)) == scene
+    assert parse_scene(KEPT[path.stem]) == scene
+
+
+def test_every_kept_sample_is_a_file():
+    assert sorted(KEPT) == [path.stem for path in SAMPLES]
 
 
 @pytest.mark.parametrize("path, value, word", [
