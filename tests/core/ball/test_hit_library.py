@@ -1,0 +1,202 @@
+"""Hit motions of a whole library: found, told apart, matched with an example, and linked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.ball.hit_library import DIRECTIONS, KINDS, HitLibrary, MatchWeights, turn_for
+from beyond_mocap.ball.hits import analyse
+from beyond_mocap.ball.links import BoneWeights, Link, Transitions, aligned, links_of, pose_distance
+from beyond_mocap.errors import InputError
+from beyond_mocap.files import bvh
+from beyond_mocap.library.library import build
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.gestures import strike
+from beyond_mocap.motion.motion import place
+from beyond_mocap.motion.moves import header
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three right kicks of different strength, a header, a walk and standing."""
+    folder = tmp_path_factory.mktemp("hits")
+    for name, made, words in (
+        ("inside", strike("kick low inside", fps=60.0), "kick low inside right"),
+        ("slow", strike("kick low inside", fps=30.0, speed=0.8), "kick low inside right"),
+        ("top", strike("kick low top", fps=60.0), "kick low top right"),
+        ("header", header(fps=60.0), "header standing"),
+    ):
+        bvh.write(folder / f"{name}.bvh", made.motion)
+        (folder / f"{name}.txt").write_text(
+            f"{made.start:.3f} {made.end:.3f} {words}\n{made.key:.3f} {words}\n"
+        )
+    bvh.write(folder / "walk.bvh", gait(1.4, 3.0, 30.0))
+    (folder / "walk.txt").write_text("0 3 walking\n")
+    bvh.write(folder / "stand.bvh", gait(0.0, 3.0, 30.0))
+    (folder / "stand.txt").write_text("0 3 standing\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def library(folder):
+    return build(folder)
+
+
+@pytest.fixture(scope="module")
+def kicks(library):
+    return HitLibrary.of(library, "foot")
+
+
+def name_of(library, kicks, number):
+    return library.clips[kicks.hits[number].clip].path
+
+
+def test_both_feet_can_do_what_one_was_seen_to_do(library, kicks):
+    assert len(kicks) == 6 and sorted(kicks.sides) == ["left"] * 3 + ["right"] * 3
+    assert all(library.clips[one.clip].mirrored == (one.hit.side == "left") for one in kicks.hits)
+
+
+def test_the_words_moment_is_the_key(library, kicks):
+    for one in kicks.hits:
+        clip = library.clips[one.clip]
+        assert one.labelled and one.hit.key == next(row.key for row in clip.annotations if row.key is not None)
+        assert one.hit.ball_stretch[0] <= one.hit.key <= one.hit.ball_stretch[1]
+
+
+def test_each_part_has_its_own(library):
+    heads = HitLibrary.of(library, "head")
+    assert {name_of(library, heads, number) for number in range(len(heads))} == {"header.bvh"}
+    with pytest.raises(InputError, match="lacks"):
+        HitLibrary.of(library, "tail")
+
+
+def test_it_is_kept_beside_the_cache(library, kicks, monkeypatch):
+    monkeypatch.setattr("beyond_mocap.ball.hit_library.analyse", None)
+    again = HitLibrary.of(library, "foot")
+    assert len(again) == len(kicks)
+    for a, b in zip(again.hits, kicks.hits):
+        assert (a.clip, a.labelled, a.hit.key, a.hit.side, a.hit.fasts) == (
+            b.clip, b.labelled, b.hit.key, b.hit.side, b.hit.fasts
+        )
+        np.testing.assert_array_equal(a.hit.vectors, b.hit.vectors)
+
+
+def test_a_damaged_file_is_worked_out_anew(folder, kicks, tmp_path):
+    fresh = build(folder, cache_dir=tmp_path)
+    (tmp_path / "hits_foot.npz").write_bytes(b"no array")
+    assert len(HitLibrary.of(fresh, "foot")) == len(kicks)
+
+
+def test_an_example_finds_itself_and_then_its_like(library, kicks):
+    """Equation 2 of each hit motion with itself is 0; the slower take of the same kick is nearer than another kick."""
+    for number, one in enumerate(kicks.hits):
+        order, distance = kicks.match(one.hit)
+        assert order[0] == number and distance[number] == pytest.approx(0.0, abs=1e-9)
+    mine = [n for n in range(len(kicks)) if name_of(library, kicks, n) == "inside.bvh"]
+    inside = next(n for n in mine if kicks.sides[n] == "right")
+    order, _ = kicks.match(kicks.hits[inside].hit, side="right")
+    assert [name_of(library, kicks, n) for n in order] == ["inside.bvh", "slow.bvh", "top.bvh"]
+
+
+def test_the_distance_is_equation_2(kicks):
+    a, b = kicks.hits[0].hit, kicks.hits[2].hit
+    weights = MatchWeights(speed=0.3, vector=0.7, time=2.0)
+    expected = (
+        0.3 * abs(a.max_speed - b.max_speed)
+        + 0.7 * sum(np.linalg.norm(x - y) for x, y in zip(a.vectors, b.vectors))
+        + 2.0 * sum(abs(x - y) for x, y in zip(a.times, b.times))
+    )
+    assert kicks.match(a, weights)[1][2] == pytest.approx(expected)
+
+
+def test_an_example_may_face_anywhere_and_be_of_another_size(library, kicks):
+    one = kicks.hits[0]
+    clip = library.clips[one.clip].motion
+    turned = analyse(place(clip, 2.4, (7.0, 1.0, 0.0)), "foot", one.hit.side).strongest
+    child = replace(one.hit, size=0.5 * one.hit.size, max_speed=0.5 * one.hit.max_speed, vectors=0.5 * one.hit.vectors)
+    assert kicks.match(turned)[0][0] == kicks.match(child)[0][0] == 0
+    assert kicks.match(child)[1][0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_kinds_go_by_speed(kicks):
+    slow, fast = int(np.argmin(kicks.speeds)), int(np.argmax(kicks.speeds))
+    assert kicks.of_kind("attack")[0] in np.flatnonzero(kicks.speeds == kicks.speeds[fast])
+    assert kicks.of_kind("toss")[0] in np.flatnonzero(kicks.speeds == kicks.speeds[slow])
+    assert set(kicks.kinds) <= set(KINDS) and len(kicks.of_kind("pass", "left")) == 3
+
+
+@pytest.mark.parametrize("bearing", DIRECTIONS)
+def test_the_ball_can_be_sent_anywhere(kicks, bearing):
+    hit = kicks.hits[0].hit
+    exact = turn_for(hit, 0.3, bearing)
+    assert quaternion.wrapped(0.3 + exact + hit.direction - bearing) == pytest.approx(0.0, abs=1e-9)
+    rounded = turn_for(hit, 0.3, bearing, np.pi / 4)
+    assert rounded / (np.pi / 4) == pytest.approx(round(rounded / (np.pi / 4)))
+    assert abs(quaternion.wrapped(rounded - exact)) <= np.pi / 8 + 1e-9
+
+
+def test_links_lie_beside_the_hits(library, kicks):
+    links = links_of(library, kicks)
+    assert len(links) >= 6
+    for link in links:
+        spans = [(one.hit.first, one.hit.last) for one in kicks.hits if one.clip == link.clip]
+        assert spans and all(link.last < first or link.first > last for first, last in spans)
+        assert 0 <= link.first < link.last < len(library.clips[link.clip].motion)
+
+
+def test_aligned_poses_do_not_know_where_the_body_is(library):
+    motion, frames = library.clips[0].motion, np.array([10.0, 20.5, 31.0])
+    here, there = aligned(motion, frames), aligned(place(motion, 1.9, (3.0, 4.0, 0.0)), frames)
+    for a, b in zip(here, there):
+        np.testing.assert_allclose(a, b, atol=1e-9)
+    np.testing.assert_allclose(here[0][:, 0, :2], 0.0, atol=1e-12)
+
+
+def test_a_stretch_is_left_for_itself_without_cost(library, kicks):
+    links = links_of(library, kicks)
+    found = Transitions.of(library, links, 0.2)
+    assert np.all(np.diag(found.cost) < 1e-3)
+    assert np.all(np.diag(found.leave) == np.diag(found.enter))
+
+
+def test_the_best_transition_is_the_best_of_all(library):
+    """Against every pair of frames by equation 1 itself, added up plainly."""
+    clips = [number for number, clip in enumerate(library.clips) if clip.path in ("walk.bvh", "inside.bvh")][:2]
+    links = [Link(clip, 10, 10 + int(library.clips[clip].motion.fps * 0.9)) for clip in clips]
+    weights = BoneWeights()
+    found = Transitions.of(library, links, 0.2, weights)
+    leave, enter, cost = found.best(0, 1)
+    scale = np.concatenate([weights.position, weights.velocity])[:, None]
+    poses = []
+    for link in links:
+        motion = library.clips[link.clip].motion
+        frames = np.arange(link.first, link.last + 1e-6, motion.fps / 60.0)
+        poses.append((frames, np.concatenate(aligned(motion, frames), axis=1) * scale))
+    plain = np.linalg.norm(poses[0][1][:, None] - poses[1][1][None], axis=-1).sum(axis=-1)
+    np.testing.assert_allclose(pose_distance(poses[0][1], poses[1][1]), plain, atol=1e-6)
+    length = 12
+    least = min(
+        np.mean([plain[a + k, b + k] for k in range(length + 1)])
+        for a in range(len(plain) - length) for b in range(plain.shape[1] - length)
+    )
+    assert least - 1e-9 <= cost <= 1.1 * least
+    assert links[0].first <= leave <= links[0].last and links[1].first <= enter <= links[1].last
+
+
+def test_weights_are_the_users(library, kicks):
+    links = links_of(library, kicks)
+    feet = Transitions.of(library, links, 0.3, BoneWeights((0, 0, 0, 0, 1, 1), (0,) * 6))
+    assert np.all(feet.cost <= Transitions.of(library, links, 0.3).cost + 1e-6)
+    with pytest.raises(InputError, match="6 numbers"):
+        BoneWeights((1.0, 2.0))
+    with pytest.raises(InputError, match="0 to 5"):
+        Transitions.of(library, links, -1.0)
+
+
+def test_a_library_without_hits_has_no_links(library):
+    assert links_of(library, HitLibrary("foot", ())) == ()
+    assert Transitions.of(library, ()).cost.shape == (0, 0)
+    order, distance = HitLibrary("foot", ()).match(HitLibrary.of(library).hits[0].hit)
+    assert len(order) == len(distance) == 0
