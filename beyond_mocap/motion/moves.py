@@ -59,7 +59,7 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
     neutral = neutral_stance(skeleton or adult_skeleton())
     scale = neutral.leg / tables.LEG
     key = 1.5
-    course, steps, posture = _standing(neutral, key + 1.9, fps, seed, width=0.10)
+    course, steps, posture = standing_posture(neutral, key + 1.9, fps, seed, width=0.10)
     times = course.times - key
     air = _FLIGHT * np.sqrt(scale)
     trunk, arms = np.radians(keyed(_HEADER["trunk"], times)), np.radians(keyed(_HEADER["arms"], times))
@@ -122,7 +122,7 @@ def _jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: Neutral):
     return out, pitch, np.where(flying, 0.3, 1.0) * pitch
 
 
-def _standing(neutral: Neutral, duration: float, fps: float, seed: int, width: float = 0.0):
+def standing_posture(neutral: Neutral, duration: float, fps: float, seed: int, width: float = 0.0):
     """Course, footsteps and posture of standing for `duration` seconds with feet `width` metres wider than usual."""
     style = GaitStyle(width=width, life=0.6)
     course = plan(0.0, duration, fps, neutral, style=style, seed=seed)
@@ -167,15 +167,15 @@ def throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0)
     neutral = neutral_stance(skeleton or adult_skeleton())
     scale = neutral.leg / tables.LEG
     key = 2.2
-    course, _, posture = _standing(neutral, key + 2.0, fps, seed)
+    course, _, posture = standing_posture(neutral, key + 2.0, fps, seed)
     times = course.times - key
     moved = keyed(_THROW["hips"], times) * scale
     hips = posture.hips.copy()
     hips[:, 0] += moved[:, 0]
     hips[:, 2] -= moved[:, 1]
     steps = (
-        _walked_steps(course, neutral, LEFT, key, ((-0.72, -0.36, 0.52),)),
-        _walked_steps(course, neutral, RIGHT, key, ((0.16, 0.62, 0.46),)),
+        walked_steps(course, neutral, LEFT, key, ((-0.72, -0.36, 0.52),)),
+        walked_steps(course, neutral, RIGHT, key, ((0.16, 0.62, 0.46),)),
     )
     trunk, arms = np.radians(keyed(_THROW["trunk"], times)), np.radians(keyed(_THROW["arms"], times))
     ease = envelope(times, -2.2, -1.6, 0.8, 1.5)
@@ -191,7 +191,7 @@ def throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0)
     return Gesture(to_motion(posture.frames(course.asked), neutral), key, key - 1.3, key + 0.8)
 
 
-def _walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves) -> Footsteps:
+def walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves) -> Footsteps:
     """Stances of one foot that stands still but for `moves`: rows (leaves, lands, metres ahead), seconds from the
     key."""
     scale = neutral.leg / tables.LEG
@@ -286,7 +286,7 @@ def getting_up(
     neutral = neutral_stance(skeleton or adult_skeleton(), example)
     scale = neutral.leg / tables.LEG
     duration = rest + _UP_TIME + 0.9
-    course, _, posture = _standing(neutral, duration, fps, seed)
+    course, _, posture = standing_posture(neutral, duration, fps, seed)
     times = course.times - rest
     trunk = np.radians(keyed(_UP["tilt"], times))
     way = keyed(_UP["hips"], times) * scale

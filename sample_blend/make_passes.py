@@ -1,0 +1,70 @@
+"""Makes the library of the passing scenes: strikes out of standing, and what players do between them.
+
+    python sample_blend/make_passes.py [FOLDER]
+
+It is a library of its own (`passes/library`), so that takes from the sample's other one stay what they are. The same code
+gives the same bytes. Needs the core only."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+if __name__ == "__main__":
+    sys.path[:0] = [str(HERE.parent), str(HERE)]
+
+from make_sample import FPS, Clip, clips, words_of  # noqa: E402
+
+from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
+from beyond_mocap.files import bvh  # noqa: E402
+from beyond_mocap.motion.volleys import VOLLEYS, idle, volley  # noqa: E402
+
+TAKEN = (
+    "standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6",
+    "walking_turn_left", "walking_turn_right", "walking_back", "walking_left", "walking_right", "start_stop_walking",
+    "walk_jog_walk", "jogging_2_4", "jogging_3_5", "jogging_back", "header",
+)  # fmt: skip
+"""Clips of the sample's library that are taken over."""
+
+STRIKES = (
+    ("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass", 1.25), ("pass_quick", "pass", 1.45),
+    ("attack", "attack", 1.4), ("attack_quick", "attack", 1.6), ("receive", "receive", 1.0), ("head", "head", 1.25),
+    ("chest", "chest", 1.0), ("hand", "hand", 1.3), ("racquet", "racquet", 1.0), ("racquet_slow", "racquet", 0.8),
+)  # fmt: skip
+"""Name, kind (`motion.volleys`) and speed of every strike."""
+
+
+def library() -> list[Clip]:
+    """All clips of the library."""
+    taken = [clip for clip in clips() if clip.name in TAKEN]
+    ready = [Clip(f"ready_{seed}", idle(9.0, fps=FPS, seed=60 + seed), ("standing",)) for seed in (1, 2, 3)]
+    return [*taken, *ready, *(_strike(*row, seed=70 + number) for number, row in enumerate(STRIKES))]
+
+
+def _strike(name: str, kind: str, speed: float, seed: int) -> Clip:
+    gesture = volley(kind, fps=FPS, seed=seed, speed=speed)
+    return Clip(f"volley_{name}", gesture.motion, tuple(VOLLEYS[kind].words.split()), gesture)
+
+
+def make(folder: Path = HERE / "passes" / "library") -> None:
+    """The library's files in `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for clip in library():
+        bvh.write(folder / f"{clip.name}.bvh", clip.motion)
+        words = format_timeline(_words(clip))
+        (folder / f"{clip.name}.txt").write_text(words, encoding="utf-8", newline="\n")
+
+
+def _words(clip: Clip) -> Timeline:
+    """As the sample's other library has them; a strike out of standing stands before and after it."""
+    gesture = clip.gesture
+    if gesture is None or not clip.name.startswith("volley"):
+        return words_of(clip)
+    start, stop, end = round(gesture.start, 2), round(gesture.end, 2), clip.motion.duration
+    still = (Span(0.0, start, ("standing",)), Span(stop, round(end, 2), ("standing",)))
+    return Timeline((still[0], Span(start, stop, clip.words), still[1]), (KeyMoment(gesture.key, clip.words),))
+
+
+if __name__ == "__main__":
+    make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "passes" / "library")
