@@ -48,6 +48,8 @@ from . import (
     move_moment,
     move_video,
     nudge_points,
+    passes_file,
+    passes_list,
     path_apart,
     path_camera,
     path_cameras,
@@ -68,6 +70,7 @@ from . import (
     set_speed,
     show_timeline,
     show_video,
+    solve_ball,
     split_span,
     synthesize,
     take_ball,
@@ -162,6 +165,12 @@ CLASSES = (
     hit_analysis.BEYOND_MOCAP_OT_clear_hits,
     take_ball.BEYOND_MOCAP_OT_take_ball,
     take_ball.BEYOND_MOCAP_OT_free_ball,
+    passes_list.BEYOND_MOCAP_OT_passes_list,
+    passes_file.BEYOND_MOCAP_OT_passes_sample,
+    passes_file.BEYOND_MOCAP_OT_passes_from_json,
+    passes_file.BEYOND_MOCAP_OT_passes_to_json,
+    solve_ball.BEYOND_MOCAP_OT_solve_ball,
+    solve_ball.BEYOND_MOCAP_OT_accept_touches,
 )
 
 

@@ -6,7 +6,7 @@ import bpy
 
 from ..scene.passes import graph
 from ..scene.passes.settings import active_row, ball_of, subject, told_lines
-from .tab import Step, paragraph
+from .tab import Step, paragraph, table
 
 PART_ICONS = {"foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"}
 KIND_ICONS = {"toss": "IPO_SINE", "pass": "IPO_QUAD", "attack": "IPO_EXPO"}
@@ -63,6 +63,8 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
     def draw(self, context):
         """Its parts, each folded until it is wanted."""
         layout = self.layout
+        section(layout, "scene", "Passing Scene", lambda opened: passing(self, opened, context), closed=False)
+        section(layout, "tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
         section(layout, "hits", "Hit Analysis", lambda opened: hits(opened, context))
         section(layout, "hold", "Carried Ball", lambda opened: carried(opened, context))
 
@@ -90,6 +92,99 @@ def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> Non
     for what, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
         button = column.operator(f"beyond_mocap.{verb}", text="", icon=icon)
         button.rows, button.what = rows, what
+
+
+def passing(panel, layout, context) -> None:
+    """Players, passes, ball, and what comes of them."""
+    settings = context.scene.beyond_mocap_passes
+    row = layout.row(align=True)
+    row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
+    row.operator("beyond_mocap.passes_from_json", text="", icon="IMPORT")
+    row.operator("beyond_mocap.passes_to_json", text="", icon="EXPORT")
+    lists(layout, "passers", settings, "players", "active_player", "passes_list")
+    if player := active_row(settings.players, settings.active_player):
+        of_player(layout, player)
+    lists(layout, "passes", settings, "passes", "active_pass", "passes_list")
+    if one := active_row(settings.passes, settings.active_pass):
+        of_pass(layout, settings, one)
+    section(layout, "choices", "Choices", lambda opened: choices(opened, settings))
+    section(layout, "ball", "Ball & Air", lambda opened: of_ball(opened, settings))
+
+
+def of_player(layout, player) -> None:
+    """Where the picked player stands, and what he strikes with."""
+    column = split(layout)
+    for name in ("place", "body", "part"):
+        column.prop(player, name)
+    if player.part in {"foot", "hand", "tool"} and not player.bone:
+        column.prop(player, "side")
+    if player.part == "tool":
+        for name in ("tool_length", "tool_reach", "tool_radius"):
+            column.prop(player, name)
+    column.prop(player, "bone")
+    column.prop(player, "height")
+
+
+def of_pass(layout, settings, one) -> None:
+    """How the picked pass goes."""
+    column = split(layout)
+    column.prop_search(one, "who", settings, "players")
+    column.prop_search(one, "to", settings, "players")
+    column.row().prop(one, "kind", expand=True)
+    for name in ("bounces", "seconds", "at", "part", "side", "error", "clip"):
+        column.prop(one, name)
+    if one.clip:
+        column.prop(one, "first")
+        column.prop(one, "last")
+
+
+def choices(layout, settings) -> None:
+    """What holds for all passes, and the weights of eq. 1 and 2."""
+    column = split(layout)
+    for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
+        column.prop(settings, name)
+    if settings.serve_from == "PLAYER":
+        column.prop_search(settings, "serve", settings, "players")
+    if settings.serve_from == "PLACE":
+        column.prop(settings, "serve_at")
+    for name in ("transition", "turns", "watch", "missed", "dropped", "seed", "net"):
+        column.prop(settings, name)
+    if settings.net:
+        for name in ("net_from", "net_to", "net_height"):
+            column.prop(settings, name)
+    for title, names in (("Two Strikes Compared", ("speed", "vectors", "times")), ("Two Poses Compared", ("position", "velocity", "bones"))):
+        column.label(text=title)
+        for name in names:
+            column.prop(settings.weights, name)
+
+
+def of_ball(layout, settings) -> None:
+    """The ball's kind, or numbers of one's own."""
+    column = split(layout)
+    column.prop(settings, "ball")
+    column.prop(settings, "own")
+    if settings.own:
+        for name in ("radius", "restitution", "linear_drag", "drag", "gravity"):
+            column.prop(settings, name)
+
+
+def tracked(panel, layout, context) -> None:
+    """The button, what was solved, and the touches."""
+    settings = context.scene.beyond_mocap_passes
+    layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
+    panel.progress(context, "ball")
+    if settings.solved:
+        table(layout, settings.solved.splitlines())
+    if not len(settings.touches):
+        return
+    layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, "active_touch", rows=5)
+    if touch := active_row(settings.touches, settings.active_touch):
+        row = layout.row(align=True)
+        row.prop(touch, "words", text="")
+        row.operator("beyond_mocap.jump_to", text="", icon="PLAY").seconds = touch.time
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.accept_touches", icon="CHECKMARK")
+    row.operator("beyond_mocap.accept_touches", text="of Active").active = True
 
 
 def hits(layout, context) -> None:

@@ -31,7 +31,7 @@ def players_in(path: str, metadata: str = "", provider: str = "") -> tuple[list[
     if is_plain(path):
         track = _plain(path)
         return [Found(Path(path).stem, "", "home", float(track.times.min()), float(track.times.max()))], ()
-    match = _match(path, metadata, provider)
+    match = match_of(path, metadata, provider)
     start, end = float(match.times[0]), float(match.times[-1])
     found = [Found(_spoken(player), player.id, player.team, start, end) for player in match.players]
     return found, match.notes
@@ -48,7 +48,7 @@ def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: 
         raise InputError(f"player {player.name}", "no tracking file", "a file with positions", step)
     if not player.feed_id:
         return _plain(path)
-    match = _match(path, absolute(player.metadata_file), player.provider)
+    match = match_of(path, absolute(player.metadata_file), player.provider)
     end = settings.section_end if settings.section_end > settings.section_start else None
     return match.track(player.feed_id, settings.section_start, end)
 
@@ -71,7 +71,8 @@ def _read_plain(path: str, _changed: tuple[int, int]) -> "Track":
     return tracking.read_track_csv(path)
 
 
-def _match(path: str, metadata: str, provider: str) -> tracking.Match:
+def match_of(path: str, metadata: str = "", provider: str = "") -> tracking.Match:
+    """A whole match as its feed has it, read once; InputError where it cannot be read."""
     return _read_match(path, metadata or None, provider or None, _stamp(path))
 
 

@@ -47,6 +47,12 @@ SAMPLES = (
     ("racquet", "Racquet", "Two players, tools in their hands"),
     ("dropped", "Dropped Ball", "Three players; one of them errs"),
 )
+SERVES = (
+    ("USUAL", "By Who Would Pass", "The player who would pass to the first one"),
+    ("PLAYER", "By a Player", "A player by name"),
+    ("GROUND", "From the Ground", "The ball lies at the first foot"),
+    ("PLACE", "From a Place", "The ball comes flying from a place"),
+)
 HOLDS = (
     ("KEEP", "As It Is", "The ball stays where it is beside the bone as it is taken"),
     ("TOUCH", "Touching", "The ball comes to touch the part: the palm, the foot, the brow"),
@@ -61,10 +67,23 @@ def touch_live(_settings, _context) -> None:
     live.mark()
 
 
+def renamed(player, context) -> None:
+    """A player's new name is his in all passes, and his place's."""
+    if player.known and player.known != player.name:
+        settings = context.scene.beyond_mocap_passes
+        for one in settings.passes:
+            one.who = player.name if one.who == player.known else one.who
+            one.to = player.name if one.to == player.known else one.to
+        settings.serve = player.name if settings.serve == player.known else settings.serve
+    player.known = player.name
+    touch_live(player, context)
+
+
 class BeyondMocapPasser(bpy.types.PropertyGroup):
     """One player of a passing scene."""
 
-    name: StringProperty(name="Name", description="What this player is called", update=touch_live)
+    name: StringProperty(name="Name", description="What this player is called", update=renamed)
+    known: StringProperty(name="Known As", options={"HIDDEN"}, description="The name by which the passes know him")
     place: PointerProperty(
         name="Place", type=bpy.types.Object, update=touch_live,
         description="The object that says where the player stands, and by its local X which way he looks; drag it with G, turn it with R",
@@ -75,15 +94,18 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
     )
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="What the player meets the ball with", update=touch_live)
     side: EnumProperty(name="Side", items=EITHER, default="either", description="Of what there are two", update=touch_live)
+    bone: StringProperty(
+        name="Joint", description="A joint of the library's skeleton by name, in place of the part", update=touch_live
+    )
     tool_length: FloatProperty(
-        name="Tool Length", default=0.55, min=0.05, max=3.0, precision=2, update=touch_live,
-        description="Metres that the tool goes on beyond the hand, along the forearm",
+        name="Tool Length", default=0.66, min=0.05, max=2.0, precision=2, update=touch_live,
+        description="Metres that the tool goes on beyond the wrist, along the forearm",
     )
     tool_radius: FloatProperty(
-        name="Tool Radius", default=0.02, min=0.001, max=0.3, precision=3, description="Half as thick as it is, metres", update=touch_live
+        name="Tool Radius", default=0.015, min=0.001, max=0.5, precision=3, description="Half as thick as it is, metres", update=touch_live
     )
     tool_reach: FloatProperty(
-        name="Tool Reach", default=0.2, min=0.01, max=3.0, precision=2, update=touch_live,
+        name="Tool Reach", default=0.26, min=0.0, max=2.0, precision=2, update=touch_live,
         description="Metres of its far end that strike the ball",
     )
     height: FloatProperty(
@@ -103,11 +125,19 @@ class BeyondMocapPass(bpy.types.PropertyGroup):
     to: StringProperty(name="To", description="Who gets it", update=touch_live)
     kind: EnumProperty(name="Kind", items=KINDS, default="pass", description="How hard it is sent", update=touch_live)
     bounces: IntProperty(
-        name="Bounces", default=1, min=0, max=8, description="How often the ball touches the ground on its way", update=touch_live
+        name="Bounces", default=1, min=0, max=5, description="How often the ball touches the ground on its way", update=touch_live
     )
     part: EnumProperty(
         name="Part", items=(("own", "Own", "The part that the player is set to", "BLANK1", 9), *PARTS), default="own", update=touch_live,
         description="What the sender meets the ball with",
+    )
+    side: EnumProperty(
+        name="Side", items=(("own", "Own", "As the player is set"), *EITHER), default="own", update=touch_live,
+        description="Of what the sender has two",
+    )
+    at: PointerProperty(
+        name="Meet At", type=bpy.types.Object, update=touch_live,
+        description="An object to which the receiver goes to meet the ball; none: where he stands",
     )
     seconds: FloatProperty(
         name="Flight", default=0.0, min=0.0, max=20.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,
@@ -235,6 +265,31 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     repeat: IntProperty(
         name="Rounds", default=1, min=1, max=100, description="How many times the passes are played in a row", update=touch_live
     )
+    serve_from: EnumProperty(
+        name="Serve", items=SERVES, default="USUAL", update=touch_live, description="Where the ball comes from first"
+    )
+    serve: StringProperty(name="Serve By", description="Who serves", update=touch_live)
+    serve_at: FloatVectorProperty(
+        name="Serve At", size=3, default=(5.0, 0.0, 1.0), description="Where the ball comes from, metres", update=touch_live
+    )
+    missed: FloatProperty(
+        name="Missed", default=0.0, min=0.0, max=1.0, precision=2, description="How likely each ball is missed", update=touch_live
+    )
+    dropped: FloatProperty(
+        name="Dropped", default=0.0, min=0.0, max=1.0, precision=2, description="How likely each ball is dropped", update=touch_live
+    )
+    lead_in: FloatProperty(
+        name="Lead In", default=1.0, min=0.0, max=60.0, precision=1, unit="TIME_ABSOLUTE", update=touch_live,
+        description="Seconds before the first strike, at least",
+    )
+    lead_out: FloatProperty(
+        name="Lead Out", default=1.5, min=0.0, max=60.0, precision=1, unit="TIME_ABSOLUTE", update=touch_live,
+        description="Seconds after the last strike",
+    )
+    rate: FloatProperty(
+        name="Frame Rate", default=30.0, min=10.0, max=240.0, update=touch_live,
+        description="Frames per second that are worked out; the scene keeps its own rate",
+    )
     transition: FloatProperty(
         name="Transition", default=0.4, min=0.1, max=2.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,
         description="Seconds over which one motion goes over into the next",
@@ -245,8 +300,9 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     )
     watch: BoolProperty(name="Watch the Ball", default=True, description="Heads follow the ball", update=touch_live)
     weights: PointerProperty(type=BeyondMocapWeights, description="What counts how much where motions are compared")
-    more: StringProperty(
-        name="More", options={"HIDDEN"}, description="What else a file of a scene said, as JSON; kept for the next one"
+    library_folder: StringProperty(
+        name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, update=touch_live,
+        description="Folder of clips with strikes from a stand; empty: the library of step 1",
     )
     seed: IntProperty(name="Seed", default=0, min=0, description="Another one is another solution", update=touch_live)
     start_frame: IntProperty(name="Start Frame", default=1, description="Scene frame on which the scene begins", update=touch_live)

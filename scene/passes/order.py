@@ -1,0 +1,194 @@
+"""The settings as a passing scene of the core, and back: what the panel shows is what a SCENE.json says."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.ball.contact import Tool
+from ...beyond_mocap.ball.pass_scene import GROUND, BallChoice, Example, Net, Pass, PassScene, Player, Weights
+from ...beyond_mocap.errors import InputError
+from .. import bake
+from ..measure import units_per_metre
+from .settings import KEPT, BeyondMocapPasser, BeyondMocapPasses
+
+SIZE = 0.5  # metres
+SHIRTS = ((0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55), (0.02, 0.45, 0.60))
+NUMBERS = ("radius", "restitution", "linear_drag", "drag", "gravity")
+_DIGITS = 6  # of numbers of single precision
+
+
+def scene_of(scene: bpy.types.Scene) -> PassScene:
+    """The passing scene that the settings ask for; InputError where it makes no sense."""
+    settings = scene.beyond_mocap_passes
+    return PassScene(
+        tuple(_player(scene, one) for one in settings.players),
+        tuple(_pass(scene, one) for one in settings.passes),
+        settings.repeat, _exact(settings.rate), settings.seed,
+        BallChoice(settings.ball, {name: _exact(getattr(settings, name)) for name in NUMBERS} if settings.own else {}),
+        Net(_place(settings.net_from), _place(settings.net_to), _exact(settings.net_height)) if settings.net else None,
+        _serve(settings), *(_exact(getattr(settings, name)) for name in ("missed", "dropped", "transition", "lead_in", "lead_out")),
+        8 if settings.turns else 0, settings.watch, _weights(settings.weights),
+    )  # fmt: skip
+
+
+def fill(context: bpy.types.Context, wanted: PassScene) -> None:
+    """Let the settings say what a passing scene asks for; places become Empties, those of before go."""
+    scene, settings = context.scene, context.scene.beyond_mocap_passes
+    live, settings.live = settings.live, False
+    for row in settings.players:
+        remove_place(row)
+    for row in settings.passes:
+        remove_mark(row.at)
+    bodies = {row.name: row.body for row in settings.players}
+    settings.players.clear()
+    settings.passes.clear()
+    for player in wanted.players:
+        row = add_player(context, player.name, player.place, wanted.facing(player.name))
+        row.body = bodies.get(player.name)
+        _fill_player(row, player)
+    for one in wanted.passes:
+        _fill_pass(context, settings.passes.add(), one)
+    _fill_scene(settings, wanted)
+    settings.active_player = settings.active_pass = 0
+    settings.live = live
+
+
+def add_player(
+    context: bpy.types.Context, name: str, place: tuple[float, float], facing: float = 0.0
+) -> BeyondMocapPasser:
+    """One more player who stands at `place` (x, y) m and looks along `facing`, radians; his Empty too."""
+    settings = context.scene.beyond_mocap_passes
+    row = settings.players.add()
+    row.shirt = SHIRTS[(len(settings.players) - 1) % len(SHIRTS)]
+    row.name = name
+    row.place = _empty(context, f"{name} place", place, facing, (*row.shirt, 1.0))
+    settings.active_player = len(settings.players) - 1
+    return row
+
+
+def free_name(settings: BeyondMocapPasses) -> str:
+    """A name that no player of the list has."""
+    taken = {row.name for row in settings.players}
+    usual = ("Ann", "Ben", "Cho", "Dia", "Eli", "Fay", "Gus", "Hal")
+    return next(name for name in (*usual, *(f"Player {n}" for n in range(9, 999))) if name not in taken)
+
+
+def remove_place(row: BeyondMocapPasser) -> None:
+    """Take a player's Empty out of the file, where it was made here and nothing hangs on it."""
+    place, row.place = row.place, None
+    remove_mark(place)
+
+
+def remove_mark(thing: bpy.types.Object | None) -> None:
+    """Take an Empty of ours out of the file, unless something hangs on it."""
+    if thing is not None and thing.get(KEPT) and thing.type == "EMPTY" and not thing.children and thing.library is None:
+        bpy.data.objects.remove(thing)
+
+
+def stands(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[tuple[float, float], float]:
+    """Where an object is on the ground, m, and which way its X looks, radians."""
+    matrix = np.array(thing.matrix_world, float)
+    place = matrix[:2, 3] / units_per_metre(scene)
+    return tuple(round(float(value), _DIGITS) for value in place), round(math.atan2(matrix[1, 0], matrix[0, 0]), _DIGITS)
+
+
+def _player(scene, row: BeyondMocapPasser) -> Player:
+    if row.place is None or row.place.name not in scene.objects:
+        raise InputError(f"player {row.name}", "nothing that says where he stands", "an object", "choose one as his Place")
+    place, facing = stands(scene, row.place)
+    tool = Tool("tool", *(_exact(getattr(row, f"tool_{name}")) for name in ("length", "radius", "reach"))) if row.part == "tool" else None
+    side = "" if row.side == "either" else row.side
+    return Player(row.name, place, facing, row.bone or row.part, side, tool, _exact(row.height))
+
+
+def _pass(scene, row) -> Pass:
+    example = Example(row.clip.replace("\\", "/"), _exact(row.first), _exact(row.last) or None) if row.clip else None
+    at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
+    side = {"own": None, "either": ""}.get(row.side, row.side)
+    return Pass(
+        row.who, row.to, row.kind, row.bounces, None if row.part == "own" else row.part, side, _exact(row.seconds) or None, at,
+        example, "" if row.error == "none" else row.error,
+    )  # fmt: skip
+
+
+def _serve(settings):
+    place = tuple(_exact(value) for value in settings.serve_at)
+    return {"USUAL": None, "GROUND": GROUND, "PLAYER": settings.serve, "PLACE": place}[settings.serve_from]
+
+
+def _weights(row) -> Weights:
+    bones, words = {}, row.bones.replace(",", " ").replace("=", " ").split()
+    for name, number in zip(words[::2], words[1::2]):
+        try:
+            bones[name] = float(number)
+        except ValueError:
+            raise InputError("weights of bones", f"{name} {number}", "a bone and a number each, such as LeftFoot 2") from None
+    if len(words) % 2:
+        raise InputError("weights of bones", row.bones, "a bone and a number each, such as LeftFoot 2")
+    return Weights(*(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")), bones)
+
+
+def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
+    known = {"foot", "head", "chest", "hand", "tool"}
+    row.part, row.bone = (player.part, "") if player.part in known else ("foot", player.part)
+    row.side, row.height = player.side or "either", player.height
+    if player.tool is not None:
+        row.tool_length, row.tool_radius, row.tool_reach = player.tool.length, player.tool.radius, player.tool.reach
+
+
+def _fill_pass(context, row, one: Pass) -> None:
+    row.who, row.to, row.kind, row.bounces, row.error = one.giver, one.receiver, one.kind, one.bounces, one.error or "none"
+    row.part, row.seconds = one.part or "own", one.seconds or 0.0
+    row.side = "own" if one.side is None else one.side or "either"
+    if one.example is not None:
+        row.clip, row.first, row.last = one.example.clip, one.example.start, one.example.end or 0.0
+    if one.at is not None:
+        row.at = _empty(context, f"{one.receiver} meets", one.at, 0.0, (1.0, 1.0, 1.0, 1.0))
+
+
+def _fill_scene(settings: BeyondMocapPasses, wanted: PassScene) -> None:
+    settings.ball, settings.own = wanted.ball.kind, bool(wanted.ball.changes)
+    for name, value in wanted.ball.changes.items():
+        if name in NUMBERS:
+            setattr(settings, name, value)
+    settings.net = wanted.net is not None
+    if wanted.net is not None:
+        settings.net_from, settings.net_to, settings.net_height = wanted.net.start, wanted.net.end, wanted.net.height
+    settings.repeat, settings.rate, settings.turns = wanted.repeat, wanted.fps, wanted.directions == 8
+    settings.seed, settings.watch = max(0, wanted.seed), wanted.watch
+    for name in ("missed", "dropped", "transition", "lead_in", "lead_out"):
+        setattr(settings, name, getattr(wanted, name))
+    for name in ("speed", "vectors", "times", "position", "velocity"):
+        setattr(settings.weights, name, getattr(wanted.weights, name))
+    settings.weights.bones = ", ".join(f"{name} {value:g}" for name, value in wanted.weights.bones.items())
+    settings.serve, settings.serve_from = "", "USUAL"
+    if wanted.serve == GROUND:
+        settings.serve_from = "GROUND"
+    elif isinstance(wanted.serve, str):
+        settings.serve, settings.serve_from = wanted.serve, "PLAYER"
+    elif wanted.serve is not None:
+        settings.serve_at, settings.serve_from = wanted.serve, "PLACE"
+
+
+def _empty(context, name: str, place, facing: float, colour) -> bpy.types.Object:
+    units = units_per_metre(context.scene)
+    thing = bpy.data.objects.new(name, None)
+    thing.empty_display_type, thing.empty_display_size, thing.show_name = "ARROWS", SIZE * units, True
+    thing.location, thing.color = (place[0] * units, place[1] * units, 0.0), colour
+    thing.rotation_euler.z = facing
+    thing[KEPT] = True
+    bake.collection(context.scene).objects.link(thing)
+    context.view_layer.update()
+    return thing
+
+
+def _place(values) -> tuple[float, float]:
+    return tuple(_exact(value) for value in values)
+
+
+def _exact(value: float) -> float:
+    """A number of single precision as it was typed."""
+    return round(float(value), _DIGITS)

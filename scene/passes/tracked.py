@@ -1,0 +1,174 @@
+"""The ball of imported tracking, solved: as an object of its own, and its touches as proposals for key moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import InputError
+from .. import bake, ball, channels, dots, lanes, lay_strips, linked, strips, tracks
+from ..clock import of_scene
+from ..measure import frames_per_second
+from ..settings import BeyondMocapPlayer, active_player, absolute
+from ..strip_lines import said
+from .settings import KEPT
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.ball.tracked.solve import SolvedBall
+
+BALL = "Solved Ball"
+WORDS = {  # kind of a touch -> words of its key moment; dribbles are stretches, deflections nobody's wish
+    "kick": "kick", "receive": "receive foot", "header": "header", "chest": "receive body", "throw-in": "throwb",
+    "hand": "catchb", "save": "catchb",
+}  # fmt: skip
+NEAR = 0.4  # seconds between a touch and a key moment that is there already
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What is to be solved. tracks: (name, track) of players with files of their own; or path, metadata and provider of a
+    whole match. start, end: seconds; end None: to its end."""
+
+    tracks: tuple = ()
+    path: str = ""
+    metadata: str = ""
+    provider: str = ""
+    start: float | None = None
+    end: float | None = None
+
+
+def order_of(scene: bpy.types.Scene) -> Order:
+    """What the settings ask for: the match of the active player, or the tracks of all ticked players with files of their
+    own. InputError where nobody has a file."""
+    settings = scene.beyond_mocap
+    player = active_player(settings)
+    if player is None or not player.tracking_file:
+        raise InputError("tracking", "no file", "players with a tracking file", "import one in step 2")
+    if player.feed_id:
+        end = settings.section_end if settings.section_end > settings.section_start else None
+        path, metadata = absolute(player.tracking_file), absolute(player.metadata_file)
+        return Order((), path, metadata, player.provider, settings.section_start, end)
+    others = [one for one in settings.players if one.use and one != player and one.tracking_file and not one.feed_id]
+    return Order(tuple((one.name, tracks.read_track(settings, one)) for one in (player, *others)))
+
+
+def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
+    """Read what has to be read, and solve; never touches bpy's data."""
+    from ...beyond_mocap.solve_ball import solve_ball
+
+    if order.tracks:
+        source = together(order.tracks)
+    else:
+        progress(0.0, "Reading the match")
+        source = tracks.match_of(order.path, order.metadata, order.provider)
+    return solve_ball(source, progress, cancelled, order.start, order.end)
+
+
+def together(named: tuple):
+    """The tracks of several players, (name, track) each, as one match at the times of the first; one alone stays a track."""
+    from ...beyond_mocap.ball.tracked.solve import PITCH
+    from ...beyond_mocap.files.tracking import Match, MatchPlayer
+
+    name, first = named[0]
+    if len(named) == 1:
+        return replace(first, name=name)
+    times = first.times
+    places = np.array([[np.interp(times, track.times, track.positions[:, axis], np.nan, np.nan) for axis in range(2)]
+                       for _, track in named]).swapaxes(1, 2)
+    height = np.where(first.ball_height_known, first.ball[:, 2], np.nan)
+    players = tuple(MatchPlayer(name, "", name, -1) for name, _ in named)
+    fps = 1.0 / float(np.median(np.diff(times)))
+    return Match(times, players, places, np.column_stack([first.ball[:, :2], height]), *PITCH, fps, "csv",
+                 ((float(times[0]), float(times[-1])),))
+
+
+def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
+    """The ball on its solved way, on every frame of the scene; its touches in the list. Returns the ball."""
+    from ...beyond_mocap.take import BallPath
+
+    settings, room = scene.beyond_mocap_passes, bake.collection(scene)
+    target = room.objects.get(BALL) or ball.create(bpy.context, BALL, room)
+    linked.refuse(target)
+    channels.check_free(target)
+    times = _frames_between(scene, float(solved.times[0]), float(solved.times[-1]))
+    path = BallPath(times, solved.ball.at(times), np.ones(len(times), bool))
+    channels.discard(target, KEPT)
+    action = ball.write(target, path, scene, bake.frame_at(scene, float(times[0])))
+    action[KEPT] = target[KEPT] = True
+    _list(scene, solved)
+    settings.solved = "\n".join(lines(solved))
+    return target
+
+
+def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
+    """Make key moments of the ticked touches (of one player, or of all in the list of players); how many came of it, and a
+    line for each that did not."""
+    settings, told, count = context.scene.beyond_mocap, [], 0
+    found = {player.name: player for player in settings.players}
+    for touch in context.scene.beyond_mocap_passes.touches:
+        if not touch.use or not touch.words or touch.name not in found or (only and touch.name != only):
+            continue
+        player = found[touch.name]
+        try:
+            line = _in_the_way(context, player, touch)
+        except InputError as error:  # his track or words cannot be read; others go on
+            line = str(error)
+        if line:
+            told.append(line)
+            continue
+        lay_strips.add_moment(player.dot, said(touch.words, round(touch.time, 3)), of_scene(context.scene))
+        touch.use = False
+        count += 1
+    return count, told
+
+
+def lines(solved: "SolvedBall") -> list[str]:
+    """Lines about a solved ball for the panel."""
+    residual = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
+    told = [f"Touches: {len(solved.touches)}", f"Confidence: {solved.confidence:.0%}"]
+    if len(residual):
+        told.append(f"Off the samples: {100 * np.median(residual):.0f} cm")
+    told += [f"Filled samples: {solved.filled.mean():.0%}", f"Outliers: {int(solved.outlier.sum())}"]
+    told += [f"{end.kind.capitalize()}: {end.time:.2f} s" for end in solved.ends]
+    return told + list(solved.notes)
+
+
+def _list(scene, solved: "SolvedBall") -> None:
+    """The touches as rows; names of players by their ids in the feed."""
+    names = {player.feed_id: player.name for player in scene.beyond_mocap.players if player.feed_id}
+    rows = scene.beyond_mocap_passes.touches
+    rows.clear()
+    for touch in solved.touches:
+        row = rows.add()
+        row.name = names.get(touch.player, touch.player)
+        row.player, row.time, row.part, row.kind = touch.player, touch.time, touch.part, touch.kind
+        row.words, row.confidence = WORDS.get(touch.kind, ""), touch.confidence
+        row.use = bool(row.words) and row.name in {player.name for player in scene.beyond_mocap.players}
+    scene.beyond_mocap_passes.active_touch = 0
+
+
+def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
+    """Why a touch becomes no key moment of a player; "" where it may. He has a timeline afterwards."""
+    target = strips.with_lanes(context, player)
+    clock = of_scene(context.scene)
+    first, last = (clock.seconds(frame) for frame in _ends(player))
+    if not first <= touch.time <= last:
+        return f"{player.name}: the touch at {touch.time:.2f} s is outside his track"
+    near = [moment for moment in lanes.moments(target) if abs(moment.key.time - touch.time) < NEAR]
+    if near:
+        return f"{player.name}: has a key moment at {near[0].key.time:.2f} s, so none is added for the touch at {touch.time:.2f} s"
+    return ""
+
+
+def _ends(player) -> tuple[float, float]:
+    return dots.keyed_frames(player.dot) or (-np.inf, np.inf)
+
+
+def _frames_between(scene, start: float, end: float) -> np.ndarray:
+    """The seconds of all whole scene frames from one second to another."""
+    clock, fps = of_scene(scene), frames_per_second(scene)
+    frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
+    return clock.start_time + (frames - clock.start_frame) / fps
