@@ -119,6 +119,23 @@ def ride_asked():
     rider.delay = rider.added = 1.0
 
 
+def fill_scene():
+    """A passing scene in the lists."""
+    bpy.ops.beyond_mocap.passes_sample(sample="three")
+
+
+def solve():
+    bpy.ops.beyond_mocap.solve_ball()
+
+
+def scene_file(places):
+    """A scene in a file."""
+    fill_scene()
+    bpy.ops.beyond_mocap.passes_to_json(filepath=f"{places.out}/scene.json")
+    bpy.ops.beyond_mocap.passes_sample(sample="six")
+    return places.out / "scene.json"
+
+
 def a_ball(carried=False):
     """A ball beside the active body, which carries it already or not."""
     body = bpy.context.object
@@ -169,6 +186,7 @@ def moved(folder):
 
 ROWS = {
     "accept": Row("synthesized"),
+    "accept_touches": Row("imported", prepare=solve),
     "add_moment": Row("imported", lambda places: {"words": "header"}),
     "add_pin": Row("synthesized", lambda places: {"part": "right_hand"}),
     "add_preset": Row("imported", lambda places: {"name": "Tried"}, changes=False),
@@ -213,6 +231,10 @@ ROWS = {
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
     "move_video": Row("video", lambda places: {"frames": 3}),
     "nudge_points": Row("imported", lambda places: {"direction": "UP", "step": 0.3}, edit_points),
+    "passes_from_json": Row("imported", lambda places: {"filepath": f"{scene_file(places)}"}),
+    "passes_list": Row("imported", lambda places: {"rows": "passes", "what": "ADD"}, fill_scene),
+    "passes_sample": Row("imported", lambda places: {"sample": "three"}),
+    "passes_to_json": Row("imported", lambda places: {"filepath": f"{places.out}/scene.json"}, fill_scene, changes=False),
     "path_apart": Row("accepted", prepare=ride_asked),
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "path_cameras": Row("accepted", prepare=ride),
@@ -235,6 +257,7 @@ ROWS = {
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_timeline": Row("imported", changes=False),
     "show_video": Row("video", changes=False),
+    "solve_ball": Row("imported"),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
     "synthesize": Row("imported"),
     "take_ball": Row("accepted", lambda places: {"first": 3, "last": 8}, a_ball),
