@@ -6,10 +6,11 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ..beyond_mocap.ball.sample_scenes import SAMPLES as SCENES
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files import scene_json
 from ..beyond_mocap.files.whole import atomic_write
-from ..scene.passes import order, samples
+from ..scene.passes import order
 from ..scene.passes.settings import SAMPLES
 from .verb import ImportVerb, Verb
 
@@ -24,7 +25,7 @@ class BEYOND_MOCAP_OT_passes_sample(Verb, bpy.types.Operator):
 
     def do(self, context):
         """Read it, fill the lists."""
-        order.fill(context, scene_json.parse_scene(samples.text_of(self.sample), self.sample))
+        order.fill(context, scene_json.parse_scene(SCENES[self.sample], self.sample))
         self.report({"INFO"}, "drag the players' Empties, edit the passes, then press Make Scene")
 
 

@@ -3,5 +3,7 @@
 - `settings`   what the panel shows: players, passes, the ball, weights; what an armature keeps of its hit analysis
 - `hits_shown` hit analysis of an armature: figures for the panel, markers on its action
 - `graph`      its curves as a small picture
+- `order`      the lists as a passing scene of the core, and back
+- `tracked`    the ball of imported tracking, solved
 - `possession` a ball carried by a bone for a while, without a jump at either end
 """

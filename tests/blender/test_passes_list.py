@@ -27,10 +27,11 @@ def asked(room):
     return room("order").scene_of(bpy.context.scene)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_samples_are_those_of_the_sample_folder(core, room, name):
-    scene_json = core("files.scene_json")
-    assert scene_json.parse_scene(room("samples").text_of(name)) == scene_json.read_scene(SAMPLES / f"{name}.json")
+def test_every_sample_can_be_chosen(core, room):
+    assert {name for name, *_ in room("settings").SAMPLES} == set(core("ball.sample_scenes").SAMPLES)
+    for name in NAMES:
+        press(bpy.ops.beyond_mocap.passes_sample, sample=name)
+        assert len(asked(room).passes) == len(core("ball.sample_scenes").SAMPLES[name]["passes"])
 
 
 @pytest.mark.parametrize("name", NAMES)
