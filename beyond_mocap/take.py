@@ -15,11 +15,12 @@ from .synthesis.edit_list import EditList
 @dataclass(frozen=True, eq=False)
 class BallPath:
     """The ball at the output's rate: times (T,) s on the track's clock, positions (T, 3) m of its centre, measured (T,)
-    bool."""
+    bool; rotations (T, 4) of its body, None where nobody knows how it turns."""
 
     times: np.ndarray
     positions: np.ndarray
     measured: np.ndarray
+    rotations: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

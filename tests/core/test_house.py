@@ -33,7 +33,7 @@ ROOMS = {
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "polish": ["motion"],
-    "ball": ["motion", "library", "polish"],
+    "ball": ["motion", "annotation", "library", "polish"],
     "evaluation": ["motion", "annotation", "plan", "take", "ball", "library"],
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.

@@ -1,0 +1,164 @@
+"""What a ball is and what acts on it: air, bounce and ground, with the numbers of real balls.
+
+In the air a ball of mass m feels gravity, a drag that grows with its speed (the paper's) or with its square (measured), and
+the Magnus lift of its spin, at right angles to its way:
+
+    dv/dt = -g z - linear_drag v - drag |v| v + lift_scale C_L |v| (w x v) / |w|,   C_L = 1 / (a + b |v| / (r |w|))
+
+At a bounce the ground gives back `restitution` of the speed into it; across, it stops the ball's lowest point (grip), as far
+as `friction` times the push upward can (else it slides), which couples way and spin: Cross, "Grip-slip behavior of a
+bouncing ball", Am. J. Phys. 70 (2002). Every formula takes energy out or leaves it: nothing here speeds a ball up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Ball:
+    """One kind of ball.
+
+    radius m, mass kg, gravity m/s^2. linear_drag 1/s (share of the speed lost in a second). drag 1/m: rho C_D A / 2m.
+    lift: (scale 1/m: rho A / 2m, a, b) of the Magnus lift above; scale 0: none. restitution: share of the speed into the
+    ground that comes back. friction: Coulomb's, at a bounce and while sliding; 0: no spin is made. rolling m/s^2: how fast a
+    rolling ball slows. spin_decay 1/s. inertia: moment of inertia / (mass radius^2), 2/3 for a hollow ball.
+    """
+
+    name: str
+    radius: float
+    mass: float
+    gravity: float = 9.8
+    linear_drag: float = 0.0
+    drag: float = 0.0
+    lift: tuple[float, float, float] = (0.0, 2.0, 1.0)
+    restitution: float = 0.7
+    friction: float = 0.0
+    rolling: float = 1.0
+    spin_decay: float = 0.0
+    inertia: float = 2.0 / 3.0
+
+
+PAPER = Ball("paper", 0.11, 0.43, linear_drag=0.2)
+"""Ball handling §5: air resistance 0.2 (taken as -0.2 v per second), elasticity 0.7, gravity 9.8; no spin. How it rolls
+is not said there; it slows as a football does."""
+
+FOOTBALL = Ball("football", 0.11, 0.43, 9.81, drag=0.0133, lift=(0.0531, 2.0, 0.4), restitution=0.62, friction=0.5,
+                rolling=1.0, spin_decay=0.05)
+"""C_D 0.25, between the 0.2 that Goff & Carre, "Trajectory analysis of a soccer ball", Am. J. Phys. 77 (2009), find above the
+drag crisis near 12 m/s and the 0.4 and more below it (Asai et al., "Fundamental aerodynamics of the soccer ball", Sports
+Eng. 10 (2007)); C_L about 0.3 for spin parameters of 0.3 (both), levelling off. Bounce and roll as on good turf: FIFA's test
+manual asks for a rebound of 0.6 to 0.85 m from 2 m and 4 to 8 m of roll from a 1 m ramp. Friction: 0.37 to 0.62 are measured
+("The coefficient of friction of soccer balls", Proceedings 49 (2020) 92)."""
+
+VOLLEYBALL = Ball("volleyball", 0.105, 0.27, 9.81, drag=0.0192, lift=(0.0770, 2.0, 0.4), restitution=0.74, friction=0.5,
+                  rolling=0.4, spin_decay=0.05)
+"""C_D 0.25 between 0.15 above and 0.45 below the crisis (Asai et al., "A study of knuckle effect of volleyball", Procedia
+Eng. 2 (2010)); a hard floor."""
+
+TENNIS = Ball("tennis", 0.0335, 0.0577, 9.81, drag=0.0202, lift=(0.0367, 2.022, 0.981), restitution=0.745, friction=0.6,
+              rolling=0.6, spin_decay=0.05, inertia=0.55)
+"""C_D 0.55 (Mehta, Alam & Subic, "Aerodynamics of tennis balls", Sports Technol. 1 (2008)); lift: Stepanek, "The aerodynamics
+of tennis balls: the topspin lob", Am. J. Phys. 56 (1988); bounce: the rules ask for 1.35 to 1.47 m from 2.54 m; inertia:
+Cross (2002)."""
+
+BALLS: dict[str, Ball] = {ball.name: ball for ball in (PAPER, FOOTBALL, VOLLEYBALL, TENNIS)}
+
+FASTEST: dict[str, float] = {"foot": 38.0, "head": 23.0, "chest": 10.0, "hand": 38.0, "tool": 73.0}
+"""m/s that a human gives a ball with a part. Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis, "Biomechanical
+characteristics of instep soccer kick", J. Sports Sci. Med. 6 (2007)), records some more. Hand: the fastest volleyball serves and
+spikes (some 137 km/h). Tool: the fastest tennis serves (263 km/h). Head and chest: the best runs up and dives, rounded up."""
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (...,) of vectors (..., 3)."""
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.sqrt(x * x + y * y + z * z)
+
+
+def in_air(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+    """Accelerations (..., 3) m/s^2 of balls that fly with velocity (..., 3) m/s and spin (..., 3) rad/s (eq. 3)."""
+    speed = length(velocity)
+    out = velocity * -(ball.linear_drag + ball.drag * speed)[..., None]
+    scale, a, b = ball.lift
+    if scale and spin.any():
+        rim = ball.radius * length(spin)
+        share = scale * ball.radius * speed / np.maximum(a * rim + b * speed, 1e-9)
+        wx, wy, wz = spin[..., 0], spin[..., 1], spin[..., 2]
+        vx, vy, vz = velocity[..., 0], velocity[..., 1], velocity[..., 2]
+        out[..., 0] += (wy * vz - wz * vy) * share
+        out[..., 1] += (wz * vx - wx * vz) * share
+        out[..., 2] += (wx * vy - wy * vx) * share
+    out[..., 2] -= ball.gravity
+    return out
+
+
+def bounced(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and spin (..., 3) after meeting level ground with those given: the impulse of eq. 5.
+
+    The push across is at right angles to Z and turns the ball; at most it brings the lowest point to a stop.
+    """
+    down = np.maximum(-velocity[..., 2], 0.0)
+    push = _across(velocity, spin, ball, ball.friction * (1.0 + ball.restitution) * down)
+    after = velocity + push
+    after[..., 2] = np.where(velocity[..., 2] < 0.0, ball.restitution * down, velocity[..., 2])
+    return after, spin + _turned_by(push, ball)
+
+
+def gripped(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and spin (..., 3) once the lowest point stands still: it rolls. A ball without friction stays as it is."""
+    push = _across(velocity, spin, ball, np.full(velocity.shape[:-1], np.inf if ball.friction else 0.0))
+    return velocity + push, spin + _turned_by(push, ball)
+
+
+def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+    """Velocity (..., 3) m/s, level, of the ball's lowest point over the ground."""
+    out = np.zeros(np.broadcast_shapes(velocity.shape, spin.shape))
+    out[..., 0] = velocity[..., 0] - ball.radius * spin[..., 1]
+    out[..., 1] = velocity[..., 1] + ball.radius * spin[..., 0]
+    return out
+
+
+def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (..., 3) m/s^2 and rad/s^2 of balls that slide over the ground."""
+    over = slip(velocity, spin, ball)
+    rub = over * (-ball.friction * ball.gravity / np.maximum(length(over), 1e-12))[..., None]
+    air = velocity * -(ball.linear_drag + ball.drag * length(velocity))[..., None]
+    return rub + air, _turned_by(rub, ball) - ball.spin_decay * spin
+
+
+def rolling_spin(velocity: np.ndarray, ball: Ball) -> np.ndarray:
+    """Spin (..., 3) rad/s, level, with which a ball rolls at velocity (..., 3)."""
+    out = np.zeros(velocity.shape)
+    out[..., 0], out[..., 1] = -velocity[..., 1] / ball.radius, velocity[..., 0] / ball.radius
+    return out
+
+
+def slowing(speed: np.ndarray, ball: Ball) -> np.ndarray:
+    """m/s^2 by which a ball that rolls at `speed` (...,) m/s slows: the ground, and the air."""
+    return ball.rolling + ball.linear_drag * speed + ball.drag * speed**2
+
+
+def energy(position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+    """Joules (...,) of way, spin and height (of the centre over z = 0) together."""
+    way = 0.5 * np.einsum("...i,...i->...", velocity, velocity)
+    turning = 0.5 * ball.inertia * ball.radius**2 * np.einsum("...i,...i->...", spin, spin)
+    return ball.mass * (way + turning + ball.gravity * position[..., 2])
+
+
+def _across(velocity, spin, ball: Ball, most) -> np.ndarray:
+    """Change of velocity (..., 3), level, that stops the lowest point, or as much of it as `most` (...,) m/s allows."""
+    wanted = slip(velocity, spin, ball) * (-ball.inertia / (1.0 + ball.inertia))
+    size = length(wanted)
+    return wanted * np.minimum(1.0, most / np.maximum(size, 1e-12))[..., None]
+
+
+def _turned_by(push: np.ndarray, ball: Ball) -> np.ndarray:
+    """Change of spin (..., 3) by a level change of velocity (..., 3) that the ground makes at the lowest point."""
+    out = np.zeros(push.shape)
+    out[..., 0], out[..., 1] = push[..., 1], -push[..., 0]
+    return out / (ball.inertia * ball.radius)
