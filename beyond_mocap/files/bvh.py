@@ -118,6 +118,29 @@ def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
     return notes
 
 
+class BvhRows:
+    """How single rows of numbers of one hierarchy become poses, for rows that come one by one.
+
+    text: the hierarchy with a first row, by which unit and axes are guessed (`unit`: metres per unit, where it is
+    known). skeleton: the body's, as of the first row. InputError as `read`.
+    """
+
+    def __init__(self, text: BvhText, unit: float | None = None):
+        self.text = text
+        self.scale = bvh_scale.guess(text, unit)
+        channels = _Channels(text, self.scale)
+        self.hips = _top_of_body(text, self.scale.body)
+        self.kept = _below(text.parents, self.hips)
+        self.skeleton = _skeleton(channels, self.kept)[0]
+
+    def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Root positions (T, 3) m and local rotations (T, J, 4) of rows (T, C) of numbers in the file's order."""
+        channels = _Channels(replace(self.text, values=np.asarray(values, dtype=float)), self.scale)
+        root, rotation, _ = _folded(channels, self.hips)
+        rotations = np.stack([rotation.T] + [channels.rotation(joint) for joint in self.kept[1:]])
+        return root, rotations.transpose(2, 0, 1)
+
+
 class _Channels:
     """A file's numbers joint by joint, in our axes and metres."""
 

@@ -50,7 +50,11 @@ class BvhText:
 def parse(path) -> BvhText:
     """Read the file at `path`; InputError (file:line) where it is missing, truncated, damaged or no BVH file."""
     path = Path(path)
-    data = _content(path)
+    return parse_data(path, _content(path))
+
+
+def parse_data(path: Path, data: bytes) -> BvhText:
+    """The same of bytes with plain line ends that came from elsewhere; `path` is what errors call them."""
     motion = re.search(rb"^[ \t]*MOTION\b[^\n]*\n?", data, re.M | re.I)
     if motion is None:
         raise InputError(path, "no MOTION section", "HIERARCHY, then MOTION", f"the file is cut off; {_EXPORT_AGAIN}")

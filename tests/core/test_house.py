@@ -34,6 +34,7 @@ ROOMS = {
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "polish": ["motion"],
     "ball": ["motion", "annotation", "library", "polish"],
+    "stream": ["motion", "files", "ball"],
     "evaluation": ["motion", "annotation", "plan", "take", "ball", "library"],
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
