@@ -29,6 +29,7 @@ from .motion.motion import Motion
 from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
 from .plan import Plan
+from .polish.gaze import CHEST, following
 from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
 from .polish.strike import Touch
 from .polish.strike_at import Meeting, met_at
@@ -40,6 +41,9 @@ from .take import BallPath, Take
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""
+
+OWN_HEAD = 0.3
+"""Seconds around a header in which the head moves as recorded; it goes over within as many more."""
 
 _WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip's own turning
 
@@ -109,6 +113,13 @@ def least_seconds(library: Library, before: HitOrder | Stance, after: HitOrder) 
     return out + into + max(turn / 2.0, 0.2 if still else needed(state, end))
 
 
+def strike_words(library: Library) -> frozenset[str]:
+    """The words by which the library's key moments are told from what goes on between them."""
+    rows = [row for clip in library.clips for row in clip.annotations]
+    between = {word for row in rows if row.key is None for word in row.words}
+    return frozenset(word for row in rows if row.key is not None for word in row.words) - between
+
+
 def _check(orders: Sequence[HitOrder], times: np.ndarray, fps: float) -> None:
     for order in orders:
         if not times[0] - 0.5 / fps <= order.time <= times[-1] + 0.5 / fps:
@@ -166,16 +177,20 @@ class _Body:
         speeds = np.array([gait.speed for gait in library.gaits])
         gait = automatic_gaits(track.speed, library.fps, speeds, library.gait_thresholds)
         words = [frozenset(words) for words in automatic_words(library, gait, track)]
+        strikes = strike_words(library)
         keys = tuple(self._key(hit, (hit.order.time - self.start) * library.fps) for hit in self.hits)
         for hit in self.hits:
             for frame in np.flatnonzero((times >= hit.start) & (times <= hit.end)):
                 words[frame] = None
         allowed = np.ones(len(library.clips), bool)
-        return Wanted(track, tuple(words), gait, Timeline(), keys, allowed, ())
+        avoided = tuple(strikes for _ in words) if strikes else ()
+        return Wanted(track, tuple(words), gait, Timeline(), keys, allowed, (), avoided)
 
     def _key(self, hit: Placed, frame: float) -> WantedKey:
         order, hit_motion = hit.order, hit.order.hit
-        words = frozenset({WORDS.get(order.part, "kick"), order.side} - {""})
+        clip = self.library.clips[order.clip]
+        frames = range(int(hit_motion.first), int(hit_motion.last) + 1)
+        words = frozenset({WORDS.get(order.part, "kick"), order.side} - {""}).union(*map(clip.words_at, frames))
         key = Key(order.clip, float(order.strike_frame), float(hit_motion.first), float(hit_motion.last), words)
         return WantedKey(KeyMoment(order.time, tuple(sorted(words))), frame, (key,), None, True, (1.0,))
 
@@ -226,7 +241,20 @@ class _Body:
         ]  # fmt: skip
 
     def _watching(self, body: Motion) -> Motion:
-        return body
+        """The body with its head on the ball, but for the moments in which the head itself strikes; the chest, which
+        carries the arms, stays out of it in his hit motions."""
+        if not self.settings.watch:
+            return body
+        share = np.ones(len(self.times))
+        for order in self.orders:
+            if order.part == "head":
+                share *= np.clip((np.abs(self.times - order.time) - OWN_HEAD) / OWN_HEAD, 0.0, 1.0)
+        arms = np.ones(len(self.times))
+        for hit in self.hits:
+            outside = np.maximum(hit.start - self.times, self.times - hit.end)
+            arms *= np.clip(outside / OWN_HEAD, 0.0, 1.0)
+        share, arms = (x * x * (3.0 - 2.0 * x) for x in (share, arms))
+        return following(body, self.ball, look_of(self.library), share, CHEST * arms)
 
     def _meetings(self) -> list[Meeting]:
         skeleton, out = self.library.skeleton, []

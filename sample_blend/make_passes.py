@@ -8,6 +8,7 @@ gives the same bytes. Needs the core only."""
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -27,6 +28,9 @@ TAKEN = (
 )  # fmt: skip
 """Clips of the sample's library that are taken over."""
 
+STOPPED = 186
+"""Frames after which who starts and stops has stopped; behind them the clip goes on with half a step."""
+
 STRIKES = (
     ("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass", 1.25), ("pass_quick", "pass", 1.45),
     ("attack", "attack", 1.4), ("attack_quick", "attack", 1.6), ("receive", "receive", 1.0), ("head", "head", 1.25),
@@ -38,6 +42,7 @@ STRIKES = (
 def library() -> list[Clip]:
     """All clips of the library."""
     taken = [clip for clip in clips() if clip.name in TAKEN]
+    taken = [replace(c, motion=c.motion.frames(0, STOPPED)) if c.name == "start_stop_walking" else c for c in taken]
     ready = [Clip(f"ready_{seed}", idle(9.0, fps=FPS, seed=60 + seed), ("standing",)) for seed in (1, 2, 3)]
     return [*taken, *ready, *(_strike(*row, seed=70 + number) for number, row in enumerate(STRIKES))]
 
