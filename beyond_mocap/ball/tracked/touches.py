@@ -19,6 +19,10 @@ TOUCH, FREE = 4.5, 3.5  # nats for a cut of either kind beside what is seen ther
 _LONGEST = 6.0  # seconds of one piece
 _STEPS = 14  # cuts that one piece may leave out
 _JOINT = 0.12  # m by which neighbouring pieces may miss each other
+_JUMP = 8.0  # nats at most for missing each other: the feed has lost the ball and found it elsewhere
+_SKIP = 0.13  # s around a cut in which samples may be wrong: bodies hide the ball there
+_SKIPPED = 2.5  # nats for each sample left out so
+_SHORT, _SHORT_PRICE = 0.24, 6.0  # s within which the course hardly changes twice, nats for twice at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,20 +54,25 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     by_begin = np.searchsorted(begin, np.arange(len(cuts) + 1))
     ending = np.argsort(upto, kind="stable")
     by_end = np.searchsorted(upto[ending], np.arange(len(cuts) + 1))
-    left, right = _pairs(ending, by_end, by_begin, len(cuts))
-    knot = _knots(pieces, left, right, times, cuts, upto, player_cost)
+    reach = np.searchsorted(cuts, np.searchsorted(times, times[cuts[:-1]] + _SKIP), "left") - 1
+    reach = np.clip(np.maximum(reach, np.arange(len(cuts) - 1)), 0, len(cuts) - 2)
+    outof = [(by_begin[cut], by_begin[reach[cut] + 1]) for cut in range(len(cuts) - 1)]
+    left, right = _pairs(ending, by_end, outof)
+    knot = _knots(pieces, left, right, times, cuts, upto, begin, player_cost)
     price = np.minimum(knot.touch, knot.free)
-    best = np.where(begin == 0, pieces.cost, np.inf)
+    own = pieces.cost + _short(pieces, times)
+    best = np.where(begin == 0, own, np.inf)
     back = np.full(len(pieces), -1)
     offset = 0
     for cut in range(1, len(cuts) - 1):
-        into, outof = ending[by_end[cut] : by_end[cut + 1]], slice(by_begin[cut], by_begin[cut + 1])
-        shape = len(into), outof.stop - outof.start
-        count = shape[0] * shape[1]
-        total = best[into][:, None] + price[offset : offset + count].reshape(shape)
+        into, (low, high) = ending[by_end[cut] : by_end[cut + 1]], outof[cut]
+        count = len(into) * (high - low)
+        total = best[into][:, None] + price[offset : offset + count].reshape(len(into), high - low)
         choice = total.argmin(axis=0)
-        best[outof] = pieces.cost[outof] + total[choice, np.arange(shape[1])]
-        back[outof] = into[choice]
+        found = own[low:high] + total[choice, np.arange(high - low)]
+        better = found < best[low:high]
+        best[low:high] = np.where(better, found, best[low:high])
+        back[low:high] = np.where(better, into[choice], back[low:high])
         offset += count
     last = ending[by_end[len(cuts) - 1] :]
     way = [int(last[best[last].argmin()])]
@@ -73,13 +82,19 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     return _chosen(pieces.take(way), times, cuts, player_cost)
 
 
-def _pairs(ending, by_end, by_begin, count) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of all neighbouring pieces (left ends where right begins), cut by cut, row by row."""
+def _short(pieces: Fits, times: np.ndarray) -> np.ndarray:
+    """Nats for pieces that last less than _SHORT."""
+    ends = times[np.minimum(pieces.last + 1, len(times) - 1)]
+    return _SHORT_PRICE * np.maximum(0.0, 1.0 - (ends - pieces.begin) / _SHORT)
+
+
+def _pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of all pieces that may follow each other, cut by cut, row by row."""
     left, right = [np.zeros(0, int)], [np.zeros(0, int)]
-    for cut in range(1, count - 1):
-        into, outof = ending[by_end[cut] : by_end[cut + 1]], np.arange(by_begin[cut], by_begin[cut + 1])
-        left.append(np.repeat(into, len(outof)))
-        right.append(np.tile(outof, len(into)))
+    for cut in range(1, len(outof)):
+        into, following = ending[by_end[cut] : by_end[cut + 1]], np.arange(*outof[cut])
+        left.append(np.repeat(into, len(following)))
+        right.append(np.tile(following, len(into)))
     return np.concatenate(left), np.concatenate(right)
 
 
@@ -94,16 +109,16 @@ class _Knots:
     free: np.ndarray
 
 
-def _knots(pieces: Fits, left, right, times, cuts, upto, player_cost) -> _Knots:
+def _knots(pieces: Fits, left, right, times, cuts, upto, begin, player_cost) -> _Knots:
     """What neighbouring pieces say of the cut between them, and the costs of both kinds."""
-    cut = upto[left]
-    first, second = times[cuts[cut] - 1], times[np.minimum(cuts[cut], len(times) - 1)]
+    cut, resumed = upto[left], begin[right]
+    first, second = times[cuts[cut] - 1], times[np.minimum(cuts[resumed], len(times) - 1)]
     middle, step = 0.5 * (first + second), np.maximum(second - first, 1e-3)
     before, after = pieces.velocity(middle, left), pieces.velocity(middle, right)
     gap = pieces.position(middle, left) - pieces.position(middle, right)
     change = after - before
     size = (change**2).sum(axis=1)
-    shift = np.clip((gap * change).sum(axis=1) / np.maximum(size, 1e-6), -0.75 * step, 0.75 * step)
+    shift = np.clip((gap * change).sum(axis=1) / np.maximum(size, 1e-6), -0.6 * step, 0.6 * step)
     time = middle + shift
     before, after = pieces.velocity(time, left), pieces.velocity(time, right)
     here, there = pieces.position(time, left), pieces.position(time, right)
@@ -114,8 +129,10 @@ def _knots(pieces: Fits, left, right, times, cuts, upto, player_cost) -> _Knots:
     speed_var = speed_left + speed_right
     change = after - before
     size = np.sqrt((change**2).sum(axis=1))
-    joint = 0.5 * miss
-    touch = TOUCH + joint + player_cost[cut] + _log_touch(size, speed_var, axes)
+    joint = -np.logaddexp(-0.5 * miss, -_JUMP)
+    joint = joint + _SKIPPED * (cuts[resumed] - cuts[cut])
+    near = np.minimum(player_cost[cut], player_cost[resumed])
+    touch = TOUCH + joint + near + _log_touch(size, speed_var, axes)
     free = FREE + joint + _free_cost(before, change, here, speed_var)
     place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
     spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
@@ -155,7 +172,7 @@ def _heavy(squares: np.ndarray) -> np.ndarray:
 def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
     upto = np.searchsorted(cuts, pieces.last + 1)
     left = np.arange(len(pieces) - 1)
-    knots = _knots(pieces, left, left + 1, times, cuts, upto, player_cost)
+    knots = _knots(pieces, left, left + 1, times, cuts, upto, np.searchsorted(cuts, pieces.first), player_cost)
     return Cuts(
         time=knots.time, spread=knots.spread, touch=knots.touch < knots.free,
         margin=np.abs(knots.touch - knots.free), place=knots.place, before=knots.before, after=knots.after,
