@@ -28,6 +28,7 @@ _SHORTEST = 0.3  # s that can be solved
 _TOGETHER = 0.06  # s in which samples err together: they count as one
 _STEP = 0.04  # s between the knots of a path
 _BLEND = 0.2  # s over which a path is brought to the place of a touch
+_EVERYBODY = 14  # players who are tracked: a touch by nobody among so many is a corner that the feed made
 _HEIGHTS = 0.8  # share of samples with a height from which heights are used
 
 
@@ -225,6 +226,10 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
         return []
     away = who.distances(samples.times, place[:, :2], positions, time)
     chosen = who.choose(away, time, _between(samples, positions, time), stranger)
+    everybody = np.isfinite(away).sum(axis=0) >= _EVERYBODY
+    kept = np.flatnonzero((chosen >= 0) | ~everybody)
+    time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
+    before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
     order = sorted(range(len(time)), key=lambda k: time[k])
     known_height = np.isfinite(samples.positions[:, 2]).mean() > _HEIGHTS
     out = []

@@ -15,7 +15,7 @@ import numpy as np
 from .pieces import Fits, fit_between
 
 USUAL_CHANGE = 9.0  # m/s, the mean change of velocity by a touch
-TOUCH, FREE = 4.5, 3.5  # nats for a cut of either kind beside what is seen there
+TOUCH, FREE = 4.0, 3.5  # nats for a cut of either kind beside what is seen there
 _LONGEST = 6.0  # seconds of one piece
 _STEPS = 14  # cuts that one piece may leave out
 _JOINT = 0.12  # m by which neighbouring pieces may miss each other

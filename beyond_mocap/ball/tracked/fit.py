@@ -1,0 +1,212 @@
+"""Launches that explain the samples between two touches: flight with bounces, slide and roll by the physics of `ball`.
+
+All stretches are fitted at once by damped least squares: the unknowns are where the ball leaves (a little), its velocity and
+its spin; heights come out of it where the feed has none, for a ball in the air slows otherwise than one on the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..physics import FOOTBALL, Ball
+from .coarse import coarse_courses
+
+GRID = 0.04  # s between the moments in which flights are looked at
+LONGEST = 6.0  # s of a stretch
+_ROUNDS = 6
+_SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, how far samples lie from the ball, filled-in ones, heights
+_PLACED = 0.12  # m, how far the places of touches are wrong
+_SPUN = 25.0  # rad/s, usual spin about either axis
+_LOFTED = 8.0  # m/s, usual velocity upward
+_HIGH = 2.2  # m, the ball's height at the next touch, usually at most
+_AT_ONCE = 64  # stretches
+_MOST = 40  # samples of a stretch that are looked at
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """S stretches between touches, each with up to K samples (rows padded with weight zero).
+
+    seconds: (S,) s from start to end. start, end: (S, 3) m, z NaN where unknown. velocity: (S, 3) m/s at the start, z NaN
+    where unknown. since: (S, K) s after the start. points: (S, K, 3) m. weight: (S, K) 1/m; weight_z (S, K).
+    """
+
+    seconds: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    velocity: np.ndarray
+    since: np.ndarray
+    points: np.ndarray
+    weight: np.ndarray
+    weight_z: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.seconds)
+
+    def take(self, which: np.ndarray) -> Stretches:
+        """Some of them."""
+        return Stretches(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True, eq=False)
+class Launches:
+    """One launch for each of S stretches: place (S, 3) m, velocity (S, 3) m/s, spin (S, 3) rad/s, cost (S,)."""
+
+    place: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    cost: np.ndarray
+
+
+def gathered(times, positions, measured, used, spans) -> Stretches:
+    """The stretches of (start, end, start place (3,), end place (3,), start velocity (3,)) `spans` with their samples.
+
+    times (N,), positions (N, 3), measured and used (N,) bool: the feed's.
+    """
+    begins = np.array([span[0] for span in spans])
+    ends = np.array([span[1] for span in spans])
+    first, last = np.searchsorted(times, begins, "right"), np.searchsorted(times, ends, "left")
+    most = min(max(int((last - first).max(initial=0)), 1), _MOST)
+    stride = np.ceil((last - first) / most).astype(int)
+    index = first[:, None] + np.arange(most) * np.maximum(stride, 1)[:, None]
+    inside = index < last[:, None]
+    index = np.minimum(index, len(times) - 1)
+    points = positions[index]
+    weight = np.where(measured[index], 1.0 / _SEEN, 1.0 / _FILLED) * (inside & used[index])
+    high = np.isfinite(points[..., 2])
+    weight_z = np.where(measured[index], 1.0 / _SEEN_HEIGHT, 1.0 / _FILLED) * (inside & used[index] & high)
+    return Stretches(
+        ends - begins, *(np.array([span[place] for span in spans]) for place in (2, 3, 4)),
+        np.where(inside, times[index] - begins[:, None], 0.0), np.nan_to_num(points), weight, weight_z,
+    )  # fmt: skip
+
+
+def fit_launches(
+    stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callable[[], bool] | None = None
+) -> Launches:
+    """The best launch for every stretch, tried from the ground, from the velocity upward that was seen, or from lofts."""
+    best = None
+    seen = np.isfinite(stretches.velocity[:, 2]).all()
+    for loft in (0.0, 0.5) if seen else (0.0, 0.5, 1.0):
+        found = _fitted(stretches, _guess(stretches, ball, loft), ball, cancelled)
+        best = found if best is None else _better(best, found)
+    return best
+
+
+def _guess(stretches: Stretches, ball: Ball, loft: float) -> np.ndarray:
+    """(S, 8) unknowns: dx, dy, dz, vx, vy, vz, top spin, side spin; `loft` of a flight that takes the whole stretch."""
+    unknown = np.zeros((len(stretches), 8))
+    seconds = stretches.seconds
+    unknown[:, 3:5] = stretches.velocity[:, :2]
+    lofted = loft * 0.5 * ball.gravity * np.minimum(seconds, 4.0)
+    measured = stretches.velocity[:, 2]
+    unknown[:, 5] = np.where(np.isfinite(measured) & (loft == 0.5), measured, lofted)
+    return unknown
+
+
+def _launch(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    place = np.nan_to_num(stretches.start, nan=ball.radius) + unknown[:, :3]
+    place[:, 2] = np.maximum(place[:, 2], ball.radius)
+    velocity = unknown[:, 3:6]
+    flat = velocity[:, :2] / np.maximum(np.linalg.norm(velocity[:, :2], axis=1), 1e-6)[:, None]
+    top, side = unknown[:, 6], unknown[:, 7]
+    spin = np.stack([-flat[:, 1] * top, flat[:, 0] * top, side], axis=1)
+    return place, velocity, spin
+
+
+def ways(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+    """(S, K, 3) m where the balls are at the samples' moments, (S, 3) m at the end."""
+    count = int(np.ceil(stretches.seconds.max() / GRID))
+    places, speeds = coarse_courses(*_launch(stretches, unknown, ball), ball, GRID, count)
+    return _between(places, speeds, stretches.since), _between(places, speeds, stretches.seconds[:, None])[:, 0]
+
+
+def _between(places, speeds, since) -> np.ndarray:
+    """(S, K, 3): cubic between the moments of the grid."""
+    cell = np.clip((since / GRID).astype(int), 0, places.shape[1] - 2)
+    share = (since / GRID - cell)[..., None]
+    row = np.arange(len(places))[:, None]
+    p, q = places[row, cell], places[row, cell + 1]
+    m, n = speeds[row, cell] * GRID, speeds[row, cell + 1] * GRID
+    s2, s3 = share**2, share**3
+    return (2 * s3 - 3 * s2 + 1) * p + (s3 - 2 * s2 + share) * m + (3 * s2 - 2 * s3) * q + (s3 - s2) * n
+
+
+def _misses(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray:
+    """(S, R) weighted misses whose squares are made small."""
+    seen, end = ways(stretches, unknown, ball)
+    off = seen - stretches.points
+    count = np.maximum((stretches.weight > 0).sum(axis=1), 1)
+    even = np.sqrt(np.minimum(1.0, 12.0 / count))[:, None]  # neighbouring samples err together
+    flat = off[..., :2] * (stretches.weight * even)[..., None]
+    high = off[..., 2] * stretches.weight_z * even
+    known = np.isfinite(stretches.end[:, 2])
+    last = (end - np.nan_to_num(stretches.end)) / _PLACED
+    over = np.where(known, last[:, 2], np.maximum(end[:, 2] - _HIGH, 0.0) / _PLACED)
+    rise = np.where(np.isfinite(stretches.velocity[:, 2]), 0.0, unknown[:, 5] / _LOFTED)
+    prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :3] / _PLACED).T, rise, *(unknown[:, 6:] / _SPUN).T], axis=1)
+    return np.concatenate([_soft(flat.reshape(len(off), -1)), _soft(high), prior], axis=1)
+
+
+def _soft(off: np.ndarray) -> np.ndarray:
+    """Misses beyond two deviations grow like their square root."""
+    far = np.abs(off) > 2.0
+    return np.where(far, np.sign(off) * np.sqrt(np.maximum(4.0 * np.abs(off) - 4.0, 0.0)), off)
+
+
+_NUDGE = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.05, 0.5, 0.5])
+
+
+def _fitted(stretches: Stretches, unknown: np.ndarray, ball: Ball, cancelled) -> Launches:
+    """Levenberg and Marquardt's method, every stretch with a damping of its own; equal lengths together."""
+    order = np.argsort(stretches.seconds, kind="stable")
+    out, costs = unknown.copy(), np.zeros(len(unknown))
+    for low in range(0, len(order), _AT_ONCE):
+        if cancelled is not None and cancelled():
+            break
+        some = order[low : low + _AT_ONCE]
+        out[some], costs[some] = _descend(stretches.take(some), unknown[some], ball)
+    place, velocity, spin = _launch(stretches, out, ball)
+    return Launches(place, velocity, spin, costs)
+
+
+def _descend(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+    count = unknown.shape[1]
+    stretches = _cropped(stretches)
+    off = _misses(stretches, unknown, ball)
+    cost = (off**2).sum(axis=1)
+    damping = np.full(len(unknown), 1e-2)
+    eight = np.tile(np.arange(len(unknown)), count)
+    repeated = stretches.take(eight)
+    for _ in range(_ROUNDS):
+        nudged = np.tile(unknown, (count, 1)) + np.repeat(np.diag(_NUDGE), len(unknown), axis=0)
+        slope = (_misses(repeated, nudged, ball).reshape(count, len(unknown), -1) - off) / _NUDGE[:, None, None]
+        normal = np.einsum("isr,jsr->sij", slope, slope)
+        right = -np.einsum("isr,sr->si", slope, off)
+        diagonal = np.einsum("sii->si", normal) + 1e-9
+        step = np.linalg.solve(normal + (damping[:, None] * diagonal)[..., None] * np.eye(count), right[..., None])[..., 0]
+        tried = unknown + np.clip(step, -6.0 * _SPUN, 6.0 * _SPUN)
+        off_tried = _misses(stretches, tried, ball)
+        cost_tried = (off_tried**2).sum(axis=1)
+        good = cost_tried < cost
+        unknown, off = np.where(good[:, None], tried, unknown), np.where(good[:, None], off_tried, off)
+        cost, damping = np.where(good, cost_tried, cost), np.clip(np.where(good, damping / 5.0, damping * 8.0), 1e-6, 1e4)
+    return unknown, cost
+
+
+def _cropped(stretches: Stretches) -> Stretches:
+    """The same with as few columns as their samples need."""
+    used = np.flatnonzero((stretches.weight > 0).any(axis=0))
+    last = int(used[-1]) + 1 if len(used) else 1
+    wide = {name: getattr(stretches, name)[:, :last] for name in ("since", "points", "weight", "weight_z")}
+    rest = {name: getattr(stretches, name) for name in ("seconds", "start", "end", "velocity")}
+    return Stretches(**rest, **wide)
+
+
+def _better(one: Launches, other: Launches) -> Launches:
+    left = one.cost <= other.cost
+    both = ((getattr(one, name), getattr(other, name)) for name in ("place", "velocity", "spin"))
+    return Launches(*(np.where(left[:, None], a, b) for a, b in both), np.where(left, one.cost, other.cost))
