@@ -9,19 +9,21 @@ import numpy as np
 from ...errors import InputError
 from ...motion.runs import runs
 from ...motion.skeleton import frozen_array
+from ...motion.track import BALL_RADIUS
 
 FASTEST_BALL = 45.0  # m/s, well above the hardest kicks (38 m/s)
 _STRAIGHT = 0.4  # seconds that must be straight at constant velocity to be called filled in
 _SCATTER_WINDOW = 1.2  # seconds over which the scatter is taken
 _LEAST_SCATTER, _MOST_SCATTER = 0.03, 0.35  # m
 _WRONG = 6.0  # times the scatter
+_LOW = 0.3  # m, of a ball on the ground
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
     """N samples of the ball.
 
-    times: (N,) s, growing. positions: (N, 3) m, z NaN where the feed has no height; known (N,) bool, whether x and y
+    times: (N,) s, growing. positions: (N, 3) m of its centre, z NaN where the feed has no height; known (N,) bool, whether x and y
     are numbers. filled: (N,) bool, made by the feed at constant velocity. outlier: (N,) bool, single samples far from
     both neighbours. scatter, scatter_z: (N,) m, standard deviation of one coordinate around it. interval: s, the usual
     step.
@@ -65,10 +67,17 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
     filled = _filled(ball[:, :2], known, interval)
     scatter = _scatter(ball[:, :2], known, interval)
     outlier = _outliers(times, ball[:, :2], known, scatter)
-    has_height = np.isfinite(ball[:, 2])
+    ball, has_height = _centred(ball), np.isfinite(ball[:, 2])
     scatter_z = _scatter(ball[:, 2:], has_height, interval)
     flags = (frozen_array(flag, bool) for flag in (known, filled & known, outlier))
     return Samples(frozen_array(times), frozen_array(ball), *flags, frozen_array(scatter), frozen_array(scatter_z), interval)
+
+
+def _centred(ball: np.ndarray) -> np.ndarray:
+    """The same with heights of the ball's centre: some feeds say 0 for a ball on the ground."""
+    low = ball[:, 2][ball[:, 2] < _LOW]
+    lies_at_zero = len(low) > 0 and np.median(low) < BALL_RADIUS / 2.0
+    return ball + [0.0, 0.0, BALL_RADIUS] if lies_at_zero else ball
 
 
 def quantum(points: np.ndarray) -> float:
