@@ -1,8 +1,8 @@
 """Pieces of the ball's path: smooth curves of third degree through runs of samples, many at once.
 
-A piece is x(t) = p + v t + a t^2 / 2 + j t^3 / 6 from its first moment on. Friction and drag make accelerations of some
-m/s^2, so a and j are held near zero by their usual size: a short piece is nearly a line, a long one bends as far as its
-samples ask.
+A piece is x(t) = p + v t + a t^2 / 2 + j t^3 / 6 from its first moment on. Nothing but friction and drag, and gravity in
+the air, bends it: a and j are held near zero by their usual size at the piece's speed. So a short piece is nearly a line,
+and a slow ball that gains speed was touched.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-USUAL_SPEED, USUAL_ACCELERATION, USUAL_JERK = 20.0, 7.0, 6.0  # m/s, m/s^2 (gravity among them), m/s^3
+USUAL_SPEED = 20.0  # m/s
+REST_ACCELERATION, REST_JERK = 2.0, 2.0  # m/s^2, m/s^3 of a ball that hardly moves
+BY_SPEED = 0.35  # 1/s, 1/s^2, more of either with its speed
+IN_AIR, FALLING = 0.5, 9.0  # m above which it falls; m/s^2
 _CHUNK = 400  # starts worked out at once
 
 
@@ -99,8 +102,15 @@ def _solve(times, points, weights, cuts, begin, upto) -> Fits:
     square = np.cumsum(weight * (value**2).sum(axis=2), axis=1)
     row, column = np.searchsorted(starts, begin), cuts[upto] - cuts[begin] - 1
     normal = moments[row, column][:, np.add.outer(np.arange(4), np.arange(4))]
-    rigid = np.array([1e-6, USUAL_SPEED**-2, 4.0 * USUAL_ACCELERATION**-2, 36.0 * USUAL_JERK**-2])
-    normal = normal + np.diag(rigid)
+    seconds = np.maximum(since[row, column], 1e-3)
+    speed = np.linalg.norm(value[row, column] - value[row, 0], axis=1) / seconds
+    bend = REST_ACCELERATION + BY_SPEED * speed
+    if points.shape[1] == 3:
+        bend = np.where(np.maximum.accumulate(value[..., 2], axis=1)[row, column] > IN_AIR, np.maximum(bend, FALLING), bend)
+    rigid = np.zeros((len(row), 4))
+    rigid[:, 0], rigid[:, 1], rigid[:, 2] = 1e-6, USUAL_SPEED**-2, 4.0 / bend**2
+    rigid[:, 3] = 36.0 / (REST_JERK + BY_SPEED * speed) ** 2
+    normal[:, np.arange(4), np.arange(4)] += rigid
     right = cross[row, column]
     inverse = np.linalg.inv(normal)
     found = inverse @ right
