@@ -22,6 +22,7 @@ _ALONG_COST = 0.1  # that the other end of the foot is,
 _INSIDE_COST = 15.0  # a metre of ball within the other leg,
 _MISS_COST = 3.0  # and a metre that the part cannot be moved
 _GRAVITY = 9.81
+_ON_GROUND = 0.02  # metres above its radius
 
 Line = tuple[np.ndarray, np.ndarray]
 
@@ -104,7 +105,7 @@ def meetings(
     lift = np.stack([0.0 * lift, 0.0 * lift, lift - np.clip(lift, -_SLACK, _SLACK)], axis=1)
     raised = tuple((end + lift)[:, None] for end in line)
     start[:, 2] = height
-    touching = _touching(raised, radius, start, np.array([aim.direction for aim in aims]))
+    touching = touching_places(raised, radius, start, np.array([aim.direction for aim in aims]))
     level = np.sqrt(np.maximum(room.whole**2 - (height - ball[2]) ** 2, 0.0))
     away = touching[:, :2] - ball[:2]
     places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
@@ -121,7 +122,7 @@ def _within(way: np.ndarray, most: np.ndarray) -> np.ndarray:
     return way * np.minimum(1.0, most / np.maximum(np.linalg.norm(way, axis=1), 1e-12))[:, None]
 
 
-def _touching(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """The centres (N, 3) of balls that touch surfaces with lines (N, 1, 3), on the rays from `start` (N, 3), which is
     inside, along `direction` (N, 3); searched on ever finer grids, to some micrometres within a metre."""
     near, step = np.zeros(len(start)), 1.0
@@ -171,6 +172,33 @@ def shifted(
     out = ball.copy()
     out[frames] += share[:, None] * np.where(frames[:, None] <= held[0], ends[0], ends[1])
     out[frames, 2] = np.maximum(out[frames, 2], BALL_RADIUS)
+    return out
+
+
+def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int]) -> np.ndarray:
+    """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, from and to the frames `bounds` at
+    which it changes its course anyway: in between its velocity changes by the same at every frame, so that what flies
+    or rolls goes on doing so."""
+    shifts = places - ball[list(held)]
+    out = lead(lead(ball, held[0], bounds[0], shifts[0]), held[1], bounds[1], shifts[1])
+    out[list(held)] = places
+    return out
+
+
+def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.ndarray:
+    """The ball's path (T, 3) m moved by `shift` (3,) m at `frame`, by nothing at `anchor` and beyond, and evenly less in
+    between. Its height is what it was as soon as it comes to the ground."""
+    between = np.arange(frame, anchor, 1 if anchor > frame else -1)
+    between = between[(between >= 0) & (between < len(ball))]
+    out = ball.copy()
+    if not len(between):
+        return out
+    away = np.abs(between - frame)
+    out[between, :2] += (1.0 - away / abs(anchor - frame))[:, None] * shift[:2]
+    low = np.flatnonzero(ball[between, 2] <= BALL_RADIUS + _ON_GROUND)
+    lands = min(float(away[low[0]]) if len(low) else np.inf, float(abs(anchor - frame)))
+    fades = np.maximum(1.0 - away / lands, 0.0) if lands else (away == 0).astype(float)
+    out[between, 2] = np.maximum(out[between, 2] + fades * shift[2], BALL_RADIUS)
     return out
 
 
