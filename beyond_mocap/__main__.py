@@ -78,6 +78,11 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
     verb.add_argument("--fps", type=rate, default=30.0)
     verb.add_argument("--seed", type=int, default=0, help="of the clustering that blocks and distance search in")
+    verb.add_argument(
+        "--solve-touches", action="store_true",
+        help="key moments move to the touches that the ball's samples tell; the ball goes as physics has it and is "
+        "dribbled step by step",
+    )
     _add_settings(verb)
     verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
     verb.add_argument("--no-made", action="store_true", help="no made or blended clips where recordings lack a speed")
@@ -230,7 +235,7 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
         seam_window=options.seam_window, track_window=options.track_window, root_window=options.root_window,
         gaits=gait_choices(options.gait), pins=read_pins(options.pins) if options.pins else (),
         height=options.height, strong_foot=options.strong_foot.replace("any", ""), style=tuple(options.style),
-        style_weight=options.style_weight,
+        style_weight=options.style_weight, solve_touches=options.solve_touches,
     )
     try:
         take = synthesize(library, plan, told.progress, told.cancelled)

@@ -32,13 +32,15 @@ def in_library_size(plan: Plan, size: float) -> Plan:
         return plan
     track = plan.track
     ball = None if track.ball is None else track.ball / size
-    return replace(plan, track=replace(track, positions=track.positions / size, ball=ball))
+    course = None if plan.solved is None else replace(plan.solved, ball=plan.solved.ball / size)
+    return replace(plan, track=replace(track, positions=track.positions / size, ball=ball), solved=course)
 
 
 def taken_in_library_size(take: Take, size: float) -> Take:
-    """A take of `in_own_size`, without its pins, in the library's size again."""
+    """A take of `in_own_size`, without its pins and with the ball as it was met, in the library's size again."""
     motion, contacts = take.unpinned or (take.motion, take.contacts)
-    take = replace(take, motion=motion, contacts=contacts, pins=(), unpinned=None)
+    ball = take.met_ball or take.ball
+    take = replace(take, motion=motion, contacts=contacts, ball=ball, pins=(), unpinned=None, met_ball=None, dribbled=())
     if size == 1.0:
         return take
     return _scaled(take, 1.0 / size, in_library_size(take.plan, size), lambda ball: ball / size)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from .annotation import Timeline
 from .errors import InputError
-from .motion.track import SMOOTHING_SECONDS, Track
+from .motion.skeleton import frozen_array
+from .motion.track import SMOOTHING_SECONDS, SampledTrack, Track, sample
 
 METHODS = ("path", "distance", "blocks")
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
@@ -23,6 +26,9 @@ LIMITS = {
     "style_weight": (0.0, 10.0),
 }
 """Least and most of a plan's numbers; outside them there is no sense in it."""
+
+LATER = {"later": True}
+"""Marks fields that came after files were saved with fingerprints of the others."""
 
 HEIGHTS = (0.5, 3.0)
 """Metres that a player is tall at least and at most."""
@@ -57,6 +63,39 @@ class Pin:
 
 
 @dataclass(frozen=True)
+class Touched:
+    """Somebody changed the ball's course. time: s; mine: whether it was this player, None where nobody tracked was near;
+    part: "foot", "head", "chest" or "hand"; kind: a word such as "kick" or "receive"."""
+
+    time: float
+    mine: bool | None
+    part: str
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedCourse:
+    """The ball's course as it was solved from its samples: times (M,) s, ascending; ball (M, 3) m, its centre, NaN where
+    it is not known; filled (M,) bool, where the feed has not measured it. touches: in order, everybody's."""
+
+    times: np.ndarray
+    ball: np.ndarray
+    filled: np.ndarray
+    touches: tuple[Touched, ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "times", frozen_array(self.times))
+        object.__setattr__(self, "ball", frozen_array(self.ball))
+        object.__setattr__(self, "filled", frozen_array(self.filled, bool))
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The ball (T, 3) m at `times` (T,) s, NaN where it is not known, and whether the feed has filled it in (T,)."""
+        ball = np.stack([np.interp(times, self.times, column, np.nan, np.nan) for column in self.ball.T], axis=1)
+        near = np.clip(np.searchsorted(self.times, times), 0, len(self.times) - 1)
+        return ball, self.filled[near]
+
+
+@dataclass(frozen=True)
 class Plan:
     """One player's order.
 
@@ -78,6 +117,9 @@ class Plan:
     library's skeleton. strong_foot: one of FEET; key moments that name no side take this foot's clips where that costs
     little. style: words, or names or patterns of folders and clips ("academy", "lmd/*"), whose clips are taken rather
     than others by style_weight (m/s of missed speed that they are worth).
+    solve_touches: whether key moments move to the touches that the ball's samples tell, and the ball goes as physics
+    has it, touched step by step in dribbles (`known_touches`). solved: the ball's course where it is known already, such
+    as from a whole match.
 
     InputError for a number outside LIMITS or HEIGHTS, and for two pins of one part at one time.
     """
@@ -104,6 +146,8 @@ class Plan:
     strong_foot: str = ""
     style: tuple[str, ...] = ()
     style_weight: float = 0.5
+    solve_touches: bool = field(default=False, metadata=LATER)
+    solved: SolvedCourse | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
@@ -118,6 +162,18 @@ class Plan:
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
         self._check_pins()
+
+    def sampled(self, fps: float) -> SampledTrack:
+        """The track at `fps` frames per second, with the solved ball where there is one."""
+        track = sample(self.track, fps, self.track_window)
+        if self.solved is None:
+            return track
+        ball, filled = self.solved.at(track.times)
+        known = np.isfinite(ball).all(axis=1)
+        return replace(
+            track, ball=np.where(known[:, None], ball, track.ball),
+            ball_measured=track.ball_measured & ~(known & filled),
+        )  # fmt: skip
 
     def _check_pins(self):
         for part in PARTS:

@@ -20,11 +20,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .errors import InputError
+from .known_touches import in_force
 from .lay_out import aimed, faced, footed, leaning, met, smoothed, touches, towards_ball
 from .library.library import Library
 from .motion import quaternion
 from .motion.motion import Motion
-from .motion.track import SampledTrack, sample
+from .motion.track import SampledTrack
 from .motion.track.sampling import MOVING_SPEED
 from .own_size import in_library_size, size_of, taken_in_library_size
 from .plan import Plan
@@ -133,17 +134,27 @@ def _edited(
 ) -> Take | None:
     """The take, or None where it has to be made as a whole; what is made anew is made in the library's size."""
     size = size_of(plan, library.skeleton)
-    small = in_library_size(plan, size), taken_in_library_size(before, size)
-    found = _updated(library, *small, report, cancelled, hurry, anew)
-    return None if found is None else finished(found[0], plan, library, *found[1:], before)
+    old = in_force(before.plan, before.solved)
+    known = in_force(plan, before.solved if _same_ball(plan, before.plan) else None)
+    small = (in_library_size(which, size) for which in (known, old))
+    found = _updated(library, *small, taken_in_library_size(before, size), report, cancelled, hurry, anew)
+    return None if found is None else finished(found[0], plan, known, library, *found[1:], before)
 
 
-def _updated(library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None):
-    """The take without pins, its order and the frame from which on it was searched in a hurry; None where it has to be
-    made as a whole."""
+def _same_ball(plan: Plan, old: Plan) -> bool:
+    """Whether the ball's course is solved from the same samples."""
+    pairs = [(getattr(plan.track, name), getattr(old.track, name)) for name in ("times", "positions", "ball")]
+    return all(np.array_equal(new, before, equal_nan=True) for new, before in pairs)
+
+
+def _updated(
+    library: Library, plan: Plan, then: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
+):
+    """The take without pins, made by `plan` where `before` was made by `then`, both in force; its order and the frame from
+    which on it was searched in a hurry; None where it has to be made as a whole."""
     clock = [time.perf_counter()]
     library = _library_of_both(library, plan, before, report)
-    old, new = wanted(library, before.plan), wanted(library, plan)
+    old, new = wanted(library, then), wanted(library, plan)
     if not _made_from(library, before, len(old)):
         return None
     again = to_search(library, before.edit, old, new, SLOT)
@@ -164,7 +175,7 @@ def _updated(library: Library, plan: Plan, before: Take, report: Progress, cance
         hurried += [search.hurried] if search.hurried is not None else []
     clock.append(time.perf_counter())
     report(0.8, "Constructing")
-    track = new.track if plan.fps == library.fps else sample(plan.track, plan.fps, plan.track_window)
+    track = new.track if plan.fps == library.fps else plan.sampled(plan.fps)
     update = _Update(library, plan, before, track, edit, new)
     moved = np.interp(update.index, np.arange(len(new)), lies_elsewhere(old, new).astype(float)) > 0.0
     for stretch in update.stretches(again, moved):

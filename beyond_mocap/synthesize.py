@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from .annotation import LOCOMOTION_WORDS, avoided_per_frame, spoken
 from .errors import InputError, TimedLine
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
+from .known_touches import in_force, untouched, with_course
 from .lay_out import as_far, chained, faced, footed, leaning, met, on_track, smoothed, touches
 from .library.chosen import with_chosen_gaits
 from .library.library import Library
@@ -93,14 +94,15 @@ def synthesize(
 
 
 def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
-    plan = in_library_size(asked, size_of(asked, library.skeleton))
+    known = in_force(asked)
+    plan = in_library_size(known, size_of(asked, library.skeleton))
     recordings, library = library, with_made_gaits(library, plan, report)
     clock = [time.perf_counter()]
     order = wanted(library, plan)
     found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry, used)
     clock.append(time.perf_counter())
     report(0.8, "Constructing")
-    track = order.track if plan.fps == library.fps else sample(plan.track, plan.fps, plan.track_window)
+    track = order.track if plan.fps == library.fps else plan.sampled(plan.fps)
     edit = exact_keys(library, found.edit, order)
     index = np.minimum(np.arange(len(track.times)) * (library.fps / plan.fps), len(edit) - 1)
     footage = fetch(library, edit, index, plan.fps)
@@ -117,7 +119,7 @@ def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurr
     clock.append(time.perf_counter())
     report(1.0, "Done")
     seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
-    return finished(replace(take, seconds=seconds), asked, recordings, order, found.hurried)
+    return finished(replace(take, seconds=seconds), asked, known, recordings, order, found.hurried)
 
 
 def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
@@ -132,7 +134,7 @@ def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
 def _lacks(library: Library, plan: Plan) -> bool:
     """Whether the recordings lack speeds that the track asks for, or kicks as fast as its key moments."""
     track = sample(plan.track, library.fps, plan.track_window)
-    moments = np.array([key.time for key in plan.timeline.keys])
+    moments = np.array([key.in_force for key in plan.timeline.keys])
     return library.lacks(track.speed, np.interp(moments, track.times, track.speed))
 
 
@@ -219,12 +221,14 @@ def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
 
 
 def finished(
-    take: Take, plan: Plan, recordings: Library, order: Wanted, hurried: int | None, before: Take | None = None
+    take: Take, asked: Plan, plan: Plan, recordings: Library, order: Wanted, hurried: int | None,
+    before: Take | None = None,
 ) -> Take:
-    """A take out of the library's size in the player's, with its pins and its warnings. before: the finished take that it
-    is an edit of."""
-    take = in_own_size(take, size_of(plan, recordings.skeleton), plan, before)
-    return with_warnings(with_pins(take, recordings), recordings, order, hurried)
+    """A take out of the library's size in the player's, with its pins, its ball and its warnings. plan: `asked` as it is
+    in force; before: the finished take that it is an edit of."""
+    take = in_own_size(take, size_of(asked, recordings.skeleton), asked, before)
+    take = with_course(with_pins(take, recordings), plan)
+    return with_warnings(take, recordings, order, hurried, untouched(plan))
 
 
 def with_pins(take: Take, recordings: Library) -> Take:
@@ -252,10 +256,12 @@ def look_of(library: Library) -> np.ndarray:
     return _looks[library]
 
 
-def with_warnings(take: Take, recordings: Library, order: Wanted, hurried: int | None) -> Take:
+def with_warnings(
+    take: Take, recordings: Library, order: Wanted, hurried: int | None, more: Sequence[str] = ()
+) -> Take:
     """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
-    library's rate from which on the search was cut short, or None."""
-    told = [*recordings.notes, *order.warnings, *_crowded_out(order, take.edit)]
+    library's rate from which on the search was cut short, or None; more: lines that are told too."""
+    told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
     if hurried is not None:
         since = take.start_time + hurried / recordings.fps
         told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
@@ -281,7 +287,7 @@ def _shown_all_the_same(take: Take) -> list[str]:
     ask for is not told."""
     times = take.start_time + np.arange(len(take.words)) / take.motion.fps
     avoided = avoided_per_frame(take.plan.timeline, times)
-    asked = [(key.asked.time, frozenset(key.asked.words)) for key in take.keys]
+    asked = [(key.asked.in_force, frozenset(key.asked.words)) for key in take.keys]
     told = []
     for word in sorted(frozenset().union(*avoided)):
         shows = np.array([word in avoid and word in words for avoid, words in zip(avoided, take.words)])

@@ -8,7 +8,7 @@ import numpy as np
 
 from .annotation import KeyMoment, Timeline
 from .motion.motion import Motion
-from .plan import Pin, Plan
+from .plan import Pin, Plan, SolvedCourse
 from .synthesis.edit_list import EditList
 
 
@@ -49,6 +49,15 @@ class PinResult:
     miss: float
 
 
+@dataclass(frozen=True)
+class DribbleTouch:
+    """One touch of a dribble: output frames first .. last in which the ball is at the foot of that side."""
+
+    first: int
+    last: int
+    side: str
+
+
 @dataclass(frozen=True, eq=False)
 class Take:
     """A synthesized player.
@@ -61,7 +70,9 @@ class Take:
     ik_miss: (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right,
     extra steps of feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
     at the library's rate, for `resynthesize`. cut_short: whether part of it was searched in a hurry. pins: how they were
-    met; unpinned: motion and contacts without them, None where there are none.
+    met; unpinned: motion and contacts without them, None where there are none. solved: the ball's course where it was
+    solved; met_ball: the ball as it was met, before it was led along that course, None where it was not; dribbled: the
+    touches of dribbles.
     """
 
     motion: Motion
@@ -88,3 +99,6 @@ class Take:
     pins: tuple[PinResult, ...] = ()
     cut_short: bool = False
     unpinned: tuple[Motion, np.ndarray] | None = None
+    solved: SolvedCourse | None = None
+    met_ball: BallPath | None = None
+    dribbled: tuple[DribbleTouch, ...] = ()

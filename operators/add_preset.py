@@ -17,5 +17,5 @@ class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
     preset_values = [
         f"settings.{name}"
         for name in ("method", "catch_up", "mirror", "nearest", "rate", "alpha", "delta", "omega", "made", "seam_window",
-                     "track_window", "root_window", "seed")
+                     "track_window", "root_window", "seed", "solve_touches")
     ]

@@ -34,7 +34,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
             body.prop(settings, "method")
             if settings.method == "distance":
                 body.prop(settings, "catch_up")
-            for name in ("mirror", "nearest", "rate"):
+            for name in ("solve_touches", "mirror", "nearest", "rate"):
                 body.prop(settings, name)
             self.fine_tuning(body, settings)
 

@@ -48,6 +48,7 @@ def plan_of(
         strong_foot=player.strong_foot.replace("any", ""),
         style=tuple(text.strip() for text in player.style.split(";") if text.strip()),
         style_weight=player.style_weight,
+        solve_touches=settings.solve_touches,
     )
     return plan, found.warnings
 

@@ -210,6 +210,11 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Made Clips", default=True,
         description="Of On the path: make or blend clips where recordings lack a speed, and kicks on the run",
     )
+    solve_touches: BoolProperty(
+        name="Solve Touches", default=False,
+        description="Key moments move to the touches that the ball's samples tell, within 0.4 s; the ball goes as physics has "
+        "it, and is dribbled step by step",
+    )
     mirror: BoolProperty(
         name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged"
     )

@@ -66,17 +66,24 @@ class Span:
 @dataclass(frozen=True)
 class KeyMoment:
     """A moment, seconds on the track's clock, at which the clip's own key moment must be played (Faustino §4.2.2).
-    avoid: words that the clip's key moment may not carry."""
+    avoid: words that the clip's key moment may not carry. solved: the second in its place, where the touch of the ball
+    that it means is known better, else None."""
 
     time: float
     words: tuple[str, ...]
     line: int | None = field(default=None, compare=False, repr=False)
     avoid: tuple[str, ...] = ()
+    solved: float | None = field(default=None, metadata={"later": True})
 
     def __post_init__(self):
         object.__setattr__(self, "time", _checked_time(self.time, "key moment"))
         object.__setattr__(self, "words", _checked_words(self.words, "key moment"))
         object.__setattr__(self, "avoid", _checked_words(self.avoid, "key moment"))
+
+    @property
+    def in_force(self) -> float:
+        """The second at which it is played: the solved one, else the asked one."""
+        return self.time if self.solved is None else self.solved
 
 
 @dataclass(frozen=True)

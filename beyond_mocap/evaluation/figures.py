@@ -32,7 +32,7 @@ def place(view: View) -> dict:
     if view.wanted is not None:
         error, unsmoothed = root.root_error(pelvis, view.wanted, fps), root.pelvis_error(pelvis, view.wanted)
         out["root_error_m"] = _spread(error, ("mean", "p95", "max"))
-        at_keys = [float(np.interp(m.asked.time, view.played.times, unsmoothed)) for m in view.moments]
+        at_keys = [float(np.interp(m.asked.in_force, view.played.times, unsmoothed)) for m in view.moments]
         out["pelvis_error_m"] = {"mean": _mean(unsmoothed), "own": own, "keys": _mean(np.array(at_keys))}
     if view.wanted is not None and view.reference is not None:
         asked = root.travel_speed(view.wanted, fps)
@@ -58,7 +58,7 @@ def keys(view: View) -> list[dict]:
 
 
 def _key(view: View, moment: Moment) -> dict:
-    played, time = view.played, moment.asked.time
+    played, time = view.played, moment.asked.in_force
     place = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
     met_at, met_gap = met(played, moment)
     if view.wanted is not None:
@@ -67,8 +67,8 @@ def _key(view: View, moment: Moment) -> dict:
         place["pelvis_error_m"] = float(np.interp(time, played.times, root.pelvis_error(played.pelvis, view.wanted)))
         place["ball_shift_m"] = ball_shift(played, _met_frame(played, moment, met_at), view.track)
     return {
-        "time_s": time,
-        "solved_time_s": None,
+        "time_s": moment.asked.time,
+        "solved_time_s": moment.asked.solved,
         "labels": list(moment.asked.words),
         "clip": moment.clip,
         "clip_frame": moment.clip_frame,

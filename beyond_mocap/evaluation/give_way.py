@@ -212,7 +212,7 @@ def _off_track(played: Played, track: Track | None) -> TimedLine | None:
 
 def _late(played: Played, keys: list[Moment]) -> TimedLine | None:
     half = 0.5 / played.motion.fps + _TOLERANCE
-    errors = [(moment.asked.time, moment.played_at - moment.asked.time) for moment in keys]
+    errors = [(moment.asked.time, moment.played_at - moment.asked.in_force) for moment in keys]
     late = [(time, error) for time, error in errors if np.isfinite(error) and abs(error) > half]
     return _at_moments("key moments not at their time", late, "{:+.2f} s")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from ..library.library import Library
 from ..library.made import MADE_FOLDER
 from ..motion.striking import contact_gap, met_within, striking_part
 from ..motion.track import Track
+from ..take import DribbleTouch
 from . import pieces
 from .played import Played
 
@@ -19,7 +21,7 @@ from .played import Played
 class Moment:
     """How one key moment was served.
 
-    asked: the timeline's line. frame: output frame nearest to the asked time. clip, clip_frame (the clip's key frame,
+    asked: the timeline's line. frame: output frame nearest to the time in force (the asked or the solved one). clip, clip_frame (the clip's key frame,
     in its own rate), None where no key of a clip is played there. played_at: seconds on the track's clock at which that
     key frame is played, NaN where it is not. words: those that the source carries at `frame`. entry, exit: first and
     last output frame, without a seam between, that the clip's annotated row covers. used_instead: words in place of the
@@ -54,7 +56,7 @@ def with_made(library: Library | None, played: Played) -> Library | None:
 
 
 def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> Moment:
-    frame = _frame_at(played, (key.time - played.start_time) * played.motion.fps)
+    frame = _frame_at(played, (key.in_force - played.start_time) * played.motion.fps)
     run = np.flatnonzero(number == number[frame if result is None else _frame_at(played, result.frame)])
     words = () if played.words is None else tuple(played.words[frame])
     found = _key_in_run(played, run, frame, key, library)
@@ -145,6 +147,24 @@ def written_ball(played: Played, frame: int) -> np.ndarray:
     """The ball's centre (3,) m as written out with the take, at the row nearest to an output frame's time."""
     row = int(np.argmin(np.abs(played.ball.times - played.times[frame])))
     return played.ball.positions[row]
+
+
+def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Track | None) -> list[dict]:
+    """Every touch of a dribble: its second, the foot, the largest gap of the foot's surface and the ball's while it lasts,
+    and how far the ball lies from its samples where it begins, m."""
+    return [
+        {
+            "time_s": float(played.times[touch.first]),
+            "side": touch.side,
+            "contact_gap_m": max(_foot_gap(played, frame, touch.side) for frame in range(touch.first, touch.last + 1)),
+            "ball_shift_m": None if track is None else ball_shift(played, touch.first, track),
+        } for touch in touches
+    ]  # fmt: skip
+
+
+def _foot_gap(played: Played, frame: int, side: str) -> float:
+    pose = played.positions[frame], played.rotations[frame]
+    return abs(float(contact_gap(played.motion.skeleton, *pose, ("dribble", side), written_ball(played, frame))))
 
 
 def ball_shift(played: Played, frame: int, track: Track) -> float:

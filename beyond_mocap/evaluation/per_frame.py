@@ -131,7 +131,7 @@ def _strike(view: View, moment: Moment) -> Strike:
         part = played.positions[moment.frame, played.body.hips]
         if found:
             part = faster_middle(found, *_around(view, moment.frame))[-1]
-        return Strike(moment.asked.time, moment.asked.words, part, None, np.nan)
+        return Strike(moment.asked.in_force, moment.asked.words, part, None, np.nan)
     frame = int(np.clip(round((when - played.start_time) * view.fps), 0, view.count - 1))
     ball = written_ball(played, frame)
     lines = [surface.line(played.positions[frame], played.rotations[frame]) for surface in found]

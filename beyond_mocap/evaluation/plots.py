@@ -101,7 +101,7 @@ def words(view: View) -> bytes | None:
     for row, word in enumerate(rows):
         _bars(ax, view, np.array([word in (w or ()) for w in asked]), row - 0.38, "#8fb8de")
         _bars(ax, view, np.array([word in w for w in got]), row + 0.02, "#3c7d4e")
-        times = [m.asked.time for m in view.moments if word in m.asked.words]
+        times = [m.asked.in_force for m in view.moments if word in m.asked.words]
         ax.plot(times, [row - 0.2] * len(times), "v", color=RIGHT, ms=6)
     ax.set_yticks(range(len(rows)), rows)
     ax.set_ylim(len(rows) - 0.5, -0.5)
@@ -194,7 +194,7 @@ def _draw_smoothness(ax, view: View) -> None:
 
 def _mark_moments(ax, view: View) -> None:
     for moment in view.moments:
-        ax.axvline(moment.asked.time, color=RIGHT, lw=0.9, ls=":", zorder=0)
+        ax.axvline(moment.asked.in_force, color=RIGHT, lw=0.9, ls=":", zorder=0)
 
 
 def _clip_bar(ax, view: View, low: int, high: int, names: dict[int, tuple[int, str]]) -> None:

@@ -13,6 +13,7 @@ from ..library.library import Library
 from ..motion.track import Track
 from ..take import Take
 from . import figures
+from .moments import dribble_touches
 from .played import Played, played_from_take
 from .view import View
 
@@ -37,7 +38,11 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
         **report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings,
         "warning_seconds": _seconds_of(warnings),
     }
-    return {**out, "pins": rounded(pins)} if pins else out
+    if pins:
+        out["pins"] = rounded(pins)
+    if take.solved is not None:
+        out["dribbles"] = rounded(dribble_touches(played_from_take(take), take.dribbled, track))
+    return out
 
 
 def evaluate_played(

@@ -35,7 +35,7 @@ _LEVEL = 0.08  # metres that the foot may be above or below the middle of the ba
 _PUSH_SECONDS = 0.11  # longest time that a foot is at the ball
 _SOONEST, _LATEST = 0.2, 1.3  # seconds from one touch to the next
 _FROM_END = 0.9  # seconds at an open end within which the first or last touch lies
-_RATE = 30.0  # touches per second that are looked at
+_RATE = 30.0
 _SLOW = 0.6  # m/s below which a standing foot may touch the ball
 _STANDING_STEP = 0.3  # seconds between two such touches
 
@@ -49,6 +49,8 @@ _STOOD_COST = 0.3  # and a touch by a foot that stands
 _HEIGHT_COST = 20.0  # a metre of ball above the foot
 _MOST_EXTRA = 2.0  # m/s that a ball leaves faster than its foot
 _LEAST_EXTRA = 0.5  # m/s that it may leave slower, since a foot slows within a frame
+_KEPT = 3  # nodes of a frame from which the ball may roll on
+_ROUNDS, _CLOSE = 6, 5e-4
 _START = -1
 
 
@@ -294,12 +296,11 @@ class _Search:
         for frame in sorted(set(self.frame.tolist())):
             for node in np.flatnonzero(self.frame == frame):
                 self._push(int(node))
-            for node in np.flatnonzero((self.frame == frame) & np.isfinite(self.out)):
-                if self.part.ends:
-                    self._roll(int(node), frame, self.place[node], self.out[node])
-                else:
-                    self._ends_with(int(node))
-                    self._roll(int(node), frame, self.place[node], self.out[node])
+            here = np.flatnonzero((self.frame == frame) & np.isfinite(self.out))
+            for node in here[np.argsort(self.out[here], kind="stable")][:_KEPT].tolist():
+                if not self.part.ends:
+                    self._ends_with(node)
+                self._roll(node, frame, self.place[node], self.out[node])
         return self._path() if np.isfinite(self.best) else None
 
     def _off(self, nodes) -> np.ndarray:
@@ -380,7 +381,7 @@ class _Search:
             if to is not None:
                 path[frame + 1 : to] = rolls(place, there[None], np.array([to - frame]), self.fps).balls[0][: to - frame - 1]
             if node == _START:
-                return 0, last, path
+                return 0, last, self._kept_out(path)
             entered = int(self.pushed[node])
             swing = (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
             held = np.flatnonzero(swing & (self.frame >= self.frame[entered]) & (self.frame <= frame))
@@ -390,4 +391,21 @@ class _Search:
             to, there = first, self.place[entered]
             node = int(self.came[entered])
             if node == _START and not self.part.starts:
-                return first, last, path[first : last + 1]
+                return first, last, self._kept_out(path)[first : last + 1]
+
+    def _kept_out(self, path: np.ndarray) -> np.ndarray:
+        """The path led around what is left of the body on its way; where it is met or touched it stays."""
+        free = np.ones((self.count, 1), bool)
+        free[0], free[-1] = not self.part.starts, not self.part.ends
+        for push in self.pushes:
+            free[push.first : push.last + 1] = False
+        every, aside = np.arange(self.count), np.zeros((self.count, 2))
+        for left in reversed(range(_ROUNDS)):
+            out = self.body.way_out(path + np.pad(aside, ((0, 0), (0, 1))), every) * free
+            if np.abs(out).max() < _CLOSE:
+                break
+            aside += out
+            if left:
+                padded = np.pad(aside, ((1, 1), (0, 0)), mode="edge")
+                aside = free * (0.25 * padded[:-2] + 0.5 * aside + 0.25 * padded[2:])
+        return path + np.pad(aside, ((0, 0), (0, 1)))

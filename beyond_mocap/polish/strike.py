@@ -149,7 +149,7 @@ def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: floa
     """(number, moment) of every touch that some part can serve, in the order of time."""
     shortest, longest = _SHORTEST_EASE * fps, _LONGEST_EASE * fps
     order = sorted((t.frame, k) for k, t in enumerate(touches) if surfaces(skeleton, t.words))
-    held = [_held(frame, count) for frame, _ in order]
+    held = [held_frames(frame, count) for frame, _ in order]
     ends = [(-count, -count), *held, (2 * count, 2 * count)]
     for place, (frame, number) in enumerate(order):
         touch, (first, last) = touches[number], held[place]
@@ -163,8 +163,9 @@ def _nearest(frame: float, count: int) -> int:
     return int(np.clip(np.rint(frame), 0, count - 1))
 
 
-def _held(frame: float, count: int) -> tuple[int, int]:
-    """The frames before and after a fractional one; twice the same where it is nearly whole."""
+def held_frames(frame: float, count: int) -> tuple[int, int]:
+    """The frames, of `count`, before and after a fractional one, in which a touch is held; twice the same where it is
+    nearly whole."""
     near = _nearest(frame, count)
     if abs(frame - near) < 0.02:
         return near, near

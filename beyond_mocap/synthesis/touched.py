@@ -10,6 +10,8 @@ anew.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..annotation.gaze import wanted_offset
@@ -63,10 +65,19 @@ def _same_keys(before: Wanted, after: Wanted) -> dict[int, int]:
     for number, key in enumerate(after.keys):
         at = int(np.clip(round(key.frame), 0, len(after) - 1))
         ball = np.linalg.norm(before.track.ball[at] - after.track.ball[at])
-        old = next((n for n, other in enumerate(before.keys) if other == key and n not in found), None)
+        same = (n for n, other in enumerate(before.keys) if n not in found and _played_alike(other, key))
+        old = next(same, None)
         if old is not None and not ball > BALL:  # NaN where there is none
             found[old] = number
     return found
+
+
+def _played_alike(one: WantedKey, other: WantedKey) -> bool:
+    """Whether two key moments are the same but for the second at which they were asked for, where both are at a solved
+    one."""
+    if one.asked.solved is not None and one.asked.solved == other.asked.solved:
+        other = replace(other, asked=replace(other.asked, time=one.asked.time))
+    return one == other
 
 
 def to_search(library: Library, edit: EditList, before: Wanted, after: Wanted, slot: int) -> list[Stretch]:

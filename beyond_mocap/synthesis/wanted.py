@@ -15,7 +15,7 @@ from ..errors import NotInLibrary, TimedLine
 from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
-from ..motion.track import SampledTrack, sample
+from ..motion.track import SampledTrack
 from ..plan import Plan
 from .style import off_style_cost
 
@@ -68,7 +68,7 @@ class Wanted:
 def wanted(library: Library, plan: Plan) -> Wanted:
     """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries
     (unless plan.nearest)."""
-    track = sample(plan.track, library.fps, plan.track_window)
+    track = plan.sampled(library.fps)
     gaits = library.gaits
     speeds = np.array([gait.speed for gait in gaits])
     labelled = plan.method == "path" and not plan.omega
@@ -83,7 +83,7 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     warnings: list[str] = []
     keys = tuple(_key(library, moment, track, gait, allowed, plan.nearest, warnings) for moment in timeline.keys)
     known = plan.track.ball_height_known
-    nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.asked.time))) for key in keys]
+    nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.asked.in_force))) for key in keys]
     keys = tuple(replace(key, ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
     asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
     warnings += _lacking(library, plan.timeline)
@@ -105,7 +105,7 @@ def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided:
 
 
 def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:
-    frame = float(np.clip((moment.time - track.times[0]) * library.fps, 0, len(track.times) - 1))
+    frame = float(np.clip((moment.in_force - track.times[0]) * library.fps, 0, len(track.times) - 1))
     usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made)
     made = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
     if moment.avoid:
