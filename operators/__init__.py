@@ -72,6 +72,9 @@ from . import (
     show_video,
     solve_ball,
     split_span,
+    stream_keep,
+    stream_start,
+    stream_stop,
     synthesize,
     take_ball,
     track_object,
@@ -171,6 +174,9 @@ CLASSES = (
     passes_file.BEYOND_MOCAP_OT_passes_to_json,
     solve_ball.BEYOND_MOCAP_OT_solve_ball,
     solve_ball.BEYOND_MOCAP_OT_accept_touches,
+    stream_start.BEYOND_MOCAP_OT_stream_start,
+    stream_stop.BEYOND_MOCAP_OT_stream_stop,
+    stream_keep.BEYOND_MOCAP_OT_stream_keep,
 )
 
 

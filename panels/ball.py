@@ -6,6 +6,7 @@ import bpy
 
 from ..scene.passes import graph
 from ..scene.passes.settings import active_row, ball_of, subject, told_lines
+from .stream import stream
 from .tab import Step, paragraph, table
 
 PART_ICONS = {"foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"}
@@ -67,6 +68,7 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
         section(layout, "tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
         section(layout, "hits", "Hit Analysis", lambda opened: hits(opened, context))
         section(layout, "hold", "Carried Ball", lambda opened: carried(opened, context))
+        section(layout, "stream", "Live Stream", lambda opened: stream(opened, context))
 
 
 def section(layout, name: str, title: str, draw, closed: bool = True) -> None:

@@ -24,6 +24,7 @@
 - `key_reduction`   keys that curves do not need are left out
 - `ride`        path editing: armatures whose motion rides a curve
 - `passes`      the ball and who keeps it going: hit analysis, passing scenes, who carries the ball, the solved ball
+- `stream`      a body that arrives over this machine's own network while it moves
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -41,11 +42,15 @@ from .passes import settings as passes
 from .ride import live as ride_live
 from .ride import measure as ride_measure
 from .ride.settings import BeyondMocapRide
+from .stream import follow as stream_follow
+from .stream import receiver
+from .stream import settings as stream
 
 CLASSES = (
     *result.CLASSES,
     BeyondMocapRide,
     *passes.CLASSES,
+    *stream.CLASSES,
     video.BeyondMocapVideo,
     view_settings.BeyondMocapView,
     view_settings.BeyondMocapPlayhead,
@@ -73,6 +78,8 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_ball", passes.BeyondMocapBall),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
     ("Scene", "beyond_mocap_passes", passes.BeyondMocapPasses),
+    ("Scene", "beyond_mocap_stream", stream.BeyondMocapStream),
+    ("WindowManager", "beyond_mocap_streaming", stream.BeyondMocapStreaming),
     ("WindowManager", "beyond_mocap_problems", word_checks.BeyondMocapProblems),
     ("WindowManager", "beyond_mocap_work", settings.BeyondMocapWork),
     ("WindowManager", "beyond_mocap_playhead", view_settings.BeyondMocapPlayhead),
@@ -98,10 +105,14 @@ def register():
     ride_live.register()
     ride_measure.register()
     hits_shown.register()
+    receiver.register()
+    stream_follow.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    stream_follow.unregister()
+    receiver.unregister()
     hits_shown.unregister()
     ride_measure.unregister()
     ride_live.unregister()

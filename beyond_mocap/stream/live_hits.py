@@ -10,7 +10,6 @@ import numpy as np
 
 from ..ball.contact import Tool
 from ..ball.hits import HitMotion, analyse
-from ..errors import InputError
 from ..motion.motion import Motion
 from .listener import Arrived, Listener
 
@@ -45,7 +44,7 @@ class LiveHits:
         frames = [frame for frame in frames if frame.time > frames[-1].time - WINDOW]
         if frames[-1].time - frames[0].time < _LEAST:
             return None
-        motion, times = self._motion(frames)
+        motion, times = even(self.listener, frames, _RATE)
         found = [hit for side in self.sides for hit in self._hits(motion, side)]
         new = [hit for hit in found if times[hit.first] > self._after]
         if not new:
@@ -60,16 +59,21 @@ class LiveHits:
         found = analyse(motion, self.part, side, self.threshold, tool=self.tool).motions
         return [hit for hit in found if 0 < hit.first and hit.last < settled]
 
-    def _motion(self, frames: list[Arrived]) -> tuple[Motion, np.ndarray]:
-        """The frames as a motion at an even rate, and the seconds (T,) of its frames. Networks bring frames in bunches, so
-        they are taken to be evenly apart between the first and the last."""
-        step = max(1, int(len(frames) / ((frames[-1].time - frames[0].time) * _RATE)))
-        frames = frames[::-1][::step][::-1]
-        root, rotations = self.listener.poses(frames)
-        seconds = frames[-1].time - frames[0].time
-        fps = (len(frames) - 1) / seconds
-        times = frames[0].time + np.arange(len(frames)) / fps
-        skeleton = self.listener.skeleton
-        if skeleton is None:
-            raise InputError("stream", "no body yet", "frames of one")
-        return Motion(skeleton, root, rotations, fps), times
+
+def recorded(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
+    """The last `seconds` of a stream as a motion; None where there is less than two frames. rate: no more frames a second
+    than this. Networks bring frames in bunches, so they are taken to be evenly apart from the first to the last."""
+    frames = listener.since(0)
+    frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
+    return even(listener, frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None
+
+
+def even(listener: Listener, frames: list[Arrived], rate: float | None = None) -> tuple[Motion, np.ndarray]:
+    """Frames that came in, two or more, as a motion, and the seconds (T,) of its frames; `rate` as above."""
+    seconds = frames[-1].time - frames[0].time
+    step = 1 if rate is None else max(1, int(len(frames) / (seconds * rate)))
+    frames = frames[::-1][::step][::-1]
+    root, rotations = listener.poses(frames)
+    seconds = max(frames[-1].time - frames[0].time, 1e-3)
+    fps = (len(frames) - 1) / seconds
+    return Motion(listener.skeleton, root, rotations, fps), frames[0].time + np.arange(len(frames)) / fps

@@ -7,6 +7,8 @@ well. A new operator without a row fails here.
 import importlib
 import re
 import shutil
+import socket
+import time
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -156,6 +158,19 @@ def analyse():
     bpy.ops.beyond_mocap.hit_analysis()
 
 
+def listen():
+    """A stream is listened to, and a few frames have arrived."""
+    scene = importlib.import_module(f"{EXTENSION}.scene.stream.receiver")
+    bpy.ops.beyond_mocap.stream_start()
+    listener, text = scene.listener(), (worlds.SAMPLE / "walking_1_2.bvh").read_text()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        for piece in (text.split("MOTION")[0], *text.strip().split("\n")[-40:]):
+            out.sendto(piece.encode(), ("127.0.0.1", listener.port))
+            time.sleep(0.01)
+    while listener.status().frames < 20:
+        time.sleep(0.01)
+
+
 def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
@@ -261,6 +276,9 @@ ROWS = {
     "show_video": Row("video", changes=False),
     "solve_ball": Row("imported"),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
+    "stream_keep": Row("imported", prepare=listen),
+    "stream_start": Row("imported", changes=False),
+    "stream_stop": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.stream_start(), changes=False),
     "synthesize": Row("imported"),
     "take_ball": Row("accepted", lambda places: {"first": 3, "last": 8}, a_ball),
     "track_object": Row("imported", prepare=draw),
