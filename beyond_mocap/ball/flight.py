@@ -163,7 +163,7 @@ class _Integrator:
         over = slip(self.velocity, self.spin, self.ball)
         if self.ball.friction and length(over) > STANDS_STILL:
             def change(_, state):
-                faster, turning = sliding(state[3:6], state[6:], self.ball)
+                faster, turning = sliding(state[3:6], state[6:], self.ball, over)
                 return np.concatenate([state[3:6], faster, turning])
 
             def stands(_, state):

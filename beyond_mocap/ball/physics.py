@@ -123,9 +123,17 @@ def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     return out
 
 
-def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations (..., 3) m/s^2 and rad/s^2 of balls that slide over the ground."""
+def sliding(
+    velocity: np.ndarray, spin: np.ndarray, ball: Ball, ahead: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (..., 3) m/s^2 and rad/s^2 of balls that slide over the ground.
+
+    ahead (..., 3): where the lowest point went at first; the push stays against it when the slip has turned about, so
+    that an integrator that looks past the end of the slide finds the same law there.
+    """
     over = slip(velocity, spin, ball)
+    if ahead is not None:
+        over = over * np.where(np.sum(over * ahead, axis=-1) < 0.0, -1.0, 1.0)[..., None]
     rub = over * (-ball.friction * ball.gravity / np.maximum(length(over), 1e-12))[..., None]
     air = velocity * -(ball.linear_drag + ball.drag * length(velocity))[..., None]
     return rub + air, _turned_by(rub, ball) - ball.spin_decay * spin

@@ -1,0 +1,159 @@
+"""Launches that arrive: judged by `fly`, which the solver does not use."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from beyond_mocap.ball.aim import aim, along_ground, out_of_reach
+from beyond_mocap.ball.flight import Launch, fly
+from beyond_mocap.ball.physics import BALLS, FASTEST, FOOTBALL, PAPER, TENNIS, length
+from beyond_mocap.errors import InputError
+
+
+def aims(count, seed=0):
+    """Starts and targets (B, 3) 4 to 20 m apart at heights that feet and heads reach, with times (B,) that leave room."""
+    rng = np.random.default_rng(seed)
+    start = rng.uniform([-5, -5, 0.15], [5, 5, 1.2], (count, 3))
+    angle, far = rng.uniform(0.0, 6.28, count), rng.uniform(4.0, 20.0, count)
+    target = start + np.stack([far * np.cos(angle), far * np.sin(angle), np.zeros(count)], axis=1)
+    target[:, 2] = rng.uniform(0.15, 1.0, count)
+    return start, target, rng.uniform(1.0, 2.0, count) + far / 30.0
+
+
+def missed(start, target, aimed, ball, i):
+    """Metres by which `fly` says aim i misses, and how often the ball has bounced by then."""
+    flight = fly(Launch(0.0, start[i], aimed.velocity[i], aimed.spin[i]), ball, aimed.seconds[i])
+    return np.linalg.norm(flight.at([aimed.seconds[i]])[0] - target[i]), len(flight.bounces)
+
+
+@pytest.mark.parametrize("name", ["paper", "football", "tennis"])
+@pytest.mark.parametrize("bounces", [0, 1, 2])
+def test_targets_are_hit_after_the_bounces_asked_for(name, bounces):
+    ball = BALLS[name]
+    start, target, seconds = aims(12)
+    aimed = aim(start, target, ball, seconds + 0.4 * bounces, bounces)
+    assert aimed.possible.mean() > 0.9
+    for i in np.flatnonzero(aimed.possible):
+        miss, made = missed(start, target, aimed, ball, i)
+        assert miss < 0.02 and made == bounces
+
+
+def test_spin_is_aimed_with():
+    start, target, seconds = aims(10, 1)
+    spin = np.random.default_rng(2).normal(0.0, 25.0, (10, 3))
+    aimed = aim(start, target, FOOTBALL, seconds, spin=spin)
+    assert aimed.possible.all() and np.array_equal(aimed.spin, spin)
+    assert max(missed(start, target, aimed, FOOTBALL, i)[0] for i in range(10)) < 0.02
+    assert np.abs(aimed.velocity - aim(start, target, FOOTBALL, seconds).velocity).max() > 0.5
+
+
+def test_without_drag_and_bounce_it_is_the_textbooks_launch():
+    start, target = np.array([0.0, 0.0, 1.0]), np.array([6.0, 8.0, 1.0])
+    aimed = aim(start, target, replace(PAPER, linear_drag=0.0), 2.0)
+    assert aimed.velocity[0] == pytest.approx([3.0, 4.0, 9.8], abs=1e-6)
+
+
+def test_a_bounce_comes_late_where_an_early_one_would_do_too():
+    aimed = aim((0.0, 0.0, 0.5), (8.0, 0.0, 0.5), PAPER, 2.0, bounces=1)
+    assert aimed.velocity[0, 2] > 0.0
+    flight = fly(Launch(0.0, np.array([0.0, 0.0, 0.5]), aimed.velocity[0]), PAPER, 2.0)
+    assert flight.bounces[0] > 1.0
+
+
+def test_the_free_time_is_the_slowest_launchs():
+    start, target, _ = aims(4, 3)
+    for bounces in (0, 1):
+        aimed = aim(start, target, FOOTBALL, None, bounces)
+        assert aimed.possible.all()
+        for share in (0.8, 1.25):
+            other = aim(start, target, FOOTBALL, aimed.seconds * share, bounces)
+            assert np.all(length(aimed.velocity) < length(other.velocity) + 0.15)
+
+
+def test_a_given_loft_is_taken():
+    aimed = aim((0.0, 0.0, 0.2), (25.0, 0.0, 0.2), FOOTBALL, None, loft=np.radians(35.0))
+    assert np.degrees(np.arctan2(aimed.velocity[0, 2], aimed.velocity[0, 0])) == pytest.approx(35.0, abs=3.0)
+
+
+def test_a_launch_nearby_keeps_its_branch():
+    start, seconds = np.array([0.0, 0.0, 0.5]), 2.0
+    early = np.array([[5.0, 0.0, -6.0]])
+    one = aim(start, (8.0, 0.0, 0.5), PAPER, seconds, bounces=1, near=early)
+    if one.possible[0]:
+        moved = aim(start, (8.1, 0.05, 0.5), PAPER, seconds, bounces=1, near=one.velocity)
+        assert np.linalg.norm(moved.velocity - one.velocity) < 0.5
+    unknown = aim(start, (8.0, 0.0, 0.5), PAPER, seconds, bounces=1, near=np.full((1, 3), np.nan))
+    assert unknown.possible.all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(3.0, 30.0), st.floats(-3.1, 3.1), st.floats(0.12, 2.0), st.floats(0.12, 2.4), st.floats(0.7, 3.0),
+       st.sampled_from(sorted(BALLS)))
+def test_any_target_in_the_air_is_hit(far, angle, low, high, seconds, name):
+    start = np.array([[1.0, 2.0, low]])
+    target = start + [[far * np.cos(angle), far * np.sin(angle), high - low]]
+    aimed = aim(start, target, BALLS[name], max(seconds, far / 20.0))
+    if aimed.possible[0]:
+        assert missed(start, target, aimed, BALLS[name], 0)[0] < 0.02
+    else:  # only where the ground is in the way: the straight way down there is a bounce
+        flight = fly(Launch(0.0, start[0], aimed.velocity[0]), BALLS[name], aimed.seconds[0])
+        assert aimed.miss[0] > 0.02 and (len(flight.bounces) or flight.rolls_from is not None)
+
+
+def test_a_turned_aim_is_the_turned_launch():
+    aimed = aim((0.0, 0.0, 0.3), [[10.0, 0.0, 0.5], [0.0, 10.0, 0.5]], FOOTBALL, 1.5, bounces=1)
+    assert aimed.velocity[0, [0, 2]] == pytest.approx(aimed.velocity[1, [1, 2]], abs=1e-3)
+
+
+def test_what_no_human_can_kick_is_not_possible():
+    aimed = aim((0.0, 0.0, 0.11), (90.0, 0.0, 1.0), FOOTBALL, 1.2, fastest=FASTEST["foot"])
+    assert not aimed.possible[0]
+    error = out_of_reach((0.0, 0.0, 0.11), (90.0, 0.0, 1.0), aimed, 0, FASTEST["foot"], "pass 3")
+    assert isinstance(error, InputError)
+    assert all(part in str(error) for part in ("pass 3", "90.0 m", "38 m/s"))
+
+
+def test_a_height_that_no_second_bounce_reaches_is_not_possible():
+    aimed = aim((0.0, 0.0, 0.3), (5.0, 0.0, 2.5), FOOTBALL, 0.6, bounces=2)
+    assert not aimed.possible[0] and np.isfinite(aimed.velocity).all()
+    assert "bounces" in str(out_of_reach((0.0, 0.0, 0.3), (5.0, 0.0, 2.5), aimed, 0, 38.0, "pass 1"))
+
+
+@pytest.mark.parametrize("ball", [PAPER, FOOTBALL, TENNIS])
+def test_along_the_ground_in_a_given_time(ball):
+    target = np.array([[8.0, 6.0, 0.5]])
+    aimed = along_ground((0.0, 0.0, 0.0), target, ball, 1.4)
+    assert aimed.possible[0] and aimed.velocity[0, 2] == 0.0
+    flight = fly(Launch(0.0, np.array([0.0, 0.0, ball.radius]), aimed.velocity[0]), ball, 1.4)
+    assert np.linalg.norm(flight.at([1.4])[0] - [8.0, 6.0, ball.radius]) < 0.02
+    assert len(flight.bounces) == 0
+
+
+def test_along_the_ground_it_arrives_as_fast_as_asked():
+    aimed = along_ground((0.0, 0.0, 0.0), (15.0, 0.0, 0.0), FOOTBALL, arrives=3.0)
+    flight = fly(Launch(0.0, np.array([0.0, 0.0, 0.11]), aimed.velocity[0]), FOOTBALL, 10.0)
+    assert flight.at(aimed.seconds)[0, 0] == pytest.approx(15.0, abs=0.02)
+    assert flight.velocity(aimed.seconds)[0, 0] == pytest.approx(3.0, abs=0.3)
+
+
+def test_the_ground_may_lie_anywhere():
+    low = aim((0.0, 0.0, 0.3), (9.0, 0.0, 0.4), FOOTBALL, 1.8, bounces=1)
+    high = aim((0.0, 0.0, 5.3), (9.0, 0.0, 5.4), FOOTBALL, 1.8, bounces=1, ground=5.0)
+    assert high.velocity == pytest.approx(low.velocity, abs=1e-3)
+
+
+def test_same_input_same_launch():
+    start, target, seconds = aims(6)
+    one, other = (aim(start, target, FOOTBALL, seconds, 1) for _ in range(2))
+    assert np.array_equal(one.velocity, other.velocity)
+
+
+@pytest.mark.parametrize("change", [{"seconds": 0.0}, {"seconds": -1.0}, {"seconds": np.nan}, {"bounces": -1},
+                                    {"bounces": 1.5}, {"target": (np.nan, 0.0, 0.0)}])
+def test_what_cannot_be_meant_is_told(change):
+    given_ = {"start": (0.0, 0.0, 0.5), "target": (5.0, 0.0, 0.5), "ball": PAPER, "seconds": 1.0, **change}
+    with pytest.raises(InputError):
+        aim(**given_)
