@@ -1,14 +1,17 @@
-"""The launch that arrives: a ball that leaves here is there at that time, after so many bounces (Ball handling §4 eq. 7, 8).
+"""The launch that arrives: a ball that leaves here is there at that time, after so many bounces (Ball handling §4 eq.
+7, 8).
 
-The ball's place at the wanted time is a smooth function of its launch velocity as long as the number of bounces stays. A first
-guess comes from a ball that only linear drag slows, whose heights have a closed form; from there a damped Newton iteration
-(eq. 7: differences of three launches beside it; eq. 8: as much of the step as helps) goes on with the ball's own physics, for
-all aims at once. Where height and time leave several launches, the one that goes up and bounces late is taken.
+The ball's place at the wanted time is a smooth function of its launch velocity as long as the number of bounces stays.
+A first guess comes from a ball that only linear drag slows, whose heights have a closed form; from there a damped
+Newton iteration (eq. 7: differences of three launches beside it; eq. 8: as much of the step as helps) goes on with the
+ball's own physics, for all aims at once. Where height and time leave several launches, the one that goes up and bounces
+late is taken.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,9 +36,9 @@ NUDGE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Aimed:
-    """How balls (B) have to leave: velocity (B, 3) m/s, spin (B, 3) rad/s as given, seconds (B,) until each is there, miss (B,) m
-    that it passes its target by then, possible (B,) bool: hit, within the speeds allowed. Where not, velocity is the best
-    that was found."""
+    """How balls (B) have to leave: velocity (B, 3) m/s, spin (B, 3) rad/s as given, seconds (B,) until each is there,
+    miss (B,) m that it passes its target by then, possible (B,) bool: hit, within the speeds allowed. Where not,
+    velocity is the best that was found."""
 
     velocity: np.ndarray
     spin: np.ndarray
@@ -51,25 +54,16 @@ def aim(
 ) -> Aimed:
     """Launches from `start` (B, 3) m so that after exactly `bounces` bounces the ball's centre is at `target` (B, 3) m.
 
-    seconds (B,) after the launch; a number: all alike; None: the time with the slowest launch, or the one that leaves nearest
-    to `loft` rad over the horizon. spin (B, 3) rad/s, None: none. fastest m/s: launches beyond are not possible. near (B, 3) m/s:
-    a launch close to the one wanted (the last one, while a target is dragged); rows of it that are not finite are not used.
-    Any of start, target, spin may be (3,): the same for all. InputError: numbers that cannot be meant.
+    seconds (B,) after the launch; a number: all alike; None: the time with the slowest launch, or the one that leaves
+    nearest to `loft` rad over the horizon. spin (B, 3) rad/s, None: none. fastest m/s: launches beyond are not
+    possible. near (B, 3) m/s: a launch close to the one wanted (the last one, while a target is dragged); rows of it
+    that are not finite are not used. Any of start, target, spin may be (3,): the same for all. InputError: numbers that
+    cannot be meant.
     """
     problem = _Problem.of(start, target, ball, seconds, bounces, spin, ground)
     if seconds is None:
         problem = problem.at_time(_chosen_times(problem, loft))
-    guess, _ = problem.guessed()
-    if near is not None:
-        near = np.broadcast_to(np.asarray(near, float), guess.shape)
-        guess = np.where(np.all(np.isfinite(near), axis=1)[:, None], near, guess)
-    velocity, miss = _newton(problem, guess)
-    far = np.flatnonzero(miss > CLOSE)
-    if len(far):
-        again = problem.only(far)
-        second, rest = _newton(again, again.searched())
-        better = rest < miss[far]
-        velocity[far[better]], miss[far[better]] = second[better], rest[better]
+    velocity, miss = _solved(problem, near)
     possible = miss <= CLOSE
     if fastest is not None:
         possible &= length(velocity) <= fastest
@@ -102,9 +96,11 @@ def along_ground(
     return Aimed(velocity, problem.spin, problem.seconds, miss, possible)
 
 
-def out_of_reach(start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float, what: str) -> InputError:
-    """The error that says why aim `index` cannot be: how far it is, how fast the ball would have to leave, and what a human gives.
-    what: who or which pass is meant."""
+def out_of_reach(
+    start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float, what: str
+) -> InputError:
+    """The error that says why aim `index` cannot be: how far it is, how fast the ball would have to leave, and what a
+    human gives. what: who or which pass is meant."""
     start, target = np.atleast_2d(start), np.atleast_2d(target)
     far = np.linalg.norm(target[min(index, len(target) - 1)] - start[min(index, len(start) - 1)])
     speed = float(length(aimed.velocity[index]))
@@ -112,8 +108,28 @@ def out_of_reach(start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int
     if aimed.miss[index] > CLOSE:
         return InputError(what, f"{found}: no launch does that with this number of bounces", "",
                           "give it more time, another number of bounces, or a nearer target")
-    return InputError(what, f"{found}: that takes {speed:.0f} m/s", f"at most {fastest:.0f} m/s, which is what a human gives it",
-                      "give it more time or a nearer target")
+    expected = f"at most {fastest:.0f} m/s, which is what a human gives it"
+    return InputError(what, f"{found}: that takes {speed:.0f} m/s", expected, "give it more time or a nearer target")
+
+
+def _solved(problem: _Problem, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Launch velocities (B, 3) and misses (B,): from the launches nearby, then from first guesses, then from a search,
+    each only for those that still miss."""
+    count = len(problem.start)
+    velocity = np.full((count, 3), np.nan) if near is None else np.broadcast_to(near, (count, 3)).astype(float)
+    miss = np.full(count, np.inf)
+    known = np.flatnonzero(np.isfinite(velocity).all(axis=1))
+    if len(known):
+        velocity[known], miss[known] = _newton(problem.only(known), velocity[known])
+    for guessed in (lambda part: part.guessed()[0], _Problem.searched):
+        far = np.flatnonzero(~(miss <= CLOSE))
+        if not len(far):
+            break
+        part = problem.only(far)
+        second, rest = _newton(part, guessed(part))
+        better = (rest < miss[far]) | ~np.isfinite(velocity[far]).all(axis=1)
+        velocity[far[better]], miss[far[better]] = second[better], rest[better]
+    return velocity, miss
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,14 +169,15 @@ class _Problem:
         return _Problem(*rows, self.ball, self.bounces, self.ground)
 
     def arrived(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the balls (B, 3) m are in time, and after how many bounces (B,); more bounces than asked for are not made."""
+        """Where the balls (B, 3) m are in time, and after how many bounces (B,); more bounces than asked for are not
+        made."""
         balls = batch.launched(self.start, velocity, self.spin, self.ball, self.ground)
         balls = batch.after(balls, self.ball, self.seconds, self.ground, self.bounces)
         return balls.position, balls.bounces
 
     def guessed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Launch velocities (B, 3) of balls that linear drag as strong as theirs slows; exact for such balls. And (B,) bool:
-        whether there is one that is at the target's height in time."""
+        """Launch velocities (B, 3) of balls that linear drag as strong as theirs slows; exact for such balls. And (B,)
+        bool: whether there is one that is at the target's height in time."""
         way = self.target - self.start
         drag = self.ball.linear_drag + self.ball.drag * length(way) / self.seconds
         level = way[:, :2] / (_shares(drag * self.seconds)[0] * self.seconds)[:, None]
@@ -168,8 +185,8 @@ class _Problem:
         return np.column_stack([level, upward]), found
 
     def _upward(self, drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(B,) m/s: the highest launch upward with which such a ball is at the target's height in time, and (B,) bool whether
-        there is one; else the nearest to it."""
+        """(B,) m/s: the highest launch upward with which such a ball is at the target's height in time, and (B,) bool
+        whether there is one; else the nearest to it."""
         gravity, low = self.ball.gravity, self.ground + self.ball.radius
         first, second = _shares(drag * self.seconds)
         direct = (self.target[:, 2] - self.start[:, 2] + gravity * self.seconds**2 * second) / (self.seconds * first)
@@ -185,8 +202,8 @@ class _Problem:
         return _highest_root(over, tried)
 
     def searched(self) -> np.ndarray:
-        """Launch velocities (B, 3) found with the ball's own physics: of a row of launches upward, each brought to the target's
-        distance, the one that comes nearest to its height; slower, for where the first guess leads nowhere."""
+        """Launch velocities (B, 3) found with the ball's own physics: of a row of launches upward, each brought to the
+        target's distance, the one that comes nearest to its height; slower, for where the first guess leads nowhere."""
         count = len(self.start)
         many = self.only(np.repeat(np.arange(count), HEIGHTS))
         top = self.ball.gravity * self.seconds * (0.5 + 0.1 * self.seconds) + 1.0
@@ -204,10 +221,11 @@ class _Problem:
 
 
 def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Launch velocities (B, 3) and the distances (B,) m by which they miss; infinite where the bounces are not those asked.
+    """Launch velocities (B, 3) and the distances (B,) m by which they miss; infinite where the bounces are not those
+    asked.
 
-    The slopes of eq. 7 are taken from launches beside the first one and kept up by what each step shows (Broyden's rule); where
-    that no longer helps they are taken anew, and an aim that still does not come nearer is given up.
+    The slopes of eq. 7 are taken from launches beside the first one and kept up by what each step shows (Broyden's
+    rule); where that no longer helps they are taken anew, and an aim that still does not come nearer is given up.
     """
     velocity = guess.copy()
     short, miss = _short(problem, velocity)
@@ -257,23 +275,27 @@ def _step(slope: np.ndarray, short: np.ndarray) -> np.ndarray:
 
 
 def _learnt(slope: np.ndarray, step: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Broyden's correction (B, 3, 3) of slopes with which a step (B, 3) should have moved the ball as it did, by (B, 3)."""
+    """Broyden's correction (B, 3, 3) of slopes with which a step (B, 3) should have moved the ball as it did, by (B,
+    3)."""
     wrong = moved - np.einsum("bij,bj->bi", slope, step)
     return wrong[:, :, None] * step[:, None] / np.maximum(np.sum(step * step, axis=1), 1e-12)[:, None, None]
 
 
 def _chosen_times(problem: _Problem, loft: float | None) -> np.ndarray:
-    """(B,) s: of TIMES the one with the slowest launch, or the launch nearest to `loft` rad, as the first guesses have it."""
+    """(B,) s: of TIMES the one with the slowest launch, or the launch nearest to `loft` rad, as the first guesses have
+    it."""
     count, times = len(problem.start), len(TIMES)
     many = problem.only(np.repeat(np.arange(count), times)).at_time(np.tile(TIMES, count))
     launch, found = many.guessed()
-    worth = length(launch) if loft is None else np.abs(np.arctan2(launch[:, 2], length(launch * [1.0, 1.0, 0.0])) - loft)
+    worth = length(launch)
+    if loft is not None:
+        worth = np.abs(np.arctan2(launch[:, 2], length(launch * [1.0, 1.0, 0.0])) - loft)
     return TIMES[np.argmin(np.where(found, worth, worth + 1e6).reshape(count, times), axis=1)]
 
 
 def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np.ndarray:
-    """Heights m over a ball that lies on the ground, of balls under linear drag after `bounces` bounces; NaN where they have
-    not made them by then. All arguments broadcast."""
+    """Heights m over a ball that lies on the ground, of balls under linear drag after `bounces` bounces; NaN where they
+    have not made them by then. All arguments broadcast."""
     height, upward, drag, left = (value.copy() for value in np.broadcast_arrays(height, upward, drag, seconds))
     for _ in range(bounces):
         fall = (upward + np.sqrt(upward**2 + 2.0 * ball.gravity * height)) / ball.gravity
@@ -302,8 +324,8 @@ def _shares(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(B,) of each row of `tried` (B, N), falling, the first place where `value` of it changes sign, found by halving; where it
-    never does, the one that comes nearest to zero. And (B,) bool: whether it does."""
+    """(B,) of each row of `tried` (B, N), falling, the first place where `value` of it changes sign, found by halving;
+    where it never does, the one that comes nearest to zero. And (B,) bool: whether it does."""
     rows, values = np.arange(len(tried)), value(tried)
     changes = values[:, 1:] * values[:, :-1] <= 0.0
     first, found = np.argmax(changes, axis=1), changes.any(axis=1)
@@ -330,14 +352,21 @@ def _ground_speeds(problem: _Problem, distance: np.ndarray) -> np.ndarray:
 
 def _ground_times(ball: Ball, distance: np.ndarray, arrives: float) -> np.ndarray:
     """(B,) s until a ball on the ground that still has some `arrives` m/s at `distance` (B,) m is there."""
-    times, speeds = np.linspace(0.0, 10.0, 126), np.geomspace(0.3, 60.0, 48)
-    gone, left = batch.courses([0.0, 0.0, ball.radius], speeds[:, None] * [1.0, 0.0, 0.0], None, ball, times)
+    times, gone, left = _ground_table(ball)
     out = np.empty(len(distance))
     for i, far in enumerate(distance):
-        there = [np.interp(far, row, times, right=np.inf) for row in gone[:, :, 0]]
-        still = [np.interp(time, times, row) if np.isfinite(time) else -1.0 for time, row in zip(there, left[:, :, 0])]
-        fast = int(np.argmax(np.array(still) >= arrives))  # the slowest launch with enough left; the first one where none has
+        there = [np.interp(far, row, times, right=np.inf) for row in gone]
+        still = [np.interp(time, times, row) if np.isfinite(time) else -1.0 for time, row in zip(there, left)]
+        fast = int(np.argmax(np.array(still) >= arrives))  # the slowest launch with enough left
         share = np.clip((arrives - still[fast - 1]) / (still[fast] - still[fast - 1]), 0.0, 1.0) if fast else 1.0
         before = there[fast - 1] if fast and np.isfinite(there[fast - 1]) else there[fast]
         out[i] = before + share * (there[fast] - before)
     return np.where(np.isfinite(out), out, times[-1])
+
+
+@lru_cache(maxsize=16)
+def _ground_table(ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times (T,) s, and metres gone and m/s left (S, T) of level launches with ever higher speed."""
+    times, speeds = np.linspace(0.0, 10.0, 41), np.geomspace(0.3, 60.0, 28)
+    gone, left = batch.courses([0.0, 0.0, ball.radius], speeds[:, None] * [1.0, 0.0, 0.0], None, ball, times)
+    return times, gone[:, :, 0], left[:, :, 0]

@@ -1,8 +1,9 @@
 """Thousands of flights at once: the physics of `flight`, in steps that all balls take together.
 
-Each ball has its own clock. A ball without spin and without quadratic drag flies from bounce to bounce in closed form (one
-step a hop); others take Runge-Kutta steps of fourth order. Where a step ends below the ground it is taken again up to the
-bounce, which is found to some 1e-9 s; then the ball goes on from there. `fly` is the judge: tests compare the two.
+Each ball has its own clock. A ball without spin and without quadratic drag flies from bounce to bounce in closed form
+(one step a hop); others take Runge-Kutta steps of fourth order. Where a step ends below the ground it is taken again up
+to the bounce, which is found to some 1e-9 s; then the ball goes on from there. `fly` is the judge: tests compare the
+two.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ AIR, SLIDE, ROLL, REST = range(4)
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """Many balls (B) at one moment each: position (B, 3) m, velocity (B, 3) m/s, spin (B, 3) rad/s, phase (B,) one of AIR,
-    SLIDE, ROLL, REST, bounces (B,) how often each has left the ground again."""
+    """Many balls (B) at one moment each: position (B, 3) m, velocity (B, 3) m/s, spin (B, 3) rad/s, phase (B,) one of
+    AIR, SLIDE, ROLL, REST, bounces (B,) how often each has left the ground again."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -39,11 +40,14 @@ class Balls:
         return Balls(*(value[which] for value in vars(self).values()))
 
 
-def launched(position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, ground: float = 0.0) -> Balls:
-    """Balls (B) at their launch; the arguments (B, 3), or (3,) for all alike; spin None: none. One that lies too low is set onto
-    the ground, and meets it at once where its way leads down."""
-    shape = np.broadcast_shapes(np.shape(position), np.shape(velocity), np.shape(spin) if spin is not None else (3,), (1, 3))
-    position, velocity, spin = (np.broadcast_to(0.0 if value is None else value, shape).astype(float)
+def launched(
+    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, ground: float = 0.0
+) -> Balls:
+    """Balls (B) at their launch; the arguments (B, 3), or (3,) for all alike; spin None: none. One that lies too low is
+    set onto the ground, and meets it at once where its way leads down."""
+    spin = np.zeros(3) if spin is None else spin
+    shape = np.broadcast_shapes(np.shape(position), np.shape(velocity), np.shape(spin), (1, 3))
+    position, velocity, spin = (np.broadcast_to(value, shape).astype(float)
                                 for value in (position, velocity, spin))
     low = ground + ball.radius
     position[:, 2] = np.maximum(position[:, 2], low)
@@ -68,9 +72,11 @@ def after(balls: Balls, ball: Ball, seconds: np.ndarray, ground: float = 0.0, mo
 
 
 def states(
-    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, seconds: np.ndarray, ground: float = 0.0
+    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, seconds: np.ndarray,
+    ground: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (B, 3) m and velocities (B, 3) m/s of balls, each `seconds` (B,) after its launch (one number: all alike).
+    """Positions (B, 3) m and velocities (B, 3) m/s of balls, each `seconds` (B,) after its launch (one number: all
+    alike).
 
     position, velocity, spin: (B, 3), or (3,) for all alike; spin None: none.
     """
@@ -79,7 +85,8 @@ def states(
 
 
 def courses(
-    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray, ground: float = 0.0
+    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
+    ground: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (B, T, 3) of balls at `times` (T,) s after their launch, ascending and not negative."""
     balls = launched(position, velocity, spin, ball, ground)
@@ -119,8 +126,8 @@ def _rows(values: np.ndarray, which: np.ndarray) -> np.ndarray:
 
 
 def _until_ground(move, start: tuple, ends: tuple, steps: np.ndarray, ball: Ball, low: float) -> np.ndarray:
-    """(W,) s in which balls that are below the ground at their `ends`, after `steps` (W,), get down to it: Newton's method,
-    kept between a moment above the ground and one below it, from where a parabola through both would land."""
+    """(W,) s in which balls that are below the ground at their `ends`, after `steps` (W,), get down to it: Newton's
+    method, kept between a moment above the ground and one below it, from where a parabola through both would land."""
     above, below = np.zeros(len(steps)), steps.copy()
     rise, height, bend = start[1][:, 2], start[0][:, 2] - low, (start[1][:, 2] - ends[1][:, 2]) / steps
     guess = (rise + np.sqrt(np.maximum(rise**2 + 2.0 * bend * height, 0.0))) / bend
@@ -190,7 +197,8 @@ def _roll(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: f
     one = slowing(speed, ball)
     two = slowing(speed - 0.5 * taken * one, ball)
     three = slowing(speed - 0.5 * taken * two, ball)
-    slower = np.maximum(speed - taken * (one + 2.0 * two + 2.0 * three + slowing(speed - taken * three, ball)) / 6.0, 0.0)
+    four = slowing(speed - taken * three, ball)
+    slower = np.maximum(speed - taken * (one + 2.0 * two + 2.0 * three + four) / 6.0, 0.0)
     balls.position[which] += along * (taken * speed - taken**2 * (one + two + three) / 6.0)[:, None]
     balls.velocity[which] = along * slower[:, None]
     decayed = balls.spin[which] * np.exp(-ball.spin_decay * taken)[:, None]

@@ -1,7 +1,7 @@
 """One ball's whole way from a launch until it rests: flight, bounces, sliding, rolling (Ball handling §4 eq. 3 to 6).
 
-The pieces between bounces are integrated by scipy's DOP853 with the bounce as an event (eq. 4), the bounce itself is an impulse
-(eq. 5). A ball that would rise less than a few millimetres again stays on the ground, so that its bounces end.
+The pieces between bounces are integrated by scipy's DOP853 with the bounce as an event (eq. 4), the bounce itself is an
+impulse (eq. 5). A ball that would rise less than a few millimetres again stays on the ground, so that its bounces end.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Launch:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A stretch of the way: kind "air", "slide", "roll" or "rest"; first and last, s; state(times (N,)) -> (N, 9), position,
-    velocity and spin."""
+    """A stretch of the way: kind "air", "slide", "roll" or "rest"; first and last, s; state(times (N,)) -> (N, 9),
+    position, velocity and spin."""
 
     kind: str
     first: float
@@ -48,8 +48,8 @@ class Piece:
 class Flight:
     """The way of a ball. Before its launch it lies at the start, after `end` it stays where it is then.
 
-    pieces in order of time. bounces (K,) s: when it met the ground and left it again. rolls_from, rests_from: s, None where it
-    never does. end: s, up to when it was followed. launch, ball: what was asked.
+    pieces in order of time. bounces (K,) s: when it met the ground and left it again. rolls_from, rests_from: s, None
+    where it never does. end: s, up to when it was followed. launch, ball: what was asked.
     """
 
     launch: Launch
@@ -82,7 +82,8 @@ class Flight:
         return out
 
     def rotations(self, times: np.ndarray) -> np.ndarray:
-        """Rotations (N, 4) of the ball's body at `times` (N,) s, in any order; unturned at the launch, sign-continuous."""
+        """Rotations (N, 4) of the ball's body at `times` (N,) s, in any order; unturned at the launch,
+        sign-continuous."""
         times = np.clip(np.asarray(times, float), self.launch.time, self.end)
         steps = np.arange(self.launch.time, self.end, FINE)
         knots = np.unique(np.concatenate([steps, [piece.first for piece in self.pieces], times]))
@@ -139,9 +140,10 @@ class _Integrator:
     def _air(self) -> None:
         """A flight up to its bounce or the end."""
         def change(_, state):
-            return np.concatenate([state[3:6], in_air(state[3:6], state[6:], self.ball), -self.ball.spin_decay * state[6:]])
+            faster = in_air(state[3:6], state[6:], self.ball)
+            return np.concatenate([state[3:6], faster, -self.ball.spin_decay * state[6:]])
 
-        def lands(_, state):  # a ball that rises has not landed, though it may still touch the ground from its last bounce
+        def lands(_, state):  # a ball that rises has not landed, though it may still touch the ground from before
             return state[2] - self.low + (state[5] > 0.0)
 
         self._integrate("air", change, lands)

@@ -1,13 +1,13 @@
 """What a ball is and what acts on it: air, bounce and ground, with the numbers of real balls.
 
-In the air a ball of mass m feels gravity, a drag that grows with its speed (the paper's) or with its square (measured), and
-the Magnus lift of its spin, at right angles to its way:
+In the air a ball of mass m feels gravity, a drag that grows with its speed (the paper's) or with its square (measured),
+and the Magnus lift of its spin, at right angles to its way:
 
     dv/dt = -g z - linear_drag v - drag |v| v + lift_scale C_L |v| (w x v) / |w|,   C_L = 1 / (a + b |v| / (r |w|))
 
-At a bounce the ground gives back `restitution` of the speed into it; across, it stops the ball's lowest point (grip), as far
-as `friction` times the push upward can (else it slides), which couples way and spin: Cross, "Grip-slip behavior of a
-bouncing ball", Am. J. Phys. 70 (2002). Every formula takes energy out or leaves it: nothing here speeds a ball up.
+At a bounce the ground gives back `restitution` of the speed into it; across, it stops the ball's lowest point (grip),
+as far as `friction` times the push upward can (else it slides), which couples way and spin: Cross, "Grip-slip behavior
+of a bouncing ball", Am. J. Phys. 70 (2002). Every formula takes energy out or leaves it: nothing here speeds a ball up.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Ball:
     """One kind of ball.
 
     radius m, mass kg, gravity m/s^2. linear_drag 1/s (share of the speed lost in a second). drag 1/m: rho C_D A / 2m.
-    lift: (scale 1/m: rho A / 2m, a, b) of the Magnus lift above; scale 0: none. restitution: share of the speed into the
-    ground that comes back. friction: Coulomb's, at a bounce and while sliding; 0: no spin is made. rolling m/s^2: how fast a
-    rolling ball slows. spin_decay 1/s. inertia: moment of inertia / (mass radius^2), 2/3 for a hollow ball.
+    lift: (scale 1/m: rho A / 2m, a, b) of the Magnus lift above; scale 0: none. restitution: share of the speed into
+    the ground that comes back. friction: Coulomb's, at a bounce and while sliding; 0: no spin is made. rolling m/s^2:
+    how fast a rolling ball slows. spin_decay 1/s. inertia: moment of inertia / (mass radius^2), 2/3 for a hollow ball.
     """
 
     name: str
@@ -49,29 +49,30 @@ is not said there; it slows as a football does."""
 
 FOOTBALL = Ball("football", 0.11, 0.43, 9.81, drag=0.0133, lift=(0.0531, 2.0, 0.4), restitution=0.62, friction=0.5,
                 rolling=1.0, spin_decay=0.05)
-"""C_D 0.25, between the 0.2 that Goff & Carre, "Trajectory analysis of a soccer ball", Am. J. Phys. 77 (2009), find above the
-drag crisis near 12 m/s and the 0.4 and more below it (Asai et al., "Fundamental aerodynamics of the soccer ball", Sports
-Eng. 10 (2007)); C_L about 0.3 for spin parameters of 0.3 (both), levelling off. Bounce and roll as on good turf: FIFA's test
-manual asks for a rebound of 0.6 to 0.85 m from 2 m and 4 to 8 m of roll from a 1 m ramp. Friction: 0.37 to 0.62 are measured
-("The coefficient of friction of soccer balls", Proceedings 49 (2020) 92)."""
+"""C_D 0.25, between the 0.2 that Goff & Carre, "Trajectory analysis of a soccer ball", Am. J. Phys. 77 (2009), find
+above the drag crisis near 12 m/s and the 0.4 and more below it (Asai et al., "Fundamental aerodynamics of the soccer
+ball", Sports Eng. 10 (2007)); C_L about 0.3 for spin parameters of 0.3 (both), levelling off. Bounce and roll as on
+good turf: FIFA's test manual asks for a rebound of 0.6 to 0.85 m from 2 m and 4 to 8 m of roll from a 1 m ramp.
+Friction: 0.37 to 0.62 are measured ("The coefficient of friction of soccer balls", Proceedings 49 (2020) 92)."""
 
 VOLLEYBALL = Ball("volleyball", 0.105, 0.27, 9.81, drag=0.0192, lift=(0.0770, 2.0, 0.4), restitution=0.74, friction=0.5,
                   rolling=0.4, spin_decay=0.05)
-"""C_D 0.25 between 0.15 above and 0.45 below the crisis (Asai et al., "A study of knuckle effect of volleyball", Procedia
-Eng. 2 (2010)); a hard floor."""
+"""C_D 0.25 between 0.15 above and 0.45 below the crisis (Asai et al., "A study of knuckle effect of volleyball",
+Procedia Eng. 2 (2010)); a hard floor."""
 
 TENNIS = Ball("tennis", 0.0335, 0.0577, 9.81, drag=0.0202, lift=(0.0367, 2.022, 0.981), restitution=0.745, friction=0.6,
               rolling=0.6, spin_decay=0.05, inertia=0.55)
-"""C_D 0.55 (Mehta, Alam & Subic, "Aerodynamics of tennis balls", Sports Technol. 1 (2008)); lift: Stepanek, "The aerodynamics
-of tennis balls: the topspin lob", Am. J. Phys. 56 (1988); bounce: the rules ask for 1.35 to 1.47 m from 2.54 m; inertia:
-Cross (2002)."""
+"""C_D 0.55 (Mehta, Alam & Subic, "Aerodynamics of tennis balls", Sports Technol. 1 (2008)); lift: Stepanek, "The
+aerodynamics of tennis balls: the topspin lob", Am. J. Phys. 56 (1988); bounce: the rules ask for 1.35 to 1.47 m from
+2.54 m; inertia: Cross (2002)."""
 
 BALLS: dict[str, Ball] = {ball.name: ball for ball in (PAPER, FOOTBALL, VOLLEYBALL, TENNIS)}
 
 FASTEST: dict[str, float] = {"foot": 38.0, "head": 23.0, "chest": 10.0, "hand": 38.0, "tool": 73.0}
-"""m/s that a human gives a ball with a part. Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis, "Biomechanical
-characteristics of instep soccer kick", J. Sports Sci. Med. 6 (2007)), records some more. Hand: the fastest volleyball serves and
-spikes (some 137 km/h). Tool: the fastest tennis serves (263 km/h). Head and chest: the best runs up and dives, rounded up."""
+"""m/s that a human gives a ball with a part. Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis,
+"Biomechanical characteristics of instep soccer kick", J. Sports Sci. Med. 6 (2007)), records some more. Hand: the
+fastest volleyball serves and spikes (some 137 km/h). Tool: the fastest tennis serves (263 km/h). Head and chest: the
+best runs up and dives, rounded up."""
 
 
 def length(vectors: np.ndarray) -> np.ndarray:
@@ -110,7 +111,8 @@ def bounced(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndar
 
 
 def gripped(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity and spin (..., 3) once the lowest point stands still: it rolls. A ball without friction stays as it is."""
+    """Velocity and spin (..., 3) once the lowest point stands still: it rolls. A ball without friction stays as it
+    is."""
     push = _across(velocity, spin, ball, np.full(velocity.shape[:-1], np.inf if ball.friction else 0.0))
     return velocity + push, spin + _turned_by(push, ball)
 

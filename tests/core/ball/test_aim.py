@@ -14,7 +14,8 @@ from beyond_mocap.errors import InputError
 
 
 def aims(count, seed=0):
-    """Starts and targets (B, 3) 4 to 20 m apart at heights that feet and heads reach, with times (B,) that leave room."""
+    """Starts and targets (B, 3) 4 to 20 m apart at heights that feet and heads reach, with times (B,) that leave
+    room."""
     rng = np.random.default_rng(seed)
     start = rng.uniform([-5, -5, 0.15], [5, 5, 1.2], (count, 3))
     angle, far = rng.uniform(0.0, 6.28, count), rng.uniform(4.0, 20.0, count)

@@ -1,5 +1,5 @@
-"""Flights against closed forms, against an integrator written out here, and against what must hold of any: no energy from
-nothing, nothing below the ground."""
+"""Flights against closed forms, against an integrator written out here, and against what must hold of any: no energy
+from nothing, nothing below the ground."""
 
 from dataclasses import replace
 
@@ -79,7 +79,8 @@ def by_small_steps(launch, ball, seconds, step=1e-3):
         k2 = pull(v + h / 2 * k1, half)
         k3 = pull(v + h / 2 * k2, half)
         k4 = pull(v + h * k3, half**2 / np.where(w, w, 1.0))
-        return x + h * v + h * h / 6 * (k1 + k2 + k3), v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), half**2 / np.where(w, w, 1.0)
+        whole = half**2 / np.where(w, w, 1.0)
+        return x + h * v + h * h / 6 * (k1 + k2 + k3), v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), whole
 
     left = seconds
     for _ in range(int(2 * seconds / step)):
@@ -166,7 +167,8 @@ def test_energy_never_grows_and_the_ground_holds(name, velocity, spin, height):
 def test_a_turned_launch_gives_the_turned_flight(velocity, spin, angle):
     about = quaternion.about_up(np.array(angle))
     launch = Launch(0.0, np.array([0.0, 0.0, 1.0]), np.array(velocity), np.array(spin))
-    turned = Launch(0.0, launch.position, quaternion.rotate(about, launch.velocity), quaternion.rotate(about, launch.spin))
+    velocity, spin = (quaternion.rotate(about, value) for value in (launch.velocity, launch.spin))
+    turned = Launch(0.0, launch.position, velocity, spin)
     times = np.linspace(0.0, 3.0, 20)
     one, other = fly(launch, FOOTBALL, 3.0).at(times), fly(turned, FOOTBALL, 3.0).at(times)
     assert np.abs(quaternion.rotate(about, one) - other).max() < 1e-5
