@@ -45,11 +45,12 @@ SAMPLES: dict[str, dict] = {
             {"name": "Dia", "place": [4.2, 1.8]},
         ],
         "passes": [
-            {"from": "Ann", "to": "Ben", "kind": "toss", "bounces": 0},
+            {"from": "Ann", "to": "Ben", "kind": "toss"},
             {"from": "Ben", "to": "Cho", "kind": "pass"},
             {"from": "Cho", "to": "Dia", "kind": "toss"},
             {"from": "Dia", "to": "Ann", "kind": "attack"},
         ],
+        "defaults": {"bounces": 0},
         "repeat": 2,
         "ball": "volleyball",
         "net": {"from": [0.0, -4.5], "to": [0.0, 4.5], "height": 1.5},

@@ -67,6 +67,13 @@ def library(clips_folder) -> Library:
 
 
 @pytest.fixture(scope="session")
+def strikes_library(tmp_path_factory) -> Library:
+    """The library of the passing samples."""
+    samples = Path(__file__).resolve().parents[2] / "sample_blend" / "passes" / "library"
+    return build(samples, cache_dir=tmp_path_factory.mktemp("strikes"))
+
+
+@pytest.fixture(scope="session")
 def kick_seconds() -> float:
     """When the ball is kicked in the made clip."""
     return strike("kick low inside", fps=60.0).key
