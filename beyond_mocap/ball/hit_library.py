@@ -18,13 +18,14 @@ from ..motion import quaternion
 from ..motion.striking import striking_part
 from . import kept
 from .contact import Tool
-from .hits import HitMotion, analyse
+from .hits import HitMotion, analyse, hit_at
 
 KINDS = ("toss", "pass", "attack")
 DIRECTIONS = tuple(np.radians(degrees) for degrees in (-135, -90, -45, 0, 45, 90, 135, 180))
 """Radians from the forward direction into which a player can send the ball in the paper (§3)."""
 # m/s of the part between toss and pass, and between pass and attack (§5: told apart by the greatest speed)
-_BOUNDS = {"foot": (5.0, 10.0), "hand": (4.0, 9.0), "head": (2.0, 3.5), "chest": (1.0, 2.0), "tool": (8.0, 18.0)}
+_BOUNDS = {"foot": (4.5, 7.5), "hand": (4.0, 7.0), "head": (2.0, 3.5), "chest": (1.0, 2.0), "tool": (8.0, 13.0)}
+_MOVES = 0.3  # m/s: the least of a part that is said to touch the ball
 
 
 @dataclass(frozen=True)
@@ -116,12 +117,14 @@ class HitLibrary:
 
     def of_kind(self, kind: str, side: str | None = None) -> np.ndarray:
         """Indices (K,) into `hits`, what suits a toss, a pass or an attack best first: whose speed lies in the kind's
-        range, then whose is nearest to it; of equals those that words name first."""
+        range, then whose is nearest to it; within the range those that words name first, then the nearest to its middle
+        (of attacks the fastest)."""
         edges = (0.0, *_bounds(self.part), np.inf)
         low, high = edges[KINDS.index(kind)], edges[KINDS.index(kind) + 1]
         outside = np.maximum(low - self.speeds, 0.0) + np.maximum(self.speeds - high, 0.0)
         unnamed = np.array([not one.labelled for one in self.hits], dtype=bool)
-        order = np.lexsort((np.arange(len(self)), unnamed, outside))
+        typical = np.abs(self.speeds - 0.5 * (low + high)) if np.isfinite(high) else -self.speeds
+        order = np.lexsort((np.arange(len(self)), typical, unnamed, outside))
         return order if side is None else order[self.sides[order] == side]
 
 
@@ -142,21 +145,43 @@ def _of_clip(index: int, clip: Clip, part: str, tool: Tool | None) -> list[Libra
     if len(clip.recording) < 3:
         return []
     sides = ("left", "right") if part in ("foot", "hand", "tool") else ("",)
-    found = [one for side in sides for one in analyse(clip.recording, part, side, tool=tool).motions]
-    return [_labelled(index, clip, hit) for hit in sorted(found, key=lambda hit: hit.first)]
+    hits = [hit for side in sides for hit in analyse(clip.recording, part, side, tool=tool).motions]
+    found = [_labelled(index, clip, hit) for hit in hits]
+    found += [LibraryHit(index, hit, True) for hit in _unseen(clip, part, sides, hits, tool)]
+    return sorted(found, key=lambda one: one.hit.first)
 
 
 def _labelled(index: int, clip: Clip, hit: HitMotion) -> LibraryHit:
     """The hit motion with the key that the clip's words give, where they name a touch of this part within it."""
     for row in clip.annotations:
-        if row.key is not None and hit.first < row.key < hit.last and _names(row.words, hit):
+        if row.key is not None and hit.first < row.key < hit.last and _names(row.words, hit.part, hit.side):
             return LibraryHit(index, replace(hit, key=int(round(row.key))), True)
     return LibraryHit(index, hit, False)
 
 
-def _names(words, hit: HitMotion) -> bool:
-    sides = {"left", "right"} & set(words) if hit.part in ("foot", "hand") else set()
-    return striking_part(words) == hit.part and (not sides or hit.side in sides)
+def _unseen(clip: Clip, part: str, sides, hits: list[HitMotion], tool: Tool | None) -> list[HitMotion]:
+    """Touches that the clip's words name and the analysis has not seen: a trap is slow, a header may do without a jump.
+    Where the words name no side, it is the faster one."""
+    found = []
+    for row in clip.annotations:
+        if row.key is None or any(hit.first < row.key < hit.last and _names(row.words, part, hit.side) for hit in hits):
+            continue
+        named = [side for side in sides if _names(row.words, part, side)]
+        made = [hit_at(clip.recording, int(round(row.key)), _around(row, clip), part, side, tool) for side in named]
+        found += [hit for hit in sorted(made, key=lambda hit: -hit.max_speed)[:1] if hit.max_speed > _MOVES]
+    return found
+
+
+def _around(row, clip: Clip) -> tuple[int, int]:
+    """First and last frame of a touch: its row, at most a second before and behind its key."""
+    reach = clip.motion.fps
+    return int(max(row.start, row.key - reach)), int(min(row.end, row.key + reach))
+
+
+def _names(words, part: str, side: str) -> bool:
+    """Whether words name a touch of this part and side."""
+    sides = {"left", "right"} & set(words) if part in ("foot", "hand") else set()
+    return striking_part(words) == part and (not sides or side in sides)
 
 
 def _told(clip: Clip, hit: HitMotion) -> bool:
@@ -165,7 +190,7 @@ def _told(clip: Clip, hit: HitMotion) -> bool:
         return True
     rows = [row.words for row in clip.annotations if row.start <= hit.key <= row.end]
     juggles = hit.part in ("foot", "head", "chest") and any("juggling" in words for words in rows)
-    return not rows or juggles or any(_names(words, hit) for words in rows)
+    return not rows or juggles or any(_names(words, hit.part, hit.side) for words in rows)
 
 
 _WHOLE = ("first", "last", "high", "key")

@@ -42,7 +42,7 @@ class HitMotion:
     """One hit motion (§3: S_H), all frames of its motion's own rate.
 
     first, last: where it begins and ends. high: the highest frame. fasts: the fastest before and after it. key: the
-    likeliest frame of the strike (nobody observed a ball): the faster of the two. max_speed: of the part there, m/s.
+    likeliest frame of the strike (nobody observed a ball): the faster of the two. max_speed: of the part, m/s.
     vectors (4, 3) m and times (4,) s: the part's way first - fast - high - fast - last, as the body sees it (x where it
     faces on average, y to its left, the pelvis' own travel taken out), and how long each took (eq. 2: m_i, t_i).
     velocity (3,) m/s: of the part at the key, in the same frame but with the body's travel. facing: radians, world.
@@ -138,6 +138,22 @@ def analyse(
         tuple(sorted({*highs, *(one.high for one in found)})), tuple(_apart(way.speed, motion.fps)), found,
         tuple(one.ball_stretch for one in found), _between(found, len(motion)),
     )
+
+
+def hit_at(
+    motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right", tool: Tool | None = None
+) -> HitMotion:
+    """The hit motion of a strike whose frame is known, within `span` (first, last): also of parts that neither rise nor
+    are fast, as in a trap, of which `analyse` sees nothing. InputError as there."""
+    _check(motion, None)
+    positions, rotations = forward_kinematics(motion)
+    place = strike_place(motion.skeleton, positions, rotations, part, side, tool)
+    body = _Body.of(motion, positions)
+    first = int(np.clip(span[0], 0, len(motion) - 3))
+    last = int(np.clip(span[1], first + 2, len(motion) - 1))
+    key = int(np.clip(frame, first + 1, last - 1))
+    side = side if part in ("foot", "hand", "tool") else ""
+    return _hit_motion(part, side, (first, last), _Way.of(place, body, part, motion.fps), body, key)
 
 
 def strike_place(
@@ -279,9 +295,11 @@ def _is_hit(span: tuple[int, int], part: str, way: _Way, body: _Body, other: np.
     return way.speed[key] > min(3.0 * (pace + 0.5), 2.3 * pace + 2.5)
 
 
-def _hit_motion(part: str, side: str, span: tuple[int, int], way: _Way, body: _Body) -> HitMotion:
+def _hit_motion(
+    part: str, side: str, span: tuple[int, int], way: _Way, body: _Body, key: int | None = None
+) -> HitMotion:
     first, last = span
-    key = first + int(np.argmax(way.speed[first : last + 1]))
+    key = first + int(np.argmax(way.speed[first : last + 1])) if key is None else key
     high = _high(way.height, first, key, last)
     fasts = _fastest(way.speed, first, high), _fastest(way.speed, high, last)
     frames = np.array([first, fasts[0], high, fasts[1], last])
@@ -290,7 +308,7 @@ def _hit_motion(part: str, side: str, span: tuple[int, int], way: _Way, body: _B
     turn = quaternion.about_up(np.array(-facing))
     steps = np.diff(way.place[frames] - body.pelvis[frames] * [1.0, 1.0, 0.0], axis=0)
     return HitMotion(
-        part, side, first, last, high, fasts, key, float(way.speed[key]), quaternion.rotate(turn, steps),
+        part, side, first, last, high, fasts, key, float(way.speed[list(fasts)].max()), quaternion.rotate(turn, steps),
         np.diff(frames) / way.fps, quaternion.rotate(turn, way.velocity[key]), facing, body.size, way.fps,
     )
 
