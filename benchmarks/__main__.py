@@ -2,8 +2,8 @@
 
 Everything of one run is measured in one process on one core; seconds are the best of three. Written to
 benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
-`--compare` measures instead what is decided once, `--paths` recordings on other paths, and writes that section anew. A
-Blender measures with the numpy that it has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
+`--compare` measures instead what is decided once, `--paths` recordings on other paths, `--ball` the ball and who touches
+it, and writes that section anew. A Blender measures with the numpy that it has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from beyond_mocap.library.library import Library, build  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesize import synthesize  # noqa: E402
 
-from benchmarks import compare, effort, markdown, misses, paper, path_editing  # noqa: E402
+from benchmarks import ball, compare, effort, markdown, misses, paper, path_editing  # noqa: E402
 from benchmarks.edit_time import edit_times  # noqa: E402
 from benchmarks.places import DATA, LIBRARIES, ROOT, library_folder, scenario  # noqa: E402
 
@@ -37,7 +37,7 @@ METHODS = {
     "distance": {"method": "distance"},
     "path": {"method": "path"},
 }
-COMPARED, PATHS = "## Compared once", "## Path editing"
+COMPARED, PATHS, BALL = "## Compared once", "## Path editing", "## The ball"
 KEY_COLUMNS = (
     "time_s", "labels", "clip", "time_error_s", "position_error_m", "contact_gap_m", "ball_shift_m", "used_instead",
 )
@@ -136,12 +136,14 @@ def bench(scenarios: list[int], libraries: list[str], command: str) -> list[str]
     return lines
 
 
-def sections(path: Path) -> list[list[str]]:
-    """The lines of results written before: scenarios, recordings on other paths, what was compared once."""
-    lines = path.read_text().splitlines() if path.is_file() else []
-    third = lines.index(COMPARED) if COMPARED in lines else len(lines)
-    second = lines.index(PATHS) if PATHS in lines else third
-    return [lines[:second], lines[second:third], lines[third:]]
+def sections(path: Path) -> dict[str, list[str]]:
+    """The lines of results written before by the heading of their section; "" is all before the first of these."""
+    found: dict[str, list[str]] = {"": []}
+    for line in path.read_text().splitlines() if path.is_file() else []:
+        if line in (PATHS, BALL, COMPARED):
+            found[line] = []
+        list(found.values())[-1].append(line)
+    return found
 
 
 def main() -> int:
@@ -151,6 +153,7 @@ def main() -> int:
     options.add_argument("--library", choices=tuple(LIBRARIES), nargs="+", default=list(LIBRARIES))
     options.add_argument("--compare", action="store_true", help="what is decided once, instead of the methods")
     options.add_argument("--paths", action="store_true", help="recordings on other paths, instead of the scenarios")
+    options.add_argument("--ball", action="store_true", help="the ball and who touches it, instead of the scenarios")
     options.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
     chosen = options.parse_args(arguments)
@@ -160,15 +163,19 @@ def main() -> int:
     effort.on_one_core()
     command = " ".join(["python -m benchmarks", *arguments])
     parts = sections(chosen.out)
+    begin = ["", f"`{command}`", ""]
     if chosen.compare:
-        parts[2] = told = [COMPARED, "", f"`{command}`", "", *compare.all_of(chosen.scenarios, chosen.library)]
+        made = {COMPARED: [COMPARED, *begin, *compare.all_of(chosen.scenarios, chosen.library)]}
+    elif chosen.ball:
+        made = {BALL: [BALL, *begin, *ball.section(), ""]}
     else:
-        told = parts[1] = [PATHS, "", f"`{command}`", "", *path_editing.section(), ""]
+        made = {PATHS: [PATHS, *begin, *path_editing.section(), ""]}
         if not chosen.paths:
-            parts[0] = bench(chosen.scenarios, chosen.library, command)
-            told = [*parts[0], *parts[1]]
-    chosen.out.write_text("\n".join(line for part in parts for line in part).rstrip() + "\n")
-    print("\n".join(told))
+            made = {"": bench(chosen.scenarios, chosen.library, command), **made}
+    parts |= made
+    whole = [line for name in ("", PATHS, BALL, COMPARED) for line in parts.get(name, [])]
+    chosen.out.write_text("\n".join(whole).rstrip() + "\n")
+    print("\n".join(line for lines in made.values() for line in lines))
     return 0
 
 

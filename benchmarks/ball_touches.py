@@ -1,0 +1,145 @@
+"""Touches solved from tracking against what a person read, against events, and against made matches."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from beyond_mocap.ball.tracked.planted import planted_match
+from beyond_mocap.ball.tracked.planted_feed import Feed, sampled
+from beyond_mocap.ball.tracked.solve import SolvedBall
+from beyond_mocap.evaluation.touches import Reading, ReadTouch, Score, read_touches, scored, scored_by_events
+from beyond_mocap.files.tracking import Match, MatchPlayer
+from beyond_mocap.solve_ball import solve_ball
+
+from benchmarks import effort
+from benchmarks.markdown import head, row
+from benchmarks.places import DATA, ROOT
+from benchmarks.touch_reading import match_of
+
+BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
+EVENTS = DATA / "tracking" / "match" / "dutch_6min_events.csv"
+PLAYED = ("pass", "miss", "clearance")  # events that are a touch for certain
+_NO_TOUCH = ("out", "foul", "card", "offside")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One match or feed, its score, and what was solved."""
+
+    name: str
+    score: Score
+    solved: SolvedBall
+    reading: Reading
+
+
+def thinned(match: Match, every: int = 1, heights: bool = True) -> Match:
+    """Every so many samples of a match, without heights."""
+    part = slice(None, None, every)
+    ball = match.ball[part].copy()
+    if not heights:
+        ball[:, 2] = np.nan
+    return Match(
+        match.times[part], match.players, match.positions[:, part], ball, match.length, match.width,
+        match.fps / every, match.provider, match.periods, match.notes,
+    )  # fmt: skip
+
+
+def of_feed(feed: Feed) -> Match:
+    """A made feed as a match that was read."""
+    players = tuple(MatchPlayer(name, team, name, i) for i, (name, team) in enumerate(zip(feed.ids, feed.teams)))
+    end = float(feed.times[-1])
+    return Match(feed.times, players, feed.positions, feed.ball, feed.length, feed.width, feed.fps, "made", ((0.0, end),))
+
+
+def by_hand(name: str, match: Match, margin: float = 20.0) -> Measured:
+    """One recorded match against the reading: solved from a while before the first stretch to a while after the last."""
+    reading = read_touches(BY_HAND, name.replace(",", " ").split()[0])
+    solved = solve_ball(match, start=reading.stretches[0][0] - margin, end=reading.stretches[-1][1] + margin)
+    return Measured(name, _score(solved, reading), solved, reading)
+
+
+def _score(solved: SolvedBall, reading: Reading) -> Score:
+    return scored([touch.time for touch in solved.touches], [touch.player for touch in solved.touches], reading)
+
+
+def planted(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> Measured:
+    """A made match as a feed would have it."""
+    match = planted_match(seconds, seed)
+    touches = tuple(ReadTouch(t.time, (t.player,), None, t.part, t.word) for t in match.touches if 1.2 < t.time < seconds - 1)
+    solved = solve_ball(of_feed(sampled(match, **feed)))
+    reading = Reading(((1.2, seconds - 1.0),), touches, (ReadTouch(1.0),))
+    return Measured(name, _score(solved, reading), solved, reading)
+
+
+def event_reading(path: Path = EVENTS) -> Reading:
+    """Events as a reading: what was played for certain, and around all the rest a second of doubt."""
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = [event for event in csv.DictReader(file) if event["type"] not in _NO_TOUCH]
+    sure, doubts = [], []
+    for event in rows:
+        time, player = float(event["time_s"]), (event["player"],)
+        if event["sync"] == "touch" and event["type"] in PLAYED and event["player"]:
+            sure.append(ReadTouch(time, player))
+        else:
+            doubts.append(ReadTouch(time - 1.0, player if event["player"] else (), time + 1.0))
+    return Reading(((0.0, max(touch.time for touch in sure) + 0.5),), tuple(sure), tuple(doubts))
+
+
+def against_events(match: Match) -> Measured:
+    """The last touches of each player before the ball goes to another, against the passes among the events."""
+    solved, reading = solve_ball(match), event_reading()
+    last = [a for a, b in zip(solved.touches, solved.touches[1:]) if a.player != b.player]
+    score = scored_by_events([touch.time for touch in last], [touch.player for touch in last], reading)
+    return Measured("dutch, passes among its events", score, replace(solved, touches=tuple(last)), reading)
+
+
+def residuals(solved: SolvedBall) -> tuple[float, float, float]:
+    """Median, 95th percentile (m) of the path's distance over the ground to measured samples; share of measured ones."""
+    away = solved.residuals[solved.measured]
+    away = away[np.isfinite(away)]
+    return float(np.median(away)), float(np.percentile(away, 95)), float(solved.measured.mean())
+
+
+def line(measured: Measured) -> list[str]:
+    """A row of the table."""
+    score = measured.score
+    late = np.abs(score.errors)
+    median, p95, share = residuals(measured.solved)
+    return [
+        measured.name, str(len(measured.reading.touches)), f"{score.precision:.3f}", f"{score.recall:.3f}", f"{score.f1:.3f}",
+        str(len(score.doubtful)), f"{1000 * np.median(late):.0f} / {1000 * np.percentile(late, 95):.0f}" if len(late) else "-",
+        f"{score.offset:.2f}", f"{100 * median:.1f} / {100 * p95:.0f}", f"{100 * share:.0f} %",
+    ]  # fmt: skip
+
+
+COLUMNS = (
+    "feed", "touches", "precision", "recall", "F1 at 0.1 s, right player", "doubtful", "time off, ms (median / p95)",
+    "offset s", "path to measured samples, cm (median / p95)", "measured",
+)
+
+
+def all_measured() -> list[Measured]:
+    """Every feed."""
+    dutch, half = match_of("dutch"), match_of("nl2019")
+    return [
+        by_hand("dutch", dutch), by_hand("nl2019", half),
+        by_hand("dutch, no heights", thinned(dutch, 1, False)), by_hand("nl2019, no heights", thinned(half, 1, False)),
+        by_hand("dutch, 12.5 Hz", thinned(dutch, 2)), by_hand("nl2019, 12.5 Hz", thinned(half, 2)),
+        by_hand("dutch, 8.3 Hz, no heights", thinned(dutch, 3, False)),
+        against_events(dutch),
+        planted("made, 25 Hz, 8 cm"), planted("made, 25 Hz, 8 cm, half filled", filled=0.5),
+        planted("made, 25 Hz, 8 cm, no heights", heights=False), planted("made, 10 Hz, 8 cm", fps=10.0),
+        planted("made, 10 Hz, 8 cm, no heights", fps=10.0, heights=False),
+    ]  # fmt: skip
+
+
+def section() -> list[str]:
+    """Lines for results.md."""
+    half = match_of("nl2019")
+    took, _ = effort.seconds(lambda: solve_ball(half), 1)
+    lines = [f"- the whole half (46 min) is solved in {took:.1f} s (target 60)", ""]
+    return [*lines, *head(COLUMNS), *(row(line(one)) for one in all_measured())]
