@@ -24,6 +24,7 @@ BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
 EVENTS = DATA / "tracking" / "match" / "dutch_6min_events.csv"
 PLAYED = ("pass", "miss", "clearance")  # events that are a touch for certain
 _NO_TOUCH = ("out", "foul", "card", "offside")
+EVENT_SPREAD = 1.8  # s: three deviations of how far events that were not tied to a touch lie from it
 
 
 @dataclass(frozen=True)
@@ -76,25 +77,31 @@ def planted(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> Measur
 
 
 def event_reading(path: Path = EVENTS) -> Reading:
-    """Events as a reading: what was played for certain, and around all the rest a second of doubt."""
+    """Events as a reading: what was played for certain; around all the rest the time by which an event may lie wrong
+    counts neither way, nor do the times in which the ball is out of play."""
     with open(path, newline="", encoding="utf-8") as file:
-        rows = [event for event in csv.DictReader(file) if event["type"] not in _NO_TOUCH]
+        rows = sorted(csv.DictReader(file), key=lambda event: float(event["time_s"]))
     sure, doubts = [], []
-    for event in rows:
-        time, player = float(event["time_s"]), (event["player"],)
-        if event["sync"] == "touch" and event["type"] in PLAYED and event["player"]:
+    for number, event in enumerate(rows):
+        time, player = float(event["time_s"]), (event["player"],) if event["player"] else ()
+        if event["type"] in _NO_TOUCH:
+            again = [float(other["time_s"]) for other in rows[number:] if other["type"] in PLAYED]
+            doubts.append(ReadTouch(time - EVENT_SPREAD, (), again[0] - 0.5 if again else np.inf))
+        elif event["sync"] == "touch" and event["type"] in PLAYED and player:
             sure.append(ReadTouch(time, player))
         else:
-            doubts.append(ReadTouch(time - 1.0, player if event["player"] else (), time + 1.0))
+            doubts.append(ReadTouch(time - EVENT_SPREAD, player, time + EVENT_SPREAD))
     return Reading(((0.0, max(touch.time for touch in sure) + 0.5),), tuple(sure), tuple(doubts))
 
 
 def against_events(match: Match) -> Measured:
-    """The last touches of each player before the ball goes to another, against the passes among the events."""
+    """All touches against the passes among the events. Events tell who plays the ball away, so that other touches of a
+    player before he does count neither way."""
     solved, reading = solve_ball(match), event_reading()
-    last = [a for a, b in zip(solved.touches, solved.touches[1:]) if a.player != b.player]
-    score = scored_by_events([touch.time for touch in last], [touch.player for touch in last], reading)
-    return Measured("dutch, passes among its events", score, replace(solved, touches=tuple(last)), reading)
+    on = [ReadTouch(a.time, (a.player,)) for a, b in zip(solved.touches, solved.touches[1:]) if a.player == b.player]
+    reading = replace(reading, doubts=(*reading.doubts, *on))
+    times, players = [touch.time for touch in solved.touches], [touch.player for touch in solved.touches]
+    return Measured("dutch, passes among its events", scored_by_events(times, players, reading), solved, reading)
 
 
 def residuals(solved: SolvedBall) -> tuple[float, float, float]:
