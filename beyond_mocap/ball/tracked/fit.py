@@ -11,18 +11,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import Cancelled
+from ..batch import courses
 from ..physics import FOOTBALL, Ball
 from .coarse import coarse_courses
 
 GRID = 0.04  # s between the moments in which flights are looked at
 LONGEST = 6.0  # s of a stretch
-_ROUNDS = 6
+_ROUGH_ROUNDS, _ROUNDS, _FINE_ROUNDS = 3, 5, 2  # of descending: for each of _UPWARD, by coarse steps and then by the physics as it is
+_UPWARD = (0.0, 2.0, 4.5, 7.0, 10.0, 14.0)  # m/s, tried where heights are not known
+_FLAT = 6.0  # m, a stretch so short is on the ground in the end: no more than a hop
 _SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, how far samples lie from the ball, filled-in ones, heights
 _PLACED = 0.12  # m, how far the places of touches are wrong
 _SPUN = 25.0  # rad/s, usual spin about either axis
 _LOFTED = 8.0  # m/s, usual velocity upward
 _HIGH = 2.2  # m, the ball's height at the next touch, usually at most
-_AT_ONCE = 64  # stretches
+_AT_ONCE = 300  # stretches
 _MOST = 40  # samples of a stretch that are looked at
 
 
@@ -87,40 +91,70 @@ def gathered(times, positions, measured, used, spans) -> Stretches:
 def fit_launches(
     stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callable[[], bool] | None = None
 ) -> Launches:
-    """The best launch for every stretch, tried from the ground, from the velocity upward that was seen, or from lofts."""
-    best = None
-    seen = np.isfinite(stretches.velocity[:, 2]).all()
-    for loft in (0.0, 0.5) if seen else (0.0, 0.5, 1.0):
-        found = _fitted(stretches, _guess(stretches, ball, loft), ball, cancelled)
-        best = found if best is None else _better(best, found)
-    return best
+    """The best launch for every stretch, from the velocity upward that was seen; else several are tried."""
+    if np.isfinite(stretches.velocity[:, 2]).all():
+        tried = [_guess(stretches, stretches.velocity[:, 2])]
+    else:
+        tried = _lofted(stretches, ball, cancelled)
+    fitted = [_fitted(stretches, start, ball, _ROUNDS, _coarsely, cancelled) for start in tried]
+    best, cost = fitted[0]
+    for other, costs in fitted[1:]:
+        best = np.where((costs < cost)[:, None], other, best)
+        cost = np.minimum(cost, costs)
+    best, cost = _fitted(stretches, best, ball, _FINE_ROUNDS, _finely, cancelled)
+    return Launches(*_launch(stretches, best, ball), cost)
 
 
-def _guess(stretches: Stretches, ball: Ball, loft: float) -> np.ndarray:
-    """(S, 8) unknowns: dx, dy, dz, vx, vy, vz, top spin, side spin; `loft` of a flight that takes the whole stretch."""
-    unknown = np.zeros((len(stretches), 8))
-    seconds = stretches.seconds
-    unknown[:, 3:5] = stretches.velocity[:, :2]
-    lofted = loft * 0.5 * ball.gravity * np.minimum(seconds, 4.0)
-    measured = stretches.velocity[:, 2]
-    unknown[:, 5] = np.where(np.isfinite(measured) & (loft == 0.5), measured, lofted)
+def _lofted(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarray]:
+    """Two beginnings (S, 7), the best after some rounds from several velocities upward."""
+    row = np.arange(len(stretches))
+    start = _guess(stretches, np.zeros(len(stretches)))
+    far = np.flatnonzero(np.linalg.norm((stretches.end - stretches.start)[:, :2], axis=1) > _FLAT)
+    if not len(far):
+        return [start]
+    some = stretches.take(far)
+    most = 0.5 * ball.gravity * some.seconds + 2.0  # it has come down again by then
+    rough = [_fitted(some, _guess(some, np.minimum(upward, most)), ball, _ROUGH_ROUNDS, _coarsely, cancelled)
+             for upward in _UPWARD]  # fmt: skip
+    order = np.argsort([cost for _, cost in rough], axis=0)
+    found = np.stack([unknown for unknown, _ in rough])
+    both = [start.copy(), start.copy()]
+    for rank, unknown in enumerate(both):
+        unknown[far] = found[order[rank], row[: len(far)]]
+    return both
+
+
+def _coarsely(place, velocity, spin, ball: Ball, count: int):
+    return coarse_courses(place, velocity, spin, ball, GRID, count)
+
+
+def _finely(place, velocity, spin, ball: Ball, count: int):
+    return courses(place, velocity, spin, ball, np.arange(count + 1) * GRID)
+
+
+def _guess(stretches: Stretches, upward: np.ndarray) -> np.ndarray:
+    """(S, 7) unknowns dx, dy, vx, vy, vz, top spin, side spin to begin with."""
+    unknown = np.zeros((len(stretches), 7))
+    unknown[:, 2:4] = stretches.velocity[:, :2]
+    unknown[:, 4] = upward
     return unknown
 
 
 def _launch(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    place = np.nan_to_num(stretches.start, nan=ball.radius) + unknown[:, :3]
+    place = np.nan_to_num(stretches.start, nan=ball.radius)
+    place[:, :2] += unknown[:, :2]
     place[:, 2] = np.maximum(place[:, 2], ball.radius)
-    velocity = unknown[:, 3:6]
+    velocity = unknown[:, 2:5]
     flat = velocity[:, :2] / np.maximum(np.linalg.norm(velocity[:, :2], axis=1), 1e-6)[:, None]
-    top, side = unknown[:, 6], unknown[:, 7]
+    top, side = unknown[:, 5], unknown[:, 6]
     spin = np.stack([-flat[:, 1] * top, flat[:, 0] * top, side], axis=1)
     return place, velocity, spin
 
 
-def ways(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+def _ways(stretches: Stretches, unknown: np.ndarray, ball: Ball, follow) -> tuple[np.ndarray, np.ndarray]:
     """(S, K, 3) m where the balls are at the samples' moments, (S, 3) m at the end."""
     count = int(np.ceil(stretches.seconds.max() / GRID))
-    places, speeds = coarse_courses(*_launch(stretches, unknown, ball), ball, GRID, count)
+    places, speeds = follow(*_launch(stretches, unknown, ball), ball, count)
     return _between(places, speeds, stretches.since), _between(places, speeds, stretches.seconds[:, None])[:, 0]
 
 
@@ -135,9 +169,8 @@ def _between(places, speeds, since) -> np.ndarray:
     return (2 * s3 - 3 * s2 + 1) * p + (s3 - 2 * s2 + share) * m + (3 * s2 - 2 * s3) * q + (s3 - s2) * n
 
 
-def _misses(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray:
-    """(S, R) weighted misses whose squares are made small."""
-    seen, end = ways(stretches, unknown, ball)
+def _misses(stretches: Stretches, unknown: np.ndarray, seen: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """(S, R) weighted misses, whose squares are made small, of balls at `seen` (S, K, 3) and `end` (S, 3)."""
     off = seen - stretches.points
     count = np.maximum((stretches.weight > 0).sum(axis=1), 1)
     even = np.sqrt(np.minimum(1.0, 12.0 / count))[:, None]  # neighbouring samples err together
@@ -146,8 +179,8 @@ def _misses(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray
     known = np.isfinite(stretches.end[:, 2])
     last = (end - np.nan_to_num(stretches.end)) / _PLACED
     over = np.where(known, last[:, 2], np.maximum(end[:, 2] - _HIGH, 0.0) / _PLACED)
-    rise = np.where(np.isfinite(stretches.velocity[:, 2]), 0.0, unknown[:, 5] / _LOFTED)
-    prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :3] / _PLACED).T, rise, *(unknown[:, 6:] / _SPUN).T], axis=1)
+    rise = np.where(np.isfinite(stretches.velocity[:, 2]), 0.0, unknown[:, 4] / _LOFTED)
+    prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :2] / _PLACED).T, rise, *(unknown[:, 5:] / _SPUN).T], axis=1)
     return np.concatenate([_soft(flat.reshape(len(off), -1)), _soft(high), prior], axis=1)
 
 
@@ -157,44 +190,55 @@ def _soft(off: np.ndarray) -> np.ndarray:
     return np.where(far, np.sign(off) * np.sqrt(np.maximum(4.0 * np.abs(off) - 4.0, 0.0)), off)
 
 
-_NUDGE = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.05, 0.5, 0.5])
+_NUDGE = np.array([0.01, 0.01, 0.02, 0.02, 0.05, 0.5, 0.5])
 
 
-def _fitted(stretches: Stretches, unknown: np.ndarray, ball: Ball, cancelled) -> Launches:
-    """Levenberg and Marquardt's method, every stretch with a damping of its own; equal lengths together."""
+def _fitted(stretches: Stretches, unknown, ball: Ball, rounds: int, follow, cancelled) -> tuple[np.ndarray, np.ndarray]:
+    """Unknowns (S, 7) and costs (S,) after some rounds; stretches of about equal lengths together."""
     order = np.argsort(stretches.seconds, kind="stable")
     out, costs = unknown.copy(), np.zeros(len(unknown))
     for low in range(0, len(order), _AT_ONCE):
         if cancelled is not None and cancelled():
-            break
+            raise Cancelled("solving the ball")
         some = order[low : low + _AT_ONCE]
-        out[some], costs[some] = _descend(stretches.take(some), unknown[some], ball)
-    place, velocity, spin = _launch(stretches, out, ball)
-    return Launches(place, velocity, spin, costs)
+        out[some], costs[some] = _descend(stretches.take(some), unknown[some], ball, rounds, follow)
+    return out, costs
 
 
-def _descend(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
-    count = unknown.shape[1]
-    stretches = _cropped(stretches)
-    off = _misses(stretches, unknown, ball)
+def _descend(stretches: Stretches, unknown, ball: Ball, rounds: int, follow) -> tuple[np.ndarray, np.ndarray]:
+    """Levenberg and Marquardt's method, every stretch with a damping of its own."""
+    stretches, count = _cropped(stretches), unknown.shape[1]
+    off = _misses(stretches, unknown, *_ways(stretches, unknown, ball, follow))
     cost = (off**2).sum(axis=1)
     damping = np.full(len(unknown), 1e-2)
-    eight = np.tile(np.arange(len(unknown)), count)
-    repeated = stretches.take(eight)
-    for _ in range(_ROUNDS):
-        nudged = np.tile(unknown, (count, 1)) + np.repeat(np.diag(_NUDGE), len(unknown), axis=0)
-        slope = (_misses(repeated, nudged, ball).reshape(count, len(unknown), -1) - off) / _NUDGE[:, None, None]
+    for _ in range(rounds):
+        slope = _slopes(stretches, unknown, ball)
         normal = np.einsum("isr,jsr->sij", slope, slope)
         right = -np.einsum("isr,sr->si", slope, off)
         diagonal = np.einsum("sii->si", normal) + 1e-9
         step = np.linalg.solve(normal + (damping[:, None] * diagonal)[..., None] * np.eye(count), right[..., None])[..., 0]
         tried = unknown + np.clip(step, -6.0 * _SPUN, 6.0 * _SPUN)
-        off_tried = _misses(stretches, tried, ball)
+        off_tried = _misses(stretches, tried, *_ways(stretches, tried, ball, follow))
         cost_tried = (off_tried**2).sum(axis=1)
         good = cost_tried < cost
         unknown, off = np.where(good[:, None], tried, unknown), np.where(good[:, None], off_tried, off)
         cost, damping = np.where(good, cost_tried, cost), np.clip(np.where(good, damping / 5.0, damping * 8.0), 1e-6, 1e4)
     return unknown, cost
+
+
+def _slopes(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray:
+    """(7, S, R) changes of the misses with the unknowns; another place moves the whole way alike."""
+    seen, end = _ways(stretches, unknown, ball, _coarsely)
+    here = _misses(stretches, unknown, seen, end)
+    out = []
+    for axis in range(2):
+        shift = _NUDGE[axis] * np.eye(3)[axis]
+        out.append(_misses(stretches, unknown + _NUDGE[axis] * np.eye(7)[axis], seen + shift, end + shift))
+    repeated = stretches.take(np.tile(np.arange(len(unknown)), 5))
+    nudged = np.tile(unknown, (5, 1)) + np.repeat(np.diag(_NUDGE)[2:], len(unknown), axis=0)
+    near = _misses(repeated, nudged, *_ways(repeated, nudged, ball, _coarsely))
+    near = near.reshape(5, len(unknown), -1)
+    return (np.concatenate([np.stack(out), near]) - here) / _NUDGE[:, None, None]
 
 
 def _cropped(stretches: Stretches) -> Stretches:
@@ -205,8 +249,3 @@ def _cropped(stretches: Stretches) -> Stretches:
     rest = {name: getattr(stretches, name) for name in ("seconds", "start", "end", "velocity")}
     return Stretches(**rest, **wide)
 
-
-def _better(one: Launches, other: Launches) -> Launches:
-    left = one.cost <= other.cost
-    both = ((getattr(one, name), getattr(other, name)) for name in ("place", "velocity", "spin"))
-    return Launches(*(np.where(left[:, None], a, b) for a, b in both), np.where(left, one.cost, other.cost))

@@ -8,7 +8,7 @@ search that weighs how the velocity changes against who is near. 4. `who`: one c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ...motion.track import BALL_RADIUS
 from . import cuts as cutting
 from . import kinds, touches, who
 from .ends import BallEnd, ball_ends
+from .flights import flown
 from .path import BallPiece, SolvedPath
 from .samples import Samples, read_samples
 
@@ -120,10 +121,15 @@ def solve(
         if cancelled is not None and cancelled():
             raise Cancelled("solving the ball")
         if progress is not None:
-            progress(number / len(windows), "touches")
+            progress(0.6 * number / len(windows), "touches")
         found.append(_solve_window(samples, window, positions, stranger))
-    path = SolvedPath(tuple(piece for window, cuts in zip(windows, found) for piece in _pieces(samples, window, cuts)))
     solved = _named(samples, found, positions, players, teams, pitch, stranger)
+    curves = [piece for window, cuts in zip(windows, found) for piece in _pieces(samples, window, cuts)]
+    if progress is not None:
+        progress(0.6, "flights")
+    moments = np.array([touch.time for touch in solved])
+    path = SolvedPath(tuple(flown(samples, curves, moments, _has_heights(samples), cancelled)))
+    solved = [_along(touch, path) for touch in solved]
     ends = ball_ends(samples.times, path.at(samples.times), *pitch)
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     sure = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
@@ -231,7 +237,7 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
     order = sorted(range(len(time)), key=lambda k: time[k])
-    known_height = np.isfinite(samples.positions[:, 2]).mean() > _HEIGHTS
+    known_height = _has_heights(samples)
     out = []
     for k in order:
         player = int(chosen[k])
@@ -248,6 +254,16 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
         name = players[player] if player >= 0 else ""
         out.append(SolvedTouch(float(time[k]), float(spread[k]), name, part, kind, centre, before[k], after[k], sure))
     return out
+
+
+def _has_heights(samples: Samples) -> bool:
+    return bool(np.isfinite(samples.positions[samples.used, 2]).mean() > _HEIGHTS)
+
+
+def _along(touch: SolvedTouch, path: SolvedPath) -> SolvedTouch:
+    """The touch with the velocities that the path has just before and after it."""
+    before, after = path.velocity(np.array([touch.time - 1e-4, touch.time + 1e-4]))
+    return replace(touch, before=before, after=after)
 
 
 def _three(values: np.ndarray) -> np.ndarray:

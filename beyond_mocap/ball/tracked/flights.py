@@ -1,0 +1,202 @@
+"""The ways between touches as flights: where one launch explains a stretch's samples, it takes the curves' place."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..batch import courses
+from ..physics import FOOTBALL
+from .fit import LONGEST, Stretches, fit_launches, gathered
+from .path import BallPiece
+from .samples import Samples
+
+STEP = 0.02  # s between the moments in which a flight is kept
+_SHORTEST, _LEAST_WAY = 0.25, 2.5  # s, m, of a stretch worth a flight
+_WELL, _BARELY = 0.1, 0.2  # m root mean square: as good as the samples; not worse than this
+_WORSE = 2.5  # times the curves' own misses, at most
+_FILLED_OFF = 1.2  # m from samples that the feed made
+_TRUSTED = 5.0  # 1/m, the weight of samples that were measured
+_WAVE = 0.4  # s, in which a shift beside the flight may turn
+_SCATTER, _SHIFTED = 0.08, 0.3  # m of samples; m, its usual size
+_END_OFF = 0.5  # m from the place of the next touch
+_HIGH = 0.6  # m, where a foot hardly takes a ball
+_AIR = 0.35  # m of the centre above the ground, from which it flies
+
+
+def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool, cancelled=None) -> list[BallPiece]:
+    """The pieces (in order, without gaps in a window), those between neighbouring `moments` (K,) s of touches replaced by
+    flights where these fit. heights: whether those of the samples are meant."""
+    groups = _between(pieces, moments)
+    groups = [group for group in groups if _worth(group)]
+    if not groups:
+        return pieces
+    spans = [_span(group, heights) for group in groups]
+    stretches = _stretches(samples, spans, heights)
+    flights, offs = _fitted(stretches, spans, cancelled)
+    if not heights and len(high := _from_above(groups, flights, offs)):
+        for number, height in high.items():
+            spans[number][2][2] = height
+        again = list(high)
+        spans_again = [spans[number] for number in again]
+        found = _fitted(_stretches(samples, spans_again, heights), spans_again, cancelled)
+        for number, flight, off in zip(again, *found):
+            flights[number], offs[number] = flight, off
+    return _exchanged(pieces, groups, stretches, flights, offs)
+
+
+def _stretches(samples: Samples, spans, heights: bool) -> Stretches:
+    return gathered(samples.times, _heights(samples, heights), samples.measured, samples.used, spans)
+
+
+def _fitted(stretches: Stretches, spans, cancelled) -> tuple[list[BallPiece], list[tuple]]:
+    return _followed(stretches, fit_launches(stretches, FOOTBALL, cancelled), spans)
+
+
+def _from_above(groups, flights, offs) -> dict[int, float]:
+    """The heights m at which stretches begin whose ball has come flying."""
+    found = {}
+    for number in range(1, len(groups)):
+        together = abs(groups[number - 1][-1].end - groups[number][0].start) < 1e-6
+        height = float(flights[number - 1].positions[-1, 2])
+        if together and height > _HIGH and _fits(groups[number - 1], offs[number - 1]):
+            found[number] = height
+    return found
+
+
+def _exchanged(pieces, groups, stretches, flights, offs) -> list[BallPiece]:
+    """The pieces, each group that a flight fits replaced by it."""
+    index = {id(piece): number for number, piece in enumerate(pieces)}
+    replaced, gone = {}, set()
+    for number, (group, flight, off) in enumerate(zip(groups, flights, offs)):
+        if _fits(group, off):
+            numbers = [index[id(piece)] for piece in group]
+            replaced[numbers[0]] = _brought(flight, stretches, number, _ends(group))
+            gone.update(numbers)
+    return [replaced.get(number, piece) for number, piece in enumerate(pieces) if number not in gone or number in replaced]
+
+
+def _between(pieces: list[BallPiece], moments: np.ndarray) -> list[list[BallPiece]]:
+    """The pieces between each two neighbouring touches, where they follow each other without a gap."""
+    groups: list[list[BallPiece]] = []
+    touched = set(np.round(moments, 6).tolist())
+    open_group: list[BallPiece] | None = None
+    for piece in pieces:
+        if open_group and abs(open_group[-1].end - piece.start) > 1e-6:
+            open_group = None
+        if round(piece.start, 6) in touched:
+            open_group = []
+        if open_group is not None:
+            open_group.append(piece)
+            if round(piece.end, 6) in touched:
+                groups.append(open_group)
+                open_group = None
+    return groups
+
+
+def _worth(group: list[BallPiece]) -> bool:
+    seconds = group[-1].end - group[0].start
+    way = sum(np.linalg.norm(piece.positions[-1, :2] - piece.positions[0, :2]) for piece in group)
+    return _SHORTEST <= seconds <= LONGEST and way >= _LEAST_WAY
+
+
+def _ends(group: list[BallPiece]) -> tuple[np.ndarray, np.ndarray]:
+    """Where the first piece begins and the last ends (3,) m."""
+    return group[0].positions[0], group[-1].positions[-1]
+
+
+def _span(group: list[BallPiece], heights: bool):
+    mask = np.array([1.0, 1.0, 1.0 if heights else np.nan])
+    start, end = _ends(group)
+    return group[0].start, group[-1].end, start * mask, end * mask, group[0].velocities[0] * mask
+
+
+def _heights(samples: Samples, heights: bool) -> np.ndarray:
+    return samples.positions if heights else samples.positions * [1.0, 1.0, np.nan]
+
+
+def _followed(stretches: Stretches, launches, spans) -> tuple[list[BallPiece], list[tuple]]:
+    """The flights as pieces, and how far each is off: (measured root mean square, how many, filled one, end) m."""
+    found, offs = [None] * len(spans), [None] * len(spans)
+    order = np.argsort(stretches.seconds, kind="stable")
+    for low in range(0, len(order), 64):
+        some = order[low : low + 64]
+        grid = np.arange(int(np.ceil(stretches.seconds[some].max() / STEP)) + 1) * STEP
+        places, speeds = courses(launches.place[some], launches.velocity[some], launches.spin[some], FOOTBALL, grid)
+        for row, number in enumerate(some):
+            piece = _piece(grid, places[row], speeds[row], spans[number], launches.spin[number])
+            found[number], offs[number] = piece, _off(piece, stretches, number, spans[number])
+    return found, offs
+
+
+def _piece(grid, places, speeds, span, spin) -> BallPiece:
+    seconds = span[1] - span[0]
+    inside = grid < seconds - 1e-3
+    share = (seconds - grid[inside][-1]) / STEP
+    last = min(np.count_nonzero(inside), len(grid) - 1)
+    end = places[last - 1] + share * (places[last] - places[last - 1])
+    end_speed = speeds[last - 1] + share * (speeds[last] - speeds[last - 1])
+    times = np.append(grid[inside], seconds)
+    places, speeds = np.vstack([places[inside], end]), np.vstack([speeds[inside], end_speed])
+    high = places[:, 2].max() - FOOTBALL.radius
+    return BallPiece(span[0] + times, places, speeds, "flight" if high > _AIR else "roll", spin, np.nan,
+                     span[0] + _bounces(times, places, speeds))  # fmt: skip
+
+
+def _bounces(times, places, speeds) -> np.ndarray:
+    """Seconds at which the velocity turns upward near the ground."""
+    turns = np.flatnonzero((speeds[:-1, 2] < -0.3) & (speeds[1:, 2] > 0.1))
+    falls = np.maximum(places[turns, 2] - FOOTBALL.radius, 0.0) / -speeds[turns, 2]
+    return times[turns] + np.minimum(falls, times[turns + 1] - times[turns])
+
+
+def _off(piece: BallPiece, stretches: Stretches, number: int, span) -> tuple[float, int, float, float]:
+    since, weight = stretches.since[number], stretches.weight[number]
+    at = np.stack([np.interp(since, piece.times - span[0], piece.positions[:, axis]) for axis in range(2)], axis=1)
+    off = np.linalg.norm(at - stretches.points[number, :, :2], axis=1)
+    seen = weight > _TRUSTED
+    made = (weight > 0) & ~seen
+    end = float(np.linalg.norm(piece.positions[-1, :2] - span[3][:2]))
+    return _rms(off[seen]), int(seen.sum()), _rms(off[made]), end
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def _fits(group: list[BallPiece], off: tuple) -> bool:
+    measured, count, made, end = off
+    own = [piece.residual for piece in group if np.isfinite(piece.residual)]
+    limit = np.clip(_WORSE * max(own, default=0.0), _WELL, _BARELY)
+    return measured <= limit and made <= _FILLED_OFF and end <= _END_OFF
+
+
+def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np.ndarray, np.ndarray]) -> BallPiece:
+    """The same with its ends over the ground where the touches are, and what wind, pitch and knuckles did to it: a slow
+    shift over the ground, as far as the measured samples ask for it."""
+    seconds = piece.end - piece.start
+    shift = np.stack([ends[0] - piece.positions[0], ends[1] - piece.positions[-1]])[:, :2]
+    measured = stretches.weight[number] > _TRUSTED
+    since = stretches.since[number][measured]
+    there = np.stack([np.interp(since, piece.times - piece.start, piece.positions[:, axis]) for axis in range(2)], axis=1)
+    waves, _ = _waves(since / seconds, seconds)
+    off = stretches.points[number][measured, :2] - there - waves[:, :2] @ shift
+    slow = waves[:, 2:]
+    size = np.linalg.solve(slow.T @ slow + (_SCATTER / _SHIFTED) ** 2 * np.eye(slow.shape[1]), slow.T @ off)
+    every, slopes = _waves((piece.times - piece.start) / seconds, seconds)
+    both = np.vstack([shift, size])
+    places, speeds = piece.positions.copy(), piece.velocities.copy()
+    places[:, :2] += every @ both
+    speeds[:, :2] += slopes @ both
+    path = np.stack([np.interp(since, piece.times - piece.start, places[:, axis]) for axis in range(2)], axis=1)
+    residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if measured.any() else np.nan
+    return BallPiece(piece.times, places, speeds, piece.kind, piece.spin, residual, piece.bounces)
+
+
+def _waves(share: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2 + W) shapes over a stretch, one beginning at 1, one ending at 1, the others zero at both ends; their slopes
+    in 1/s."""
+    count = int(np.clip(round(seconds / _WAVE), 1, 6))
+    angles = np.pi * np.arange(1, count + 1)
+    values = np.column_stack([1.0 - share, share, np.sin(share[:, None] * angles)])
+    one = np.ones_like(share)
+    return values, np.column_stack([-one, one, angles * np.cos(share[:, None] * angles)]) / seconds
