@@ -63,6 +63,8 @@ def moments(report: Mapping) -> str:
     lines = []
     for number, key in enumerate(report.get("keys", ()), 1):
         text = f"{key['time_s']:.1f} s  {' '.join(key['labels'])}"
+        if key.get("solved_time_s") is not None:
+            text += f", touched at {key['solved_time_s']:.2f} s"
         if key.get("used_instead"):
             text += f", shown as {' '.join(key['used_instead'])}"
         if key.get("clip"):

@@ -17,48 +17,62 @@ _LEAST_HOP = 0.02  # metres; a lower hop is a roll
 
 
 @dataclass(frozen=True, eq=False)
-class Rolls:
-    """Rolls from one place to K others. balls (K, D, 3) m: the ball's centre at frames 1 .. D after it set out; leaves,
-    arrives (K, 2) m/s on the ground; missed (K,) m by which it is too high or too low in the
-    end, or higher on its way than at both."""
+class Speeds:
+    """leaves, arrives (..., 2) m/s on the ground; rolling (...,) s for which the ball rolls before it rests."""
 
-    balls: np.ndarray
     leaves: np.ndarray
     arrives: np.ndarray
+    rolling: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Rolls:
+    """P rolls. balls (P, D, 3) m: the ball's centre at frames 1 .. D after it set out; missed (P,) m by which it is too
+    high or too low in the end, or higher on its way than at both ends."""
+
+    balls: np.ndarray
     missed: np.ndarray
 
 
-def rolls(start: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> Rolls:
-    """From `start` (3,) m to each of `ends` (K, 3) m in `frames` (K,) whole frames.
-
-    On the ground it loses ROLLING all the way, or comes to rest early where it has time. What starts high falls and hops;
-    what ends high is sent up so as to be there.
-    """
-    seconds = frames / fps
-    way = ends[:, :2] - start[:2]
-    length = np.linalg.norm(way, axis=1)
-    along = way / np.maximum(length, 1e-9)[:, None]
+def speeds_of(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> Speeds:
+    """Of a ball that rolls from `starts` to `ends` (..., 3) m within `seconds` (...,): it loses ROLLING all the way, or
+    comes to rest early where it has time."""
+    way = ends[..., :2] - starts[..., :2]
+    length = np.hypot(way[..., 0], way[..., 1])
     rests = length < 0.5 * ROLLING * seconds**2
     fast = np.where(rests, np.sqrt(2.0 * ROLLING * length), length / seconds + 0.5 * ROLLING * seconds)
     rolling = np.where(rests, fast / ROLLING, seconds)
+    along = way / np.maximum(length, 1e-9)[..., None]
+    return Speeds(along * fast[..., None], along * (fast - ROLLING * rolling)[..., None], rolling)
+
+
+def rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> Rolls:
+    """From `starts` to `ends` (P, 3) m in `frames` (P,) whole frames, on the ground; what starts high falls and hops, what
+    ends high is sent up so as to be there."""
+    speeds = speeds_of(starts, ends, frames / fps)
     at = np.arange(1, int(frames.max()) + 1) / fps
-    gone = np.minimum(at[None], rolling[:, None])
+    gone = np.minimum(at, speeds.rolling[:, None])
+    fast = np.hypot(speeds.leaves[:, 0], speeds.leaves[:, 1])
+    along = speeds.leaves / np.maximum(fast, 1e-9)[:, None]
     done = fast[:, None] * gone - 0.5 * ROLLING * gone**2
-    level = start[:2] + done[..., None] * along[:, None]
-    height, missed = _heights(start[2], ends[:, 2], seconds, at)
-    leaves, arrives = along * fast[:, None], along * (fast - ROLLING * rolling)[:, None]
-    return Rolls(np.concatenate([level, height[..., None]], axis=-1), leaves, arrives, missed)
+    height, missed = _heights(starts[:, 2], ends[:, 2], frames / fps, at)
+    level = starts[:, None, :2] + done[..., None] * along[:, None]
+    return Rolls(np.concatenate([level, height[..., None]], axis=-1), missed)
 
 
-def _heights(start: float, ends: np.ndarray, seconds: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights (K, D) m at times `at` (D,) s, and how far (K,) m they are from `ends` (K,) m in the end."""
-    fall, high = _falling(start, at), ends > BALL_RADIUS + _ON_GROUND
-    out = np.broadcast_to(fall, (len(ends), len(at))).copy()
-    for number in np.flatnonzero(high):
-        upward = (ends[number] - start) / seconds[number] + 0.5 * _GRAVITY * seconds[number]
-        out[number] = np.maximum(start + upward * at - 0.5 * _GRAVITY * at**2, BALL_RADIUS)
-    top = np.max(np.where(at < seconds[:, None], out, 0.0), axis=1) - np.maximum(ends, start)
-    return out, np.where(high, np.maximum(top, 0.0), np.abs(np.interp(seconds, at, fall) - ends))
+def _heights(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (P, D) m at times `at` (D,) s, and how far (P,) m they are from `ends` (P,) m in the end."""
+    out, missed = np.full((len(ends), len(at)), BALL_RADIUS), np.zeros(len(ends))
+    for pair in np.flatnonzero(np.maximum(starts, ends) > BALL_RADIUS + _ON_GROUND):
+        start, end, until = starts[pair], ends[pair], seconds[pair]
+        if end > BALL_RADIUS + _ON_GROUND:
+            upward = (end - start) / until + 0.5 * _GRAVITY * until
+            out[pair] = np.maximum(start + upward * at - 0.5 * _GRAVITY * at**2, BALL_RADIUS)
+            missed[pair] = max(out[pair, at < until].max(initial=0.0) - max(start, end), 0.0)
+        else:
+            out[pair] = _falling(start, at)
+            missed[pair] = abs(np.interp(until, at, out[pair]) - end)
+    return out, missed
 
 
 def _falling(start: float, at: np.ndarray) -> np.ndarray:

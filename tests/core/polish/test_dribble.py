@@ -11,7 +11,7 @@ from beyond_mocap.motion.striking import ball_gap, surfaces
 from beyond_mocap.motion.track import BALL_RADIUS
 from beyond_mocap.polish.dribble import dribble
 from beyond_mocap.polish.meeting import lead, led
-from beyond_mocap.polish.roll import ROLLING, rolls
+from beyond_mocap.polish.roll import ROLLING, rolls, speeds_of
 
 FPS = 30.0
 
@@ -109,16 +109,17 @@ def test_without_a_ball_nothing_happens(run):
 def test_a_roll_slows_evenly_and_arrives():
     ends = np.array([[3.0, 1.0, BALL_RADIUS], [0.05, 0.0, BALL_RADIUS]])
     frames = np.array([30, 45])
-    found = rolls(np.array([0.0, 0.0, BALL_RADIUS]), ends, frames, FPS)
+    starts = np.tile([0.0, 0.0, BALL_RADIUS], (2, 1))
+    found, speeds = rolls(starts, ends, frames, FPS), speeds_of(starts, ends, frames / FPS)
     for number, (end, frame) in enumerate(zip(ends, frames)):
         assert np.allclose(found.balls[number, frame - 1], end, atol=1e-9)
-    lost = np.linalg.norm(found.leaves[0]) - np.linalg.norm(found.arrives[0])
+    lost = np.linalg.norm(speeds.leaves[0]) - np.linalg.norm(speeds.arrives[0])
     assert lost == pytest.approx(ROLLING * 1.0)
-    assert np.linalg.norm(found.arrives[1]) == pytest.approx(0.0, abs=1e-9)  # it lies there and waits
+    assert np.linalg.norm(speeds.arrives[1]) == pytest.approx(0.0, abs=1e-9)  # it lies there and waits
 
 
 def test_a_ball_from_the_chest_falls_and_hops():
-    found = rolls(np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0.0, BALL_RADIUS]]), np.array([60]), FPS)
+    found = rolls(np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, BALL_RADIUS]]), np.array([60]), FPS)
     height = found.balls[0, :, 2]
     assert height.min() >= BALL_RADIUS and found.missed[0] == 0.0
     assert np.flatnonzero(height <= BALL_RADIUS + 0.05)[0] / FPS == pytest.approx(np.sqrt(2 * 0.89 / 9.81), abs=0.05)
