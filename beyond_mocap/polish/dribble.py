@@ -47,12 +47,12 @@ def dribble(
 ) -> Dribbled:
     """The ball's path with every stretch of dribbling touched step by step.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion on the pitch, which stays as it is. standing (T, 2) bool: left
-    and right foot on the ground. ball (T, 3) m: its centre, NaN where there is none. stretches: first and last frame of
-    each, fractional. held: the frames, first and last, in which the ball is met at key moments. measured (T,) bool: False
-    where a sample counts for nothing. turns: frames at which the ball is known to change its course outside of the
-    stretches. Frames before and behind the stretches change only where the ball has to come to its first touch or go from
-    its last.
+    root (T, 3) m and rotations (T, J, 4) local: the motion on the pitch, which stays as it is. standing (T, 2) bool:
+    left and right foot on the ground. ball (T, 3) m: its centre, NaN where there is none. stretches: first and last
+    frame of each, fractional. held: the frames, first and last, in which the ball is met at key moments. measured (T,)
+    bool: False where a sample counts for nothing. turns: frames at which the ball is known to change its course outside
+    of the stretches. Frames before and behind the stretches change only where the ball has to come to its first touch
+    or go from its last.
     """
     path, pushes = np.array(ball, dtype=float), []
     measured = np.isfinite(path).all(axis=1) if measured is None else np.asarray(measured, bool)
@@ -67,9 +67,10 @@ def dribble(
             before, after, made = found
             path[part.low + before : part.low + after + 1] = made
             pushes += [Push(p.first + part.low, p.last + part.low, p.side) for p in search.pushes]
-            others = [*(edge for pair in held for edge in pair), *turns, *(p.first for p in pushes), *(p.last for p in pushes)]
+            touched = [*held, *((push.first, push.last) for push in pushes)]
+            others = [*turns, *(edge for pair in touched for edge in pair)]
             path = _joined(path, ball, part, before, after, others, fps)
-            path = _kept_out(skeleton, root, rotations, path, part, [*held, *((p.first, p.last) for p in pushes)], fps)
+            path = _kept_out(skeleton, root, rotations, path, part, touched, fps)
     return Dribbled(path, tuple(sorted(pushes, key=lambda push: push.first)))
 
 
@@ -89,8 +90,8 @@ def _parts(low: float, high: float, held, count: int, fps: float) -> list[Betwee
 
 
 def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[int], fps: float) -> np.ndarray:
-    """The path led to the first touch and away from the last where nothing is met at the part's ends; first and last are
-    counted from its beginning."""
+    """The path led to the first touch and away from the last where nothing is met at the part's ends; first and last
+    are counted from its beginning."""
     first, last = part.low + first, part.low + last
     if not part.starts:
         anchor = max((frame for frame in others if frame < first), default=first - int(fps))
@@ -101,9 +102,11 @@ def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[i
     return path
 
 
-def _kept_out(skeleton, root, rotations, path, part: Between, held: Sequence[tuple[int, int]], fps: float) -> np.ndarray:
-    """The path led around the body on its way; where the ball is `held` it stays. A little further than the part at open
-    ends, so that it does not jump there."""
+def _kept_out(
+    skeleton: Skeleton, root, rotations, path: np.ndarray, part: Between, held: Sequence[tuple[int, int]], fps: float
+) -> np.ndarray:
+    """The path led around the body on its way; where the ball is `held` it stays. A little further than the part at
+    open ends, so that it does not jump there."""
     beyond = int(_BEYOND * fps)
     low = part.low if part.starts else max(part.low - beyond, 0)
     high = part.high if part.ends else min(part.high + beyond, len(path) - 1)

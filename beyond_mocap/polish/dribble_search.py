@@ -29,7 +29,7 @@ _STANDING_STEP = 0.3  # seconds between two touches by a standing foot
 _INSIDE_COST = 60.0  # a metre of ball within the body for a 30th of a second,
 _NEAR, _FIT_COST = 0.25, 3.0  # a metre further than this from its sample for a second,
 _BESIDE, _AHEAD_COST = 0.3, 4.0  # a metre less than this ahead of the pelvis for a second,
-_TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.75, 2.0  # a touch, and a second more than this to the next,
+_TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.7, 4.0  # a touch, and a second more than this to the next,
 _ACROSS_COST, _BACK_COST, _SPEED_COST, _BRAKE_COST = 0.05, 0.3, 0.05, 0.6  # m/s that no foot so moved gives the ball,
 _ANGLE_COST = 0.3  # a radian off straight ahead,
 _STOOD_COST = 0.3  # and a touch by a foot that stands
@@ -52,8 +52,8 @@ class Push:
 
 @dataclass(frozen=True)
 class Between:
-    """A part of a stretch without a key moment inside: frames low .. high; starts, ends: whether the ball is met at that
-    end."""
+    """A part of a stretch without a key moment inside: frames low .. high; starts, ends: whether the ball is met at
+    that end."""
 
     low: int
     high: int
@@ -83,7 +83,8 @@ class Search:
         ahead = self.body.ahead[self.frame]
         c, s = np.cos(_ANGLES[self.angle]), np.sin(_ANGLES[self.angle])
         self.normal = np.column_stack([c * ahead[:, 0] - s * ahead[:, 1], s * ahead[:, 0] + c * ahead[:, 1]])
-        line = [np.where(self.side[:, None] == 0, left[self.frame], right[self.frame]) for left, right in zip(*self.body.lines)]
+        is_left, ends = self.side[:, None] == 0, zip(*self.body.lines)
+        line = [np.where(is_left, left[self.frame], right[self.frame]) for left, right in ends]
         start = line[0] + _ALONG * (line[1] - line[0])
         start[:, 2] = BALL_RADIUS
         radius = self.body.feet[0].radius
@@ -182,14 +183,15 @@ class Search:
         """The cheapest way for the ball to be at this foot: rolled here, or pushed here since a few frames."""
         longest = int(_PUSH_SECONDS * self.fps)
         same = (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
-        since = np.flatnonzero(same & (self.frame <= self.frame[node]) & (self.frame >= self.frame[node] - longest))[::-1]
-        since = since[self.frame[node] - self.frame[since] == np.arange(len(since))]  # without a frame between
+        ago = self.frame[node] - self.frame
+        since = np.flatnonzero(same & (ago >= 0) & (ago <= longest))[::-1]
+        since = since[ago[since] == np.arange(len(since))]  # without a frame between
         costs = self.into[since] + np.cumsum(self.held[since]) + self.touch[node]
         best = int(np.argmin(costs))
         self.out[node], self.pushed[node] = costs[best], since[best]
 
     def _sources(self, frame: int) -> np.ndarray:
-        """The nodes from which the ball may roll so as to be somewhere at a frame: within _LATEST, or the last before."""
+        """The nodes from which the ball may roll so as to be somewhere at a frame: within _LATEST, or the last ones."""
         found = np.array(self.sources, dtype=int)
         since = frame - np.where(found == _START, 0, self.frame[found]) if len(found) else found
         enough = since >= SOONEST * self.fps
@@ -207,10 +209,10 @@ class Search:
         self.arrives[nodes[better]] = arrives[better]
 
     def _cheapest(self, sources: np.ndarray, ends: np.ndarray, frame: int, swing: np.ndarray | None = None):
-        """For each of `ends` (N, 3) m the cost of the cheapest roll there, its source, and its velocity (N, 2) m/s there.
+        """For each of `ends` (N, 3) m the cost of the cheapest roll there, its source, and its velocity (N, 2) m/s.
 
-        What a roll costs beside its way is worked out for all; the way, which only adds to it, for the cheapest, a few at
-        a time, until no other can be cheaper.
+        What a roll costs beside its way is worked out for all; the way, which only adds to it, for the cheapest, a few
+        at a time, until no other can be cheaper.
         """
         starts = np.where((sources == _START)[:, None], self.feed[0], self.place[sources])
         frames = frame - np.where(sources == _START, 0, self.frame[sources])
@@ -238,15 +240,15 @@ class Search:
         return costs, whence, arrives
 
     def _way(self, starts: np.ndarray, ends: np.ndarray, since: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(P,) what it costs that the ball rolls from `starts` to `ends` (P, 3) m in `frames` (P,) from `since` (P,) on."""
+        """(P,) what the ways from `starts` to `ends` (P, 3) m in `frames` (P,) from the frames `since` (P,) on cost."""
         rolled = rolls(starts, ends, frames, self.fps)
         pair, step = np.nonzero(np.arange(1, frames.max() + 1) < frames[:, None])
         passed = self._at(rolled.balls[pair, step], since[pair] + 1 + step)
         return np.bincount(pair, passed, len(frames)) + _HEIGHT_COST * rolled.missed
 
     def _sent(self, sources: np.ndarray, leaves: np.ndarray) -> np.ndarray:
-        """(S, N) what it costs that feet, as they move, send the ball off with `leaves` (S, N, 2) m/s; nothing where the ball
-        was met."""
+        """(S, N) what it costs that feet, as they move, send the ball off with `leaves` (S, N, 2) m/s; nothing where
+        the ball was met."""
         normal = self.normal[sources][:, None]
         change = leaves - self.arrives[self.pushed[sources]][:, None]
         pushed = np.sum(change * normal, axis=-1)

@@ -47,8 +47,8 @@ def speeds_of(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> Spee
 
 
 def rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> Rolls:
-    """From `starts` to `ends` (P, 3) m in `frames` (P,) whole frames, on the ground; what starts high falls and hops, what
-    ends high is sent up so as to be there."""
+    """From `starts` to `ends` (P, 3) m in `frames` (P,) whole frames, on the ground; what starts high falls and hops,
+    what ends high is sent up so as to be there."""
     speeds = speeds_of(starts, ends, frames / fps)
     at = np.arange(1, int(frames.max()) + 1) / fps
     gone = np.minimum(at, speeds.rolling[:, None])
@@ -60,7 +60,7 @@ def rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) 
     return Rolls(np.concatenate([level, height[..., None]], axis=-1), missed)
 
 
-def _heights(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Heights (P, D) m at times `at` (D,) s, and how far (P,) m they are from `ends` (P,) m in the end."""
     out, missed = np.full((len(ends), len(at)), BALL_RADIUS), np.zeros(len(ends))
     for pair in np.flatnonzero(np.maximum(starts, ends) > BALL_RADIUS + _ON_GROUND):
