@@ -232,7 +232,9 @@ class _Reach:
         return MatchWeights(own.speed * asked.speed, own.vector * asked.vectors, own.time * asked.times)
 
     def _example(self, example, part: str, side: str, tool: Tool | None) -> HitMotion:
-        """The strongest hit motion in a stretch of a recording."""
+        """The strongest hit motion in a stretch of a recording, or the one that is given."""
+        if example.hit is not None:
+            return example.hit
         clip = next((clip for clip in self.library.clips if clip.path == example.clip and not clip.mirrored), None)
         if clip is None:
             names = ", ".join(sorted({clip.path for clip in self.library.clips if not clip.made})[:5])

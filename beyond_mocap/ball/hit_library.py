@@ -128,6 +128,11 @@ class HitLibrary:
         return order if side is None else order[self.sides[order] == side]
 
 
+def kind_of(hit: HitMotion) -> str:
+    """Toss, pass or attack, by the greatest speed of the part (§5)."""
+    return KINDS[int(np.searchsorted(_bounds(hit.part), hit.max_speed, "right"))]
+
+
 def turn_for(hit: HitMotion, facing: float, bearing: float, step: float | None = None) -> float:
     """Radians by which a body that faces `facing` turns so that the hit motion sends the ball along `bearing`.
 
@@ -185,12 +190,14 @@ def _names(words, part: str, side: str) -> bool:
 
 
 def _told(clip: Clip, hit: HitMotion) -> bool:
-    """Whether the clip's words call this a touch of the part, or say nothing; words do not know tools and joints."""
+    """Whether the clip's words call this a touch of the part, or say nothing here but elsewhere in the clip; words do not
+    know tools and joints."""
     if hit.part not in ("foot", "head", "chest", "hand"):
         return True
-    rows = [row.words for row in clip.annotations if row.start <= hit.key <= row.end]
+    here = [row.words for row in clip.annotations if row.start <= hit.key <= row.end]
+    rows = here or [row.words for row in clip.annotations]
     juggles = hit.part in ("foot", "head", "chest") and any("juggling" in words for words in rows)
-    return not rows or juggles or any(_names(words, hit.part, hit.side) for words in rows)
+    return juggles or any(_names(words, hit.part, hit.side) for words in rows)
 
 
 _WHOLE = ("first", "last", "high", "key")

@@ -14,7 +14,7 @@ import numpy as np
 from ..library.library import Library
 
 # raised whenever what is worked out or stored changes
-VERSION = 2
+VERSION = 3
 
 
 def load(library: Library, name: str) -> dict[str, np.ndarray] | None:

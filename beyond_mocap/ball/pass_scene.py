@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from ..errors import InputError
 from .contact import Tool
+from .hits import HitMotion
 
 KINDS = ("toss", "pass", "attack")
 SIDES = ("", "left", "right")
@@ -51,11 +52,12 @@ class Player:
 @dataclass(frozen=True)
 class Example:
     """A stretch of a recording that a strike is to be like (eq. 2). clip: path below the library; start, end: s, end
-    None: as long as it is."""
+    None: as long as it is. hit: the hit motion itself, where it comes from elsewhere, such as a live stream."""
 
     clip: str
     start: float = 0.0
     end: float | None = None
+    hit: HitMotion | None = None
 
 
 @dataclass(frozen=True)
