@@ -29,7 +29,7 @@ MOST_MISS, PER_TRAVEL = 4.0, 0.8
 IN_THE_WAY, PERSON, TALL = 6.0, 0.45, 1.9
 """What it costs to fly through the middle of somebody, his radius with room around him and his height in m."""
 
-THROUGH = 0.5 * IN_THE_WAY
+THROUGH = 0.35 * IN_THE_WAY
 """What it costs at least where a ball meets the body itself."""
 
 PUSHED = 2.0
@@ -38,8 +38,15 @@ PUSHED = 2.0
 RISES_STILL, PER_RISE = 1.0, 0.5
 """m/s upward with which a ball may still come in, and what each more costs: it has bounced a moment ago."""
 
+OWN_BODY, TRUNK, TRUNK_FROM = 8.0, 0.22, 0.8
+"""What it costs to go through the middle of a trunk, its radius and lower end in m."""
+
+TRUNK_TO = {"head": 1.35, "chest": 0.0}
+UPRIGHT = 1.7
+"""Metres up to which a ball stays clear of the body of who strikes it, by what he strikes with, else UPRIGHT."""
+
 A_MOMENT = 1e-3
-_STEPS = 24
+_STEPS = 30
 
 
 def cost_of_moments(
@@ -95,6 +102,17 @@ def out_of_the_way(
     low = np.minimum(ways[:, :-1, 2], ways[:, 1:, 2])[..., None] < TALL
     inside = np.where(low, np.maximum(PERSON - near, 0.0) / PERSON, 0.0)
     return IN_THE_WAY * inside.max(axis=1)
+
+
+def through_bodies(
+    starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball, places: np.ndarray, tall: float
+) -> np.ndarray:
+    """(N,): what it costs that flights go through the trunks, up to `tall` m, of who gives and who receives, at `places`
+    (P, 2) m."""
+    ways = ways_of(starts, velocities, seconds, ball)[:, :, None]
+    near = np.linalg.norm(ways[..., :2] - places, axis=-1) - ball.radius
+    inside = (ways[..., 2] > TRUNK_FROM) & (ways[..., 2] < tall + ball.radius)
+    return OWN_BODY * np.where(inside, np.clip((TRUNK - near) / TRUNK, 0.0, 1.0), 0.0).max(axis=(1, 2))
 
 
 def arrivals(starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball) -> np.ndarray:

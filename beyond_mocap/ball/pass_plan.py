@@ -20,7 +20,10 @@ from .batch import courses
 from .contact import Tool, in_world
 from .flight import Flight, Launch, fly
 from .orders import HitOrder, Stance
-from .pass_costs import THROUGH, TIMES, against_the_part, arrivals, clears_net, cost_of_moments, lasting, misses, out_of_the_way, rising, wished
+from .pass_costs import (
+    THROUGH, TIMES, TRUNK_TO, UPRIGHT, against_the_part, arrivals, clears_net, cost_of_moments, lasting, misses,
+    out_of_the_way, rising, through_bodies, wished,
+)  # fmt: skip
 from .pass_scene import GROUND, Net, Pass, PassScene, served_by
 from .physics import FASTEST, Ball
 from .strike_moments import StrikeMoments, launched_from
@@ -42,7 +45,7 @@ LIES = 0.2
 BESIDE = 0.45
 """Metres by which a missed ball goes past the part."""
 
-LIMP = {"received": (0.6, 0.0), "dropped": (0.9, 0.5)}
+LIMP = {"received": (0.9, 0.4), "dropped": (1.1, 0.9)}
 """m/s ahead and up with which a ball goes that was stopped, or that slipped off."""
 
 ROUNDS, LONGER = 5, 6
@@ -254,7 +257,7 @@ class _Planner:
         toward, kind = self._toward(number), "toss" if site.kind == "receive" else site.kind
         moments = self._possible(number, site)
         velocity = moments.struck.velocity
-        natural_way = np.arctan2(velocity[:, 1], velocity[:, 0])
+        natural_way = np.arctan2(velocity[:, 1], velocity[:, 0]) * (site.asked is not None)  # a trap gives way
         bearing = np.arctan2(*(toward[:2] - site.place)[::-1])
         turned = (bearing - natural_way)[:, None] + TURNS
         if self.scene.directions:
@@ -307,6 +310,9 @@ class _Planner:
         cost = options.cost[every[which]] + np.linalg.norm(aimed.velocity[which] - natural[every[which]], axis=1)
         flights = (starts[every[which]], aimed.velocity[which], times[which])
         cost += self._in_the_way(number, *flights).max(axis=1, initial=0.0)
+        for near in (site, self.sites[number + 1]):
+            tall = near.size * TRUNK_TO.get(near.part, UPRIGHT)
+            cost += through_bodies(*flights, self.ball, near.place[None], tall)
         arriving = arrivals(*flights, self.ball)
         cost += against_the_part(arriving, after.velocity, self._pushes(number + 1, after))
         cost += rising(arriving) + lasting(times[which], site.kind)

@@ -1,0 +1,160 @@
+"""A whole passing scene: bodies, ball, files; and one line for what is wrong."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from beyond_mocap.__main__ import main
+from beyond_mocap.ball.contact import striking_surface
+from beyond_mocap.ball.sample_scenes import SAMPLES
+from beyond_mocap.commands.told import Told
+from beyond_mocap.errors import Cancelled
+from beyond_mocap.files import bvh
+from beyond_mocap.files.scene_json import parse_scene
+from beyond_mocap.files.tables import read_ball, read_provenance
+from beyond_mocap.motion.humanoid import stature
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.striking import ball_gap
+from beyond_mocap.passes import ball_of, passes
+
+TALL = {
+    "players": [{"name": "Ann", "place": [0, 0], "height": 1.5}, {"name": "Ben", "place": [4, 0], "height": 2.0}],
+    "passes": [{"from": "Ann", "to": "Ben"}, {"from": "Ben", "to": "Ann", "at": [0.5, 1.2]}],
+}
+
+
+@pytest.fixture(scope="module")
+def played(strikes_library):
+    """played(name) -> Passes of a sample or of TALL, each made once."""
+    kept = {}
+
+    def play(name):
+        if name not in kept:
+            said = TALL if name == "tall" else json.loads(json.dumps(SAMPLES[name]))
+            kept[name] = passes(strikes_library, parse_scene(said))
+        return kept[name]
+
+    return play
+
+
+@pytest.mark.parametrize("name", ["dropped", "racquet", "tall"])
+def test_every_strike_meets_the_ball(played, name):
+    """The part's surface in the motion as it is written touches the ball's, within 5 mm."""
+    whole = played(name)
+    radius = ball_of(whole.scene).radius
+    for player in whole.players:
+        motion = player.take.motion
+        places, world = forward_kinematics(motion)
+        for order in whole.plan.orders(player.name):
+            frame = int(round(order.time * whole.plan.fps))
+            surface = striking_surface(motion.skeleton, order.part, order.side, order.tool)
+            gap = ball_gap(surface.line(places[frame], world[frame]), surface.radius, whole.ball.positions[frame], radius)
+            assert abs(gap) < (0.005 if name != "tall" else 0.01)
+    assert max(whole.gap(number) for number in range(len(whole.plan.strikes))) < 0.005
+    assert whole.warnings == ()
+
+
+def test_everybody_is_there_for_the_whole_scene(played):
+    whole = played("dropped")
+    assert [player.name for player in whole.players] == ["Ann", "Ben", "Cho"]
+    assert {len(player.take.motion) for player in whole.players} == {len(whole.ball.times)}
+    for player, asked in zip(whole.players, whole.scene.players):
+        way = player.take.motion.root_positions[:, :2] - asked.place
+        assert np.linalg.norm(way[0]) < 0.1 and np.linalg.norm(way, axis=1).max() < 1.0
+
+
+def test_players_of_their_own_height(played):
+    whole = played("tall")
+    sizes = [stature(player.take.motion.skeleton) for player in whole.players]
+    assert np.allclose(sizes, [1.5, 2.0], atol=0.02)
+
+
+def test_who_is_to_meet_it_elsewhere_goes_there(played):
+    whole = played("tall")
+    last = whole.plan.strikes[-1].order
+    frame = int(round(last.time * whole.plan.fps))
+    assert np.allclose(whole.players[0].take.motion.root_positions[frame, :2], [0.5, 1.2], atol=0.1)
+
+
+def test_the_same_bits(played, strikes_library):
+    again = passes(strikes_library, parse_scene(json.loads(json.dumps(SAMPLES["dropped"]))))
+    for one, other in zip(played("dropped").players, again.players):
+        assert one.take.motion.rotations.tobytes() == other.take.motion.rotations.tobytes()
+    assert played("dropped").ball.positions.tobytes() == again.ball.positions.tobytes()
+
+
+def test_progress_goes_up_and_work_can_be_stopped(strikes_library):
+    shares = []
+
+    def stop():
+        return bool(shares) and shares[-1] > 0.4
+
+    with pytest.raises(Cancelled):
+        passes(strikes_library, parse_scene(SAMPLES["dropped"]), lambda share, text: shares.append(share), stop)
+    assert shares == sorted(shares) and shares[-1] < 0.9
+
+
+# -- the verb
+
+
+@pytest.fixture
+def run(capfd, tmp_path, strikes_library):
+    """run(scene, *more, library=...) -> status, standard output, lines on standard error."""
+    strikes, kept = strikes_library.folder, strikes_library.kept[0]
+
+    def call(scene, *more, out="out", library=strikes):
+        capfd.readouterr()
+        (tmp_path / "scene.json").write_text(scene if isinstance(scene, str) else json.dumps(scene))
+        words = ("passes", tmp_path / "scene.json", "--library", library, "--out", tmp_path / out, "--cache", kept, *more)
+        status = main([str(word) for word in words])
+        said, error = capfd.readouterr()
+        return status, said, error.splitlines()
+
+    return call
+
+
+def test_what_is_written(run, tmp_path):
+    status, said, error = run({**SAMPLES["dropped"], "passes": SAMPLES["dropped"]["passes"][3:]}, "--json")
+    assert status == 0 and "3 players, 2 strikes" in said
+    assert [json.loads(line) for line in error][-1]["progress"] > 0.9
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    names = [f"{name}{end}" for name in ("Ann", "Ben", "Cho") for end in (".bvh", ".provenance.csv")]
+    assert files == sorted([*names, "ball.csv", "strikes.csv", "scene.report.json"])
+    ball, report = read_ball(tmp_path / "out" / "ball.csv"), json.loads((tmp_path / "out" / "scene.report.json").read_text())
+    rows = list(csv.DictReader((tmp_path / "out" / "strikes.csv").open()))
+    assert [row["outcome"] for row in rows] == ["struck", "dropped"] == [one["outcome"] for one in report["strikes"]]
+    assert len(ball.times) == report["frames"] == len(bvh.read(tmp_path / "out" / "Ann.bvh").motion)
+    assert len(read_provenance(tmp_path / "out" / "Cho.provenance.csv")) == report["frames"]
+    frame = int(rows[0]["frame"])
+    assert np.allclose(ball.positions[frame], [float(rows[0][axis]) for axis in ("x_m", "y_m", "z_m")], atol=1e-3)
+    assert float(rows[0]["contact_gap_m"]) < 0.005 and report["players"][0]["skate"]
+
+
+@pytest.mark.parametrize("change, word", [
+    ({"players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [0, 0.1]}]}, "0.5 m or more"),
+    ({"passes": [{"from": "Ann", "to": "Ann"}]}, "to himself"),
+    ({"passes": [{"from": "Ann", "to": "Ben", "seconds": -1}]}, "from 0.2 to 10"),
+    ({"passes": [{"from": "Ann", "to": "Ben", "part": "Tail"}]}, "lacks"),
+    ({"passes": [{"from": "Ann", "to": "Ben", "seconds": 0.2, "bounces": 0}],
+      "players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [60, 0]}]}, "up to 38 m/s"),
+    ({"ball": "cannon"}, "one of paper"),
+    ({"passes": [{"from": "Ann", "to": "Ben", "example": {"clip": "none.bvh"}}]}, "no recording"),
+])
+def test_fouls_are_one_line_and_nothing_is_written(run, tmp_path, change, word):
+    status, said, error = run({**SAMPLES["dropped"], **change})
+    assert status == 2 and said == "" and len(error) == 1 and word in error[0] and "scene.json" in error[0]
+    assert not (tmp_path / "out").exists()
+
+
+def test_other_fouls(run, tmp_path, clips_folder, monkeypatch):
+    assert run("{")[0] == 2
+    assert run(SAMPLES["three"], library=tmp_path / "none")[0] == 2
+    assert run(SAMPLES["three"], out="scene.json")[0] == 2
+    assert run(SAMPLES["three"], out="no/such/place")[0] == 2
+    status, _, error = run({**SAMPLES["three"], "defaults": {"part": "chest"}}, library=clips_folder)
+    assert status == 3 and len(error) == 1 and "chest" in error[0]
+    monkeypatch.setattr(Told, "cancelled", lambda self: True)
+    assert run(SAMPLES["three"])[0] == 130
+    assert not (tmp_path / "out").exists()
