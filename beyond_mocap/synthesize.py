@@ -94,7 +94,9 @@ def synthesize(
 
 
 def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
+    begun = time.perf_counter()
     known = in_force(asked)
+    solving = {} if known.solved is None else {"solve": time.perf_counter() - begun}
     plan = in_library_size(known, size_of(asked, library.skeleton))
     recordings, library = library, with_made_gaits(library, plan, report)
     clock = [time.perf_counter()]
@@ -118,7 +120,7 @@ def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurr
     take = _take(library, plan, order, track, edit, footage, keys, planted, taken)
     clock.append(time.perf_counter())
     report(1.0, "Done")
-    seconds = dict(zip(("search", "construct", "polish"), np.diff(clock).tolist()))
+    seconds = {**dict(zip(("search", "construct", "polish"), np.diff(clock).tolist())), **solving}
     return finished(replace(take, seconds=seconds), asked, known, recordings, order, found.hurried)
 
 
@@ -226,8 +228,11 @@ def finished(
 ) -> Take:
     """A take out of the library's size in the player's, with its pins, its ball and its warnings. plan: `asked` as it is
     in force; before: the finished take that it is an edit of."""
-    take = in_own_size(take, size_of(asked, recordings.skeleton), asked, before)
-    take = with_course(with_pins(take, recordings), plan)
+    take = with_pins(in_own_size(take, size_of(asked, recordings.skeleton), asked, before), recordings)
+    begun = time.perf_counter()
+    take = with_course(take, plan)
+    if plan.solved is not None:
+        take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - begun})
     return with_warnings(take, recordings, order, hurried, untouched(plan))
 
 

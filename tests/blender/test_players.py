@@ -110,9 +110,11 @@ def test_what_the_panel_lets_one_set_is_what_the_plan_asks(extension, ready, cor
         assert getattr(plain, name) == pytest.approx(getattr(planned, name))
         setattr(ready, name, value)
     ready.made, ready.gaits = False, "walking = walk.bvh; jogging=jog.bvh;"
+    assert not plain.solve_touches
+    ready.solve_touches = True
     plan = plans.plan_of(ready, player)[0]
     assert {name: getattr(plan, name) for name in numbers} == pytest.approx(numbers)
-    assert plain.made and not plan.made and plan.gaits == (("walking", "walk.bvh"), ("jogging", "jog.bvh"))
+    assert plain.made and not plan.made and plan.solve_touches and plan.gaits == (("walking", "walk.bvh"), ("jogging", "jog.bvh"))
     ready.gaits = "walking"
     with pytest.raises(RuntimeError, match="WORD=CLIP"):
         bpy.ops.beyond_mocap.synthesize()
@@ -180,6 +182,32 @@ def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, 
     same = np.all(before[0].take.motion.rotations == after[0].take.motion.rotations, axis=(1, 2))
     assert same[: 2 * 30].all() and same[10 * 30 :].all() and not same.all()
     assert np.array_equal(before[1].take.motion.rotations, after[1].take.motion.rotations)
+
+
+def test_solved_touches_come_out_as_the_core_has_them(extension, ready, match, core, session):
+    """A ball that is kicked at 6.13 s, asked for at 6.0 s: played, shown in the quality's line, and made anew by Update."""
+    rows = [line.split(",") for line in (match / "player1.csv").read_text().splitlines()[1:]]
+    since = np.array([float(row[0]) for row in rows]) - 6.13
+    place = [np.interp(0.0, since, [float(row[axis]) for row in rows]) for axis in (1, 2)]
+    ball = np.array(place) + [0.5, 0.0] + np.where(since < 0, -3.0, 12.0)[:, None] * since[:, None] * [1.0, 0.1]
+    lines = [",".join((*row[:3], f"{x:.3f}", f"{y:.3f}", "0.11")) for row, (x, y) in zip(rows, ball)]
+    text = "\n".join(["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m", *lines])
+    (match / "player1.csv").write_text(text + "\n")
+    ready.players[1].use, ready.solve_touches = False, True
+    assert_one_step(bpy.ops.beyond_mocap.synthesize)
+    player = bpy.context.scene.beyond_mocap.players[0]
+    made = session.made(player.take)
+    key, = made.report["keys"]
+    assert key["time_s"] == 6.0 and key["solved_time_s"] == pytest.approx(6.13, abs=0.03)
+    assert key["contact_gap_m"] < 0.005 and f"touched at {key['solved_time_s']:.2f} s" in player.moments
+    built = session.library(bpy.context.scene.beyond_mocap.library_folder, None)
+    again = core("synthesize").synthesize(built, made.plan)
+    assert np.array_equal(made.take.motion.rotations, again.motion.rotations)
+    assert np.array_equal(made.take.ball.positions, again.ball.positions)
+    bpy.context.scene.beyond_mocap.solve_touches = False
+    bpy.ops.beyond_mocap.update()
+    plain = session.made(bpy.context.scene.beyond_mocap.players[0].take)
+    assert plain.report["keys"][0]["solved_time_s"] is None
 
 
 def test_accepting_again_replaces_the_take_only(extension, ready, session):
