@@ -58,10 +58,10 @@ panel, and markers on its action. A ball was never seen: the marked frame is the
                     f"above {found.threshold:.2f} m")
 
 
-class BEYOND_MOCAP_OT_go_to_hit(HitVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_go_to_strike(Verb, bpy.types.Operator):
     """Go to the frame of this strike"""
 
-    bl_idname = "beyond_mocap.go_to_hit"
+    bl_idname = "beyond_mocap.go_to_strike"
     bl_label = "Go to Strike"
 
     frame: IntProperty(name="Frame", options={"SKIP_SAVE"}, description="Scene frame to go to")

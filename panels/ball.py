@@ -109,8 +109,26 @@ def passing(panel, layout, context) -> None:
     lists(layout, "passes", settings, "passes", "active_pass", "passes_list")
     if one := active_row(settings.passes, settings.active_pass):
         of_pass(layout, settings, one)
+    row = layout.row(align=True)
+    row.scale_y = 1.3
+    row.operator("beyond_mocap.passes_make", icon="PLAY")
+    row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
+    row.operator("beyond_mocap.passes_clear", text="", icon="X")
+    panel.progress(context, "passes")
+    for line in settings.told.splitlines():
+        paragraph(layout, line, "INFO")
+    if settings.strikes:
+        section(layout, "strikes", "Strikes", lambda opened: strikes(opened, settings))
     section(layout, "choices", "Choices", lambda opened: choices(opened, settings))
     section(layout, "ball", "Ball & Air", lambda opened: of_ball(opened, settings))
+
+
+def strikes(layout, settings) -> None:
+    """Figures, and a line for each strike that goes there."""
+    table(layout, settings.figures.splitlines())
+    column = layout.column(align=True)
+    for frame, text in told_lines(settings.strikes):
+        column.operator("beyond_mocap.go_to_strike", text=f"{frame}  {text}", icon="KEYTYPE_KEYFRAME_VEC").frame = frame
 
 
 def of_player(layout, player) -> None:
@@ -212,7 +230,7 @@ def hits(layout, context) -> None:
         width = context.region.width / context.preferences.system.ui_scale - 2.5 * LINE
         layout.template_icon(icon, scale=max(6.0, min(width / LINE, 16.0)))
     for frame, text in told_lines(found.lines):
-        layout.operator("beyond_mocap.go_to_hit", text=f"{frame}: {text}", icon="KEYTYPE_EXTREME_VEC").frame = frame
+        layout.operator("beyond_mocap.go_to_strike", text=f"{frame}: {text}", icon="KEYTYPE_EXTREME_VEC").frame = frame
     if not found.lines:
         paragraph(layout, "No strike found: try the other side, another part or a threshold", "INFO")
 

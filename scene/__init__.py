@@ -38,6 +38,7 @@ from . import (
     session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
 from .passes import hits_shown
+from .passes import live as passes_live
 from .passes import settings as passes
 from .ride import live as ride_live
 from .ride import measure as ride_measure
@@ -107,12 +108,14 @@ def register():
     hits_shown.register()
     receiver.register()
     stream_follow.register()
+    passes_live.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
     stream_follow.unregister()
     receiver.unregister()
+    passes_live.unregister()
     hits_shown.unregister()
     ride_measure.unregister()
     ride_live.unregister()

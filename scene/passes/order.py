@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.ball.contact import Tool
-from ...beyond_mocap.ball.pass_scene import GROUND, BallChoice, Example, Net, Pass, PassScene, Player, Weights
+from ...beyond_mocap.ball.pass_scene import GROUND, LIMITS, BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ...beyond_mocap.errors import InputError
 from .. import bake
-from ..measure import units_per_metre
+from ..measure import frames_per_second, units_per_metre
 from .settings import KEPT, BeyondMocapPasser, BeyondMocapPasses
 
 SIZE = 0.5  # metres
@@ -26,7 +26,7 @@ def scene_of(scene: bpy.types.Scene) -> PassScene:
     return PassScene(
         tuple(_player(scene, one) for one in settings.players),
         tuple(_pass(scene, one) for one in settings.passes),
-        settings.repeat, _exact(settings.rate), settings.seed,
+        settings.repeat, _rate(scene), settings.seed,
         BallChoice(settings.ball, {name: _exact(getattr(settings, name)) for name in NUMBERS} if settings.own else {}),
         Net(_place(settings.net_from), _place(settings.net_to), _exact(settings.net_height)) if settings.net else None,
         _serve(settings), *(_exact(getattr(settings, name)) for name in ("missed", "dropped", "transition", "lead_in", "lead_out")),
@@ -114,6 +114,11 @@ def _pass(scene, row) -> Pass:
     )  # fmt: skip
 
 
+def _rate(scene) -> float:
+    """Frames per second: as set, or the scene's own, so that strikes fall on its frames."""
+    return _exact(scene.beyond_mocap_passes.rate) or min(max(frames_per_second(scene), LIMITS["fps"][0]), LIMITS["fps"][1])
+
+
 def _serve(settings):
     place = tuple(_exact(value) for value in settings.serve_at)
     return {"USUAL": None, "GROUND": GROUND, "PLAYER": settings.serve, "PLACE": place}[settings.serve_from]
@@ -157,7 +162,8 @@ def _fill_scene(settings: BeyondMocapPasses, wanted: PassScene) -> None:
     settings.net = wanted.net is not None
     if wanted.net is not None:
         settings.net_from, settings.net_to, settings.net_height = wanted.net.start, wanted.net.end, wanted.net.height
-    settings.repeat, settings.rate, settings.turns = wanted.repeat, wanted.fps, wanted.directions == 8
+    settings.repeat, settings.turns = wanted.repeat, wanted.directions == 8
+    settings.rate = 0.0 if wanted.fps == PassScene.fps else wanted.fps
     settings.seed, settings.watch = max(0, wanted.seed), wanted.watch
     for name in ("missed", "dropped", "transition", "lead_in", "lead_out"):
         setattr(settings, name, getattr(wanted, name))

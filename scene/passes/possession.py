@@ -103,6 +103,17 @@ def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     _write(ball, frames, own, lets_go)
 
 
+def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
+    """Let `write()` give the ball another action of its own; who carries it carries it on its new way."""
+    own = ball.beyond_mocap_ball
+    if own.before.kept:
+        bring_back(own.before, ball, KEPT)
+    write()
+    if len(own.holds):
+        put_aside(own.before, ball)
+        rebuild(scene, ball)
+
+
 def own_way(scene: bpy.types.Scene, ball: bpy.types.Object, holds) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
     """Frames (F,), the ball's own place on each, and the first and last frame on which its own action has a key; None
     where it has none."""

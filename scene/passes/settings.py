@@ -287,8 +287,8 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
         description="Seconds after the last strike",
     )
     rate: FloatProperty(
-        name="Frame Rate", default=30.0, min=10.0, max=240.0, update=touch_live,
-        description="Frames per second that are worked out; the scene keeps its own rate",
+        name="Frame Rate", default=0.0, min=0.0, max=240.0, update=touch_live,
+        description="Frames per second that are worked out, on which strikes fall; 0: the scene's own",
     )
     transition: FloatProperty(
         name="Transition", default=0.4, min=0.1, max=2.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,

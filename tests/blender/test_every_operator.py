@@ -227,7 +227,7 @@ ROWS = {
     "export_motion": Row("accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
     "free_ball": Row("accepted", prepare=carry),
-    "go_to_hit": Row("accepted", lambda places: {"frame": 7}, analyse),
+    "go_to_strike": Row("accepted", lambda places: {"frame": 7}, analyse),
     "go_to_moment": Row("imported", lambda places: {"strip": "Moments", "index": 0}),
     "hit_analysis": Row("accepted"),
     "import_clip": Row("imported", prepare=list_clips),

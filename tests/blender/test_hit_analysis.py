@@ -57,7 +57,7 @@ def test_again_replaces_its_own_markers_and_no_others(body):
 def test_each_is_one_step_of_undo(body):
     assert_one_step(bpy.ops.beyond_mocap.hit_analysis)
     line = bpy.context.object.beyond_mocap_hits.lines
-    assert_one_step(bpy.ops.beyond_mocap.go_to_hit, frame=int(line.partition("\t")[0]))
+    assert_one_step(bpy.ops.beyond_mocap.go_to_strike, frame=int(line.partition("\t")[0]))
     assert_one_step(bpy.ops.beyond_mocap.clear_hits)
 
 

@@ -1,0 +1,246 @@
+"""A passing scene is made: written down on the main thread, worked out in any thread, laid on bodies and a ball."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...beyond_mocap.ball.pass_scene import Net, PassScene
+from ...beyond_mocap.errors import InputError
+from .. import action, armature, bake, ball, body, channels, linked, preferences, session
+from ..measure import frames_per_second, units_per_metre
+from ..ride import riders
+from ..set_aside import bring_back, drop, put_aside
+from ..settings import absolute
+from . import order as asked
+from . import possession
+from .settings import KEPT, BeyondMocapPasser
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.passes import Passes
+
+BALL, NET = "Passing Ball", "Net"
+MESH = 0.1  # metres between two threads of the net
+MOST_LINES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What is to be made. scene; the library, or where it is and how it is built; digest of all that."""
+
+    scene: PassScene
+    folder: str
+    unit: float | None
+    library: "Library | None"
+    digest: str
+    build: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of an order."""
+
+    order: Order
+    library: "Library"
+    passes: "Passes"
+
+
+def order_of(scene: bpy.types.Scene) -> Order:
+    """What the settings ask for; InputError where that makes no sense, or where a body cannot be animated."""
+    settings, common = scene.beyond_mocap_passes, scene.beyond_mocap
+    wanted = asked.scene_of(scene)
+    folder = absolute(settings.library_folder or common.library_folder)
+    if not folder:
+        raise InputError("library", "no folder chosen", "a folder of clips with strikes, such as sample_blend/passes/library",
+                         "choose one under Choices, or in step 1")
+    for row in settings.players:
+        _check(row)
+    linked.refuse(settings.rally)
+    unit = (common.library_unit or None) if not settings.library_folder else None
+    parts = repr((wanted, folder, unit, settings.start_frame)).encode()
+    digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
+    return Order(wanted, folder, unit, session.library(folder, unit), digest, preferences.for_build(folder))
+
+
+def work(order: Order, progress, cancelled, _hurry) -> Result:
+    """Build the library where it is not there yet, and play the scene. Never touches bpy."""
+    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.passes import passes
+
+    library = order.library
+    if library is None:
+        library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    return Result(order, library, passes(library, order.scene, progress, cancelled))
+
+
+def show(scene: bpy.types.Scene, result: Result) -> None:
+    """Lay the scene on its bodies and its ball, which are made where there are none."""
+    settings, made = scene.beyond_mocap_passes, result.passes
+    session.keep_library(result.library, result.order.unit)
+    rows = {row.name: row for row in settings.players}
+    told = [line for one in made.players for line in riders.leave(rows[one.name].body)]
+    start = float(settings.start_frame)
+    for one in made.players:
+        _body(scene, rows[one.name], one.take, start)
+    _ball(scene, made, start)
+    _net(scene, result.order.scene.net)
+    bake.lengthen(scene, start + made.plan.seconds * frames_per_second(scene))
+    settings.made_of = result.order.digest
+    settings.strikes = "\n".join(strike_lines(scene, made, start))
+    settings.figures = "\n".join(figures(made))
+    settings.told = "\n".join(list(dict.fromkeys([*told, *made.warnings]))[:MOST_LINES])
+
+
+def clear(scene: bpy.types.Scene) -> None:
+    """Take away what was made for the scene: bodies, ball, net; bodies of the user's play their own motion again. The lists
+    stay."""
+    settings = scene.beyond_mocap_passes
+    for row in settings.players:
+        if row.body is not None:
+            _check(row)
+    for row in settings.players:
+        if row.body is not None and row.body.get(KEPT):
+            remove(row.body)
+        elif row.body is not None and row.before.kept:
+            bring_back(row.before, row.body, KEPT)
+        drop(row.before, KEPT)
+    if settings.rally is not None and settings.rally.get(KEPT):
+        remove(settings.rally)
+    elif settings.rally is not None and settings.ball_before.kept:
+        bring_back(settings.ball_before, settings.rally, KEPT)
+    drop(settings.ball_before, KEPT)
+    if (net := _own_net(scene)) is not None:
+        remove(net)
+    for name in ("made_of", "strikes", "figures", "told"):
+        settings.property_unset(name)
+
+
+def strike_lines(scene: bpy.types.Scene, made: "Passes", start: float) -> list[str]:
+    """A line for each strike: its scene frame, a tab, what is done."""
+    found = []
+    for number, one in enumerate(made.plan.strikes):
+        frame = round(start + one.order.time * frames_per_second(scene))
+        gap, speed = made.gap(number), np.linalg.norm(one.velocity_out)
+        near = "" if np.isnan(gap) else f", {1000 * gap:.0f} mm"
+        side = f"{one.order.side} " if one.order.side else ""
+        found.append(f"{frame}\t{one.player}: {side}{one.order.part}, {one.outcome}, {speed:.1f} m/s{near}")
+    return found
+
+
+def figures(made: "Passes") -> list[str]:
+    """Lines "name: value" about the scene."""
+    gaps = [gap for one in made.players for gap in one.gaps if not np.isnan(gap)]
+    speeds = [float(np.linalg.norm(one.velocity_out)) for one in made.plan.strikes]
+    return [
+        f"Strikes: {len(made.plan.strikes)}", f"Length: {made.plan.seconds:.1f} s",
+        f"Off the ball: {1000 * max(gaps, default=0.0):.1f} mm", f"Fastest ball: {max(speeds, default=0.0):.1f} m/s",
+        f"Flights: {sum(one.travel for one in made.plan.strikes):.1f} s",
+    ]
+
+
+def remove(thing: bpy.types.Object) -> None:
+    """Take an object of ours out of the file, with what hangs on it that is ours, its data and its action."""
+    for child in [child for child in thing.children if child.get(KEPT)]:
+        remove(child)
+    if thing.children or thing.library is not None:  # the user has tied things to it
+        return
+    channels.discard(thing, KEPT)
+    data = thing.data
+    bpy.data.objects.remove(thing)
+    if data is not None and not data.users:
+        bpy.data.batch_remove([data])
+
+
+def _check(row: BeyondMocapPasser) -> None:
+    """InputError where a player's body cannot be animated."""
+    target = row.body
+    if target is None:
+        return
+    linked.refuse(target)
+    channels.check_free(target)
+    override = target.override_library
+    if override is not None and override.is_system_override:
+        raise InputError(f"body {target.name}", "an override that cannot be edited", "an editable override",
+                         "make it editable: Outliner, Library Override, Make")
+
+
+def _body(scene, row: BeyondMocapPasser, take, start: float) -> None:
+    """One player's motion on his body, which is made, dressed or made anew where it does not fit."""
+    target, room = row.body, bake.collection(scene)
+    if target is not None and not bake.fits(target, take, scene):
+        if target.get(KEPT):
+            remove(target)
+        elif row.before.kept:
+            bring_back(row.before, target, KEPT)
+        target = None
+    if target is None:
+        target = armature.create(bpy.context, take.motion.skeleton, row.name, room)
+        target[KEPT] = True
+        dressed = body.create(target, row.name, tuple(row.shirt), room, scene, take.motion)
+        dressed[KEPT] = True
+        row.body = target
+    elif not target.get(KEPT) and not row.before.kept:
+        put_aside(row.before, target)
+    channels.discard(target, KEPT)
+    first = start + take.start_time * frames_per_second(scene)
+    action.write(target, take.motion, scene, first, f"{row.name} passes", generated=True)[KEPT] = True
+
+
+def _ball(scene, made: "Passes", start: float) -> None:
+    """The ball's way on the ball."""
+    settings, path = scene.beyond_mocap_passes, made.ball
+    target = settings.rally
+    if target is None or target.name not in scene.objects:
+        target = settings.rally = ball.create(bpy.context, BALL, bake.collection(scene))
+        target[KEPT] = True
+    if target.get(KEPT):
+        target.scale = 3 * (made.kind.radius / ball.RADIUS,)
+    elif not settings.ball_before.kept:
+        put_aside(settings.ball_before, target)
+
+    def write() -> None:
+        channels.discard(target, KEPT)
+        first = start + float(path.times[0]) * frames_per_second(scene)
+        ball.write(target, path, scene, first)[KEPT] = True
+
+    possession.anew(scene, target, write)
+
+
+def _net(scene, net: Net | None) -> None:
+    """The net, of threads; none where none is wanted."""
+    found = _own_net(scene)
+    if net is None:
+        if found is not None:
+            remove(found)
+        return
+    mesh = bpy.data.meshes.new(NET)
+    start, way = np.array(net.start), np.subtract(net.end, net.start)
+    length = float(np.linalg.norm(way))
+    columns, rows = (max(2, round(extent / MESH) + 1) for extent in (length, net.height))
+    shape = bmesh.new()
+    bmesh.ops.create_grid(shape, x_segments=columns - 1, y_segments=rows - 1, size=0.5)
+    units = units_per_metre(scene)
+    for vertex in shape.verts:
+        x, y = start + (vertex.co.x + 0.5) * way
+        vertex.co = (x * units, y * units, (vertex.co.y + 0.5) * net.height * units)
+    bmesh.ops.delete(shape, geom=shape.faces[:], context="FACES_ONLY")
+    shape.to_mesh(mesh)
+    shape.free()
+    if found is None:
+        found = bpy.data.objects.new(NET, mesh)
+        found[KEPT] = True
+        bake.collection(scene).objects.link(found)
+    else:
+        before, found.data = found.data, mesh
+        bpy.data.meshes.remove(before)
+
+
+def _own_net(scene) -> bpy.types.Object | None:
+    found = bake.collection(scene).objects.get(NET)
+    return found if found is not None and found.get(KEPT) else None
