@@ -36,9 +36,9 @@ class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
         """One pass."""
         row = layout.row(align=True)
         row.label(text=f"{item.who} to {item.to}", icon=KIND_ICONS[item.kind])
-        bounces = row.row(align=True)
-        bounces.ui_units_x = 3.2
-        bounces.prop(item, "bounces", text="", emboss=False, icon="TRACKING_REFINE_FORWARDS")
+        bounces = row.row()
+        bounces.active, bounces.alignment = False, "RIGHT"
+        bounces.label(text=f"{item.bounces} {'bounce' if item.bounces == 1 else 'bounces'}" if item.bounces else "direct")
         if item.error != "none":
             row.label(text="", icon="CANCEL")
 
@@ -159,7 +159,7 @@ def of_pass(layout, settings, one) -> None:
 
 
 def choices(layout, settings) -> None:
-    """What holds for all passes, and the weights of eq. 1 and 2."""
+    """What holds for all passes."""
     column = split(layout)
     for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
         column.prop(settings, name)
@@ -172,6 +172,12 @@ def choices(layout, settings) -> None:
     if settings.net:
         for name in ("net_from", "net_to", "net_height"):
             column.prop(settings, name)
+    section(column, "weights", "Weights", lambda opened: weights(opened, settings))
+
+
+def weights(layout, settings) -> None:
+    """Of eq. 1 and 2."""
+    column = split(layout)
     for title, names in (("Two Strikes Compared", ("speed", "vectors", "times")), ("Two Poses Compared", ("position", "velocity", "bones"))):
         column.label(text=title)
         for name in names:

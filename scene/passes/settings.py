@@ -279,11 +279,11 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
         name="Dropped", default=0.0, min=0.0, max=1.0, precision=2, description="How likely each ball is dropped", update=touch_live
     )
     lead_in: FloatProperty(
-        name="Lead In", default=1.0, min=0.0, max=60.0, precision=1, unit="TIME_ABSOLUTE", update=touch_live,
+        name="Lead In", default=1.0, min=0.0, max=60.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,
         description="Seconds before the first strike, at least",
     )
     lead_out: FloatProperty(
-        name="Lead Out", default=1.5, min=0.0, max=60.0, precision=1, unit="TIME_ABSOLUTE", update=touch_live,
+        name="Lead Out", default=1.5, min=0.0, max=60.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,
         description="Seconds after the last strike",
     )
     rate: FloatProperty(
