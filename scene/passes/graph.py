@@ -36,14 +36,16 @@ def icon_of(hits: BeyondMocapHits) -> int:
 def paint(hits: BeyondMocapHits) -> None:
     """Paint the picture of an analysis, where there is one and it is not painted yet."""
     name = _name(hits.found)
-    if bpy.app.background or not hits.found or name in _shown.setdefault("graphs", bpy.utils.previews.new()):
+    if bpy.app.background or not hits.found:
+        return
+    if "graphs" not in _shown:
+        _shown["graphs"] = bpy.utils.previews.new()
+    if name in _shown["graphs"]:
         return
     pixels = picture(found_of(hits))
     preview = _shown["graphs"].new(name)
     preview.image_size = pixels.shape[1], pixels.shape[0]
-    preview.image_pixels_float.foreach_set(pixels.ravel()) if hasattr(preview.image_pixels_float, "foreach_set") else None
-    if not any(preview.image_pixels_float[:4]):
-        preview.image_pixels_float = pixels.ravel().tolist()
+    preview.image_pixels_float = pixels.ravel().tolist()
 
 
 def picture(found: dict) -> np.ndarray:

@@ -27,7 +27,7 @@ def match():
     files = [{"name": "player1.csv"}, {"name": "player2.csv"}]
     bpy.ops.beyond_mocap.import_tracking(directory=str(MATCH), files=files)
     for player in scene.beyond_mocap.players:
-        dot = player.dot
+        dot, player.annotation_file = player.dot, ""
         for track in list(dot.animation_data.nla_tracks):
             dot.animation_data.nla_tracks.remove(track)
     return scene

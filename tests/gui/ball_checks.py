@@ -5,7 +5,6 @@ import time
 import bpy
 import numpy as np
 from tab import PICTURES, assert_no_trouble_since, output, room, run, sample, settings, wait_for_work, window
-from window import unfold
 
 LIMIT = 400
 BEFORE = {}
@@ -21,11 +20,12 @@ def thing(name):
     return bpy.data.objects[name]
 
 
-def own_tab(open_all=True):
-    """The panel alone in a tab of its own, so that its buttons are found quickly; returns what puts it back."""
+def own_tab(part):
+    """One part of the panel alone in a tab of its own, so that its buttons are found quickly; returns what puts it back.
+    part: name of the function that draws it."""
     kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_ball")
-    was = kind.bl_category, kind.bl_options
-    fold = unfold(kind) if open_all else lambda: None
+    was, draw, drawn = (kind.bl_category, kind.bl_options), kind.draw, getattr(room("panels.ball"), part)
+    kind.draw = lambda self, context: drawn(*([self] if part in ("passing", "tracked") else []), self.layout, context)
 
     def place(category, options):
         bpy.utils.unregister_class(kind)
@@ -33,7 +33,7 @@ def own_tab(open_all=True):
         bpy.utils.register_class(kind)
 
     def back():
-        fold()
+        kind.draw = draw
         place(*was)
 
     place("Ball Check", set())
@@ -84,7 +84,7 @@ def check_hit_analysis_shows_a_graph_and_goes_to_strikes():
     yield 1.0
     run("beyond_mocap.import_clips", "EXEC_DEFAULT", filepath=str(sample() / "library" / "kick_low_top.bvh"))
     body = bpy.context.object.name
-    back = yield from own_tab()
+    back = yield from own_tab("hits")
     yield from press("hit_analysis")
     hits = thing(body).beyond_mocap_hits
     assert hits.found and room("scene.passes.graph").icon_of(hits), "no picture"
@@ -113,10 +113,11 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
     yield 1.0
     match = sample() / "match"
     run("beyond_mocap.import_tracking", "EXEC_DEFAULT", directory=f"{match}/", files=[{"name": "player1.csv"}, {"name": "player2.csv"}])
-    for player in settings().players:
+    for player in settings().players:  # without their words
+        player.annotation_file = ""
         for track in list(player.dot.animation_data.nla_tracks):
             player.dot.animation_data.nla_tracks.remove(track)
-    back = yield from own_tab()
+    back = yield from own_tab("tracked")
     yield from press("solve_ball")
     yield from wait_for_work()
     found = [(touch.name, round(touch.time, 1)) for touch in passes().touches if touch.kind == "kick"]
@@ -139,7 +140,7 @@ def check_a_passing_scene_is_made_by_a_button():
     run("beyond_mocap.passes_sample", "EXEC_DEFAULT", sample="three")
     passes().library_folder = str(sample() / "passes" / "library")
     passes().repeat = 1
-    back = yield from own_tab(open_all=False)
+    back = yield from own_tab("passing")
     start = time.monotonic()
     yield from press("passes_make")
     yield from wait_for_work()
@@ -215,7 +216,7 @@ def check_a_hand_carries_the_ball():
     last = int(passes().strikes.splitlines()[-1].partition("\t")[0])
     choose("Passing Ball", body)
     passes().hold_first, passes().hold_last = last + 8, last + 30
-    back = yield from own_tab()
+    back = yield from own_tab("carried")
     yield from press("take_ball")
     ball = thing("Passing Ball")
     assert len(ball.constraints) == 1 and len(ball.beyond_mocap_ball.holds) == 1
