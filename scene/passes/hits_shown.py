@@ -75,11 +75,11 @@ def summary(found: "Hits", first: int) -> dict:
 
 
 def lines(found: "Hits", first: int) -> list[str]:
-    """A line for each hit motion: the scene frame of its strike, a tab, its speed and extent."""
+    """A line for each hit motion: the scene frame of its strike, a tab, its speed, and the frames between which a ball can be hit."""
     told = []
     for one in found.motions:
         low, high = (first + frame for frame in one.ball_stretch)
-        told.append(f"{first + one.key}\t{one.max_speed:.1f} m/s, ball {low} to {high}, motion {first + one.first} to {first + one.last}")
+        told.append(f"{first + one.key}\t{one.max_speed:.1f} m/s, ball {low} to {high}")
     return told
 
 

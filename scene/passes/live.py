@@ -1,7 +1,8 @@
 """Sees that a passing scene has been edited, waits until the hand has come to rest, and has it made again.
 
 Only where the scene is shown already. What is asked is compared with what the scene shown was made of, so that neither its
-own making nor a walk along the timeline starts anything. The same wish is begun once.
+own making nor a walk along the timeline starts anything. The same wish is begun once: what was cancelled, undone or cannot be
+made waits for the next edit.
 """
 
 from __future__ import annotations
@@ -48,12 +49,6 @@ def _after_change(scene, depsgraph):
         mark()
 
 
-@persistent
-def _after_undo(*_):
-    _seen["begun"] = ""
-    mark()
-
-
 def _tick():
     if not _seen["dirty"]:
         return IDLE
@@ -78,16 +73,13 @@ def register():
     """Look from now on, where there is a window."""
     if not bpy.app.background:
         bpy.app.handlers.depsgraph_update_post.append(_after_change)
-        for handlers in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
-            handlers.append(_after_undo)
         bpy.app.timers.register(_tick, first_interval=1.0, persistent=True)
 
 
 def unregister():
     """Look no more."""
-    for name, handler in (("depsgraph_update_post", _after_change), ("undo_post", _after_undo), ("redo_post", _after_undo)):
-        if handler in getattr(bpy.app.handlers, name):
-            getattr(bpy.app.handlers, name).remove(handler)
+    if _after_change in bpy.app.handlers.depsgraph_update_post:
+        bpy.app.handlers.depsgraph_update_post.remove(_after_change)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     _seen.update(dirty=False, changed=0.0, begun="")

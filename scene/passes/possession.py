@@ -20,12 +20,13 @@ from mathutils import Matrix, Quaternion, Vector
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
 from .. import armature, channels, linked
-from ..measure import units_per_metre
+from ..measure import frames_per_second, units_per_metre
 from ..ride.rig_look import alone
 from ..set_aside import bring_back, put_aside
 from .settings import KEPT, BeyondMocapHold
 
 CONSTANT = 0  # Keyframe.interpolation as foreach_set takes it
+FASTEST = 8.0  # m/s at which a ball comes to where it is carried; from afar it takes longer than it is set to
 JUST_BEFORE = 0.02  # frames; Blender takes keys within 0.01 for one
 SURFACE = {"hand": 0.03, "foot": 0.045, "head": 0.1, "chest": 0.12}  # metres from a bone to the skin over it
 _TURNS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
@@ -172,8 +173,9 @@ def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None
     begins = bones[0].inverted() @ start
     held = begins if hold.how == "KEEP" else _touching(scene, hold, begins, ball)
     ends = held if end is None else bones[-1].inverted() @ end
-    count = len(bones) - 1
-    settle = max(1, min(hold.settle, count // 2)) if hold.how != "KEEP" or end is not None else 0
+    count, way = len(bones) - 1, max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
+    least = way / units_per_metre(scene) / FASTEST * frames_per_second(scene)
+    settle = max(1, min(max(hold.settle, int(np.ceil(least))), count // 2)) if hold.how != "KEEP" or end is not None else 0
     found = []
     for row in range(count + 1):
         place = held

@@ -126,6 +126,19 @@ def fill_scene():
     bpy.ops.beyond_mocap.passes_sample(sample="three")
 
 
+def one_pass():
+    """The same, of two players and one pass, so that it is quickly made."""
+    fill_scene()
+    settings = bpy.context.scene.beyond_mocap_passes
+    settings.active_player, settings.repeat, settings.live = 2, 1, False
+    bpy.ops.beyond_mocap.passes_list(rows="players", what="REMOVE")
+
+
+def make_scene():
+    one_pass()
+    bpy.ops.beyond_mocap.passes_make()
+
+
 def a_touch():
     """A touch in the list, as a solved ball leaves it."""
     touch = bpy.context.scene.beyond_mocap_passes.touches.add()
@@ -250,6 +263,8 @@ ROWS = {
     "nudge_points": Row("imported", lambda places: {"direction": "UP", "step": 0.3}, edit_points),
     "passes_from_json": Row("imported", lambda places: {"filepath": f"{scene_file(places)}"}),
     "passes_list": Row("imported", lambda places: {"rows": "passes", "what": "ADD"}, fill_scene),
+    "passes_clear": Row("imported", prepare=make_scene),
+    "passes_make": Row("imported", prepare=one_pass),
     "passes_sample": Row("imported", lambda places: {"sample": "three"}),
     "passes_to_json": Row("imported", lambda places: {"filepath": f"{places.out}/scene.json"}, fill_scene, changes=False),
     "path_apart": Row("accepted", prepare=ride_asked),

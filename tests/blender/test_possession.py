@@ -77,10 +77,10 @@ def test_it_is_rigid_with_the_bone_and_jumps_at_neither_end(ball, body):
     bpy.ops.beyond_mocap.take_ball(bone="RightForeArm", first=30, last=60, settle=5)
     for frame in (10, 30, 60, 61, 80):
         assert np.allclose(seen(ball, frame), free[frame], atol=2e-4), frame
-    held = [bone_sees(body, ball, "RightForeArm", frame) for frame in (30, 37, 42.5, 54, 54.9)]
+    held = [bone_sees(body, ball, "RightForeArm", frame) for frame in (30, 37, 42.5, 45)]
     for other in held[1:]:
         assert np.allclose(other[:3, 3], held[0][:3, 3], atol=6e-3)
-    whole = [bone_sees(body, ball, "RightForeArm", frame) for frame in (30, 37, 54)]
+    whole = [bone_sees(body, ball, "RightForeArm", frame) for frame in (30, 37, 45)]
     assert np.allclose(whole[0], whole[1], atol=1e-3) and np.allclose(whole[0], whole[2], atol=1e-3)
     for end in (30, 60):
         before, at, after = (seen(ball, frame)[:3, 3] for frame in (end - 0.02, end, end + 0.02))

@@ -215,17 +215,18 @@ def check_a_hand_carries_the_ball():
     body = passes().players["Cho"].body.name
     last = int(passes().strikes.splitlines()[-1].partition("\t")[0])
     choose("Passing Ball", body)
-    passes().hold_first, passes().hold_last = last + 8, last + 30
+    passes().hold_first, passes().hold_last = last + 8, last + 38
     back = yield from own_tab("carried")
     yield from press("take_ball")
     ball = thing("Passing Ball")
     assert len(ball.constraints) == 1 and len(ball.beyond_mocap_ball.holds) == 1
     at = []
-    for frame in range(last + 4, last + 34):
+    for frame in range(last + 4, last + 42):
         window.window.scene.frame_set(frame)
         at.append(np.array(ball.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation))
     steps = np.linalg.norm(np.diff(at, axis=0), axis=1)
     output.say(f"     carried: the ball moves {steps.max():.2f} m between two frames at most")
+    assert steps.max() < 0.9, steps
     yield 0.3
     window.picture(PICTURES / "ball_carried.png")
     yield from press("free_ball")
