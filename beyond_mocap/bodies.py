@@ -18,7 +18,7 @@ from .annotation.gaze import wanted_offset
 from .annotation.timeline import KeyMoment
 from .ball.contact import WORDS, striking_surface
 from .ball.orders import HitOrder, Stance
-from .ball.way import Placed, needed, way
+from .ball.way import Placed, needed, placed, way
 from .errors import InputError
 from .lay_out import faced, footed, smoothed
 from .library.automatic import automatic_words
@@ -135,8 +135,8 @@ class _Body:
     def __init__(self, library, stance, orders, ball, ball_radius, count, fps, settings):
         self.library, self.orders, self.fps, self.settings = library, orders, fps, settings
         self.ball_radius, self.stance = ball_radius, stance
-        self.hits = [Placed.of(library, order) for order in orders]
         self.start = float(ball.times[0])
+        self.hits = placed(library, orders, self.start)
         self.times = self.start + np.arange(count) / fps
         self.ball = np.stack([np.interp(self.times, ball.times, column) for column in ball.positions.T], axis=1)
 
@@ -187,11 +187,11 @@ class _Body:
         return Wanted(track, tuple(words), gait, Timeline(), keys, allowed, (), avoided)
 
     def _key(self, hit: Placed, frame: float) -> WantedKey:
-        order, hit_motion = hit.order, hit.order.hit
+        order = hit.order
         clip = self.library.clips[order.clip]
-        frames = range(int(hit_motion.first), int(hit_motion.last) + 1)
+        frames = range(int(hit.first), int(hit.last) + 1)
         words = frozenset({WORDS.get(order.part, "kick"), order.side} - {""}).union(*map(clip.words_at, frames))
-        key = Key(order.clip, float(order.strike_frame), float(hit_motion.first), float(hit_motion.last), words)
+        key = Key(order.clip, float(order.strike_frame), hit.first, hit.last, words)
         return WantedKey(KeyMoment(order.time, tuple(sorted(words))), frame, (key,), None, True, (1.0,))
 
     def _track(self, times: np.ndarray, fps: float):

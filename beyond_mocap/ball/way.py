@@ -8,7 +8,7 @@ far as there is time. What is left between two of them is walked as soon as the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,12 +18,14 @@ from ..motion.humanoid import heading_from_positions
 from ..motion.motion import at_frames, pose_kinematics
 from .orders import HitOrder, Stance
 
-LEAD, UNENDED = 1.6, 0.3
-"""Seconds of run-up and run-out that are taken from the recording at most, and of one that neither begins nor ends at
-rest."""
+LEAD, TIMELY = 1.6, 0.4
+"""Seconds of run-up and run-out that are taken from the recording at most, and m/s that one of them is worth."""
 
 SLOW = 0.3
 """m/s below which a run-up has not begun, and a run-out is over."""
+
+CROUCHED = 3.0
+"""m/s of unrest that a metre below or above the usual height of the hips is."""
 
 WALK, HASTE = 1.1, 2.2
 """m/s at which he goes from one place to the next where time allows, and where it does not."""
@@ -38,32 +40,40 @@ _SHARE = 0.7  # of the time between two hits that run-out and run-up may take
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A hit motion laid on the pitch: its clip turned by `turn` rad about the vertical, so that at `time` s its root is at
-    `place` (2,) m; one second of the scene is one of the clip."""
+    """A hit motion laid on the pitch: its clip turned by `turn` rad about the vertical, so that at the strike its root is
+    at the ordered place; one second of the scene is one of the clip. first, last: frames of the clip, in its own rate,
+    between which it is played: the hit motion, and as much of its run-up and run-out as there is time for."""
 
     library: Library
     order: HitOrder
     turn: float
     own_place: np.ndarray
+    first: float
+    last: float
 
     @classmethod
     def of(cls, library: Library, order: HitOrder) -> Placed:
-        """The hit motion as ordered."""
+        """The hit motion as ordered, alone."""
         motion = library.clips[order.clip].motion
         root, local = at_frames(motion, np.array([order.strike_frame]))
         places, _ = pose_kinematics(motion.skeleton, root, local)
         heading = heading_from_positions(motion.skeleton, places)[0]
-        return cls(library, order, float(quaternion.wrapped(order.facing - heading)), root[0, :2])
+        turn = float(quaternion.wrapped(order.facing - heading))
+        return cls(library, order, turn, root[0, :2], float(order.hit.first), float(order.hit.last))
+
+    def with_leads(self, into: float, out: float) -> Placed:
+        """The same with so many seconds of run-up and run-out."""
+        return replace(self, first=self.first - into * self._fps, last=self.last + out * self._fps)
 
     @property
     def start(self) -> float:
         """Second in which the hit motion begins."""
-        return self.order.time + (self.order.hit.first - self.order.strike_frame) / self._fps
+        return self.order.time + (self.first - self.order.strike_frame) / self._fps
 
     @property
     def end(self) -> float:
         """Second in which it ends."""
-        return self.order.time + (self.order.hit.last - self.order.strike_frame) / self._fps
+        return self.order.time + (self.last - self.order.strike_frame) / self._fps
 
     @property
     def _fps(self) -> float:
@@ -86,14 +96,25 @@ class Placed:
 
     def lead(self, way: int) -> float:
         """Seconds, at most LEAD, of the recorded run-up (way -1) or run-out (1) beside the hit motion: up to where the
-        body is slow; where it never is, UNENDED of it."""
+        body is at rest, or nearest to it, where a second is worth TIMELY m/s."""
         frames, order, fps = self.library.frames, self.order, self.library.fps
-        first, count = frames.first[order.clip], frames.count[order.clip]
-        edge = (order.hit.first if way < 0 else order.hit.last) * fps / self._fps
+        count = frames.count[order.clip]
+        edge = (self.first if way < 0 else self.last) * fps / self._fps
         at = np.arange(int(round(edge)), -1 if way < 0 else count, way)[: int(LEAD * fps) + 1]
         at = at[(at >= 0) & (at < count)]
-        slow = np.flatnonzero(frames.speed[first + at] < SLOW)
-        return int(slow[0]) / fps if len(slow) else min(max(len(at) - 1, 0) / fps, UNENDED)
+        if not len(at):
+            return 0.0
+        unrest = np.maximum(self._unrest()[at], SLOW)
+        return int(np.argmin(unrest + TIMELY * np.arange(len(at)) / fps)) / fps
+
+    def _unrest(self) -> np.ndarray:
+        """(L,) m/s: how far the clip's body is from standing at each of the library's frames: as fast as it goes, over
+        the ground and up or down, and as low or high."""
+        frames, clip = self.library.frames, self.order.clip
+        own = slice(frames.first[clip], frames.first[clip] + frames.count[clip])
+        height = frames.root[own, 2]
+        rising = np.gradient(height) * self.library.fps if len(height) > 1 else np.zeros(len(height))
+        return frames.speed[own] + np.abs(rising) + CROUCHED * np.abs(height - np.median(height))
 
     def _at(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values (L, K) of the library's frames at seconds (N,): linear, held at the clip's ends."""
@@ -102,6 +123,23 @@ class Placed:
         own = np.clip(own, 0.0, frames.count[clip] - 1.0)
         inside = values[frames.first[clip] : frames.first[clip] + frames.count[clip]]
         return np.stack([np.interp(own, np.arange(len(inside)), column) for column in inside.T], axis=1)
+
+
+def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[Placed]:
+    """The hit motions of one player as ordered, in the order of time, with run-up and run-out; start: second in which he
+    begins. None is in the other's way: of the time between two they take _SHARE at most."""
+    hits = [Placed.of(library, order) for order in orders]
+    leads = [[hit.lead(-1), hit.lead(1)] for hit in hits]
+    ends, starts = [start, *(hit.end for hit in hits)], [*(hit.start for hit in hits), np.inf]
+    for number, (end, begin) in enumerate(zip(ends, starts)):
+        out = leads[number - 1][1] if number else 0.0
+        into = leads[number][0] if number < len(hits) else 0.0
+        share = min(1.0, _SHARE * max(begin - end, 0.0) / max(out + into, 1e-9))
+        if number:
+            leads[number - 1][1] = share * out
+        if number < len(hits):
+            leads[number][0] = share * into
+    return [hit.with_leads(into, out) for hit, (into, out) in zip(hits, leads)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,18 +155,17 @@ def way(stance: Stance, hits: Sequence[Placed], times: np.ndarray) -> Way:
     """A player's way at seconds `times` (T,); hits in the order of time. He begins at his stance."""
     positions, facing = np.tile(np.array(stance.place, float), (len(times), 1)), np.full(len(times), np.nan)
     facing[0] = stance.facing
-    spans = _spans(hits, times)
     before, turned = (float(times[0]), np.array(stance.place, float), np.zeros(2)), stance.facing
-    for hit, (low, high) in zip(hits, spans):
+    for hit in hits:
+        low, high = hit.start, hit.end
         between = (times > before[0]) & (times < low)
         ahead = hit.path(np.array([low]))[0], hit.velocity(low)
         positions[between] = walked(times[between], before, (low, *ahead))
         inside = (times >= low) & (times <= high)
         positions[inside] = hit.path(times[inside])
-        own = (times >= hit.start) & (times <= hit.end)
-        angle = hit.heading(np.concatenate([[hit.start], times[own], [hit.end]]))
+        angle = hit.heading(np.concatenate([[low], times[inside], [high]]))
         angle += quaternion.wrapped(angle[0] - turned) + turned - angle[0]
-        facing[own], turned = angle[1:-1], angle[-1]
+        facing[inside], turned = angle[1:-1], angle[-1]
         before = high, hit.path(np.array([high]))[0], hit.velocity(high)
     after = times > before[0]
     rest = before[0] + stopping(before[2])
@@ -137,22 +174,6 @@ def way(stance: Stance, hits: Sequence[Placed], times: np.ndarray) -> Way:
     positions[after] = goal[1]
     positions[slowing] = hermite(times[slowing], before, goal)
     return Way(positions, facing)
-
-
-def _spans(hits: Sequence[Placed], times: np.ndarray) -> list[tuple[float, float]]:
-    """The seconds (from, to) of each hit with as much of its run-up and run-out as there is time for."""
-    leads = [[hit.lead(-1), hit.lead(1)] for hit in hits]
-    ends = [float(times[0]), *(hit.end for hit in hits)]
-    starts = [*(hit.start for hit in hits), np.inf]
-    for number, (end, start) in enumerate(zip(ends, starts)):
-        out = leads[number - 1][1] if number else 0.0
-        into = leads[number][0] if number < len(hits) else 0.0
-        share = min(1.0, _SHARE * max(start - end, 0.0) / max(out + into, 1e-9))
-        if number:
-            leads[number - 1][1] = share * out
-        if number < len(hits):
-            leads[number][0] = share * into
-    return [(hit.start - into, hit.end + out) for hit, (into, out) in zip(hits, leads)]
 
 
 State = tuple[float, np.ndarray, np.ndarray]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.ball.orders import HitOrder, Stance
-from beyond_mocap.ball.way import SPEEDING, Placed, hermite, needed, walked, way
+from beyond_mocap.ball.way import SPEEDING, hermite, needed, placed, walked, way
 from beyond_mocap.motion import quaternion
 
 STILL = np.zeros(2)
@@ -25,7 +25,7 @@ def orders(library):
 
 
 def test_at_each_strike_he_is_where_and_faces_as_ordered(library, orders):
-    hits = [Placed.of(library, one) for one in orders]
+    hits = placed(library, orders, 0.0)
     times = np.arange(0.0, 10.0, 0.01)
     found = way(Stance((0.0, 0.0), 0.0), hits, times)
     for one, hit in zip(orders, hits):
@@ -39,14 +39,15 @@ def test_at_each_strike_he_is_where_and_faces_as_ordered(library, orders):
 
 def test_the_way_has_no_jump_and_begins_at_the_stance(library, orders):
     times = np.arange(0.0, 10.0, 0.01)
-    found = way(Stance((0.0, 0.0), 0.0), [Placed.of(library, one) for one in orders], times)
+    found = way(Stance((0.0, 0.0), 0.0), placed(library, orders, 0.0), times)
     steps = np.linalg.norm(np.diff(found.positions, axis=0), axis=1) / 0.01
     assert np.abs(found.positions[0]).max() < 1e-9 and steps.max() < 4.5
     np.testing.assert_allclose(np.diff(steps) / 0.01, 0.0, atol=25.0)
 
 
 def test_he_turns_the_short_way_round(library):
-    hits = [Placed.of(library, order(library, t, (0.0, 0.0), f)) for t, f in ((3.0, 3.0), (6.0, -3.0), (9.0, 3.0))]
+    orders = [order(library, t, (0.0, 0.0), f) for t, f in ((3.0, 3.0), (6.0, -3.0), (9.0, 3.0))]
+    hits = placed(library, orders, 0.0)
     facing = way(Stance((0.0, 0.0), 3.0), hits, np.arange(0.0, 12.0, 0.05)).facing
     known = facing[np.isfinite(facing)]
     assert np.ptp(known) < 1.5
