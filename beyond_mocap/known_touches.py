@@ -29,6 +29,7 @@ FURTHEST = 0.4
 DRIBBLE = "dribble"
 _WITHIN = 1.5  # metres from the player within which a touch by nobody known may be his
 _NOT_MINE, _OTHER_PART, _OTHER_KIND = 0.15, 0.25, 0.15  # seconds that these are worth
+_UNSEEN = 0.1  # seconds from the nearest measured sample beyond which the ball counts as filled in
 _STEP = 0.004  # seconds between the points of a course
 _SENDING = {"kick", "pass", "volley", "bicycle", "throw", "throwb", "header"}
 _TAKING = {"receive", "trap", "catch", "catchb"}
@@ -67,8 +68,16 @@ def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
     for end, start in gone[gone[:, 1] - gone[:, 0] > _STEP]:
         unknown |= (times > end) & (times < start)
     ball = np.where(unknown[:, None], np.nan, solved.ball.at(times))
-    near = np.clip(np.searchsorted(solved.times, times), 0, len(solved.times) - 1)
-    return SolvedCourse(times, ball, solved.filled[near], tuple(_touched(touch, player, plan) for touch in inside))
+    seen = solved.times[solved.measured]
+    return SolvedCourse(times, ball, _far(times, seen), tuple(_touched(touch, player, plan) for touch in inside))
+
+
+def _far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(M,) bool: more than _UNSEEN seconds from the nearest of the times `seen` (K,)."""
+    if len(seen) < 2:
+        return np.ones(len(times), bool)
+    after = np.clip(np.searchsorted(seen, times), 1, len(seen) - 1)
+    return np.minimum(np.abs(times - seen[after - 1]), np.abs(seen[after] - times)) > _UNSEEN
 
 
 def _touched(touch: SolvedTouch, player: str, plan: Plan) -> Touched:

@@ -164,15 +164,17 @@ class Plan:
         self._check_pins()
 
     def sampled(self, fps: float) -> SampledTrack:
-        """The track at `fps` frames per second, with the solved ball where there is one."""
+        """The track at `fps` frames per second. Where its ball is solved, it has the solved height, and the solved place
+        where the feed has not measured it: where it has, the ball is met within the noise of the measurement."""
         track = sample(self.track, fps, self.track_window)
         if self.solved is None:
             return track
         ball, filled = self.solved.at(track.times)
         known = np.isfinite(ball).all(axis=1)
+        measured = track.ball_measured & ~(known & filled)
         return replace(
-            track, ball=np.where(known[:, None], ball, track.ball),
-            ball_measured=track.ball_measured & ~(known & filled),
+            track, ball=np.where(known[:, None] & (~measured[:, None] | [False, False, True]), ball, track.ball),
+            ball_measured=measured,
         )  # fmt: skip
 
     def _check_pins(self):
