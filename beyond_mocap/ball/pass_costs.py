@@ -89,13 +89,10 @@ def ways_of(starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, bal
     return np.stack(out, axis=1)
 
 
-def out_of_the_way(
-    starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball, others: np.ndarray
-) -> np.ndarray:
-    """(N, P): what it costs to fly through who stands at `others` (P, 2) m."""
+def out_of_the_way(ways: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(N, P): what it costs to fly through who stands at `others` (P, 2) m; ways (N, S, 3) m."""
     if not len(others):
-        return np.zeros((len(starts), 0))
-    ways = ways_of(starts, velocities, seconds, ball)
+        return np.zeros((len(ways), 0))
     a, b = ways[:, :-1, None, :2], ways[:, 1:, None, :2]
     share = np.sum((others - a) * (b - a), axis=-1) / np.maximum(np.sum((b - a) ** 2, axis=-1), 1e-9)
     near = np.linalg.norm(others - a - np.clip(share, 0.0, 1.0)[..., None] * (b - a), axis=-1)
@@ -104,15 +101,12 @@ def out_of_the_way(
     return IN_THE_WAY * inside.max(axis=1)
 
 
-def through_bodies(
-    starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball, places: np.ndarray, tall: float
-) -> np.ndarray:
-    """(N,): what it costs that flights go through the trunks, up to `tall` m, of who gives and who receives, at `places`
-    (P, 2) m."""
-    ways = ways_of(starts, velocities, seconds, ball)[:, :, None]
-    near = np.linalg.norm(ways[..., :2] - places, axis=-1) - ball.radius
-    inside = (ways[..., 2] > TRUNK_FROM) & (ways[..., 2] < tall + ball.radius)
-    return OWN_BODY * np.where(inside, np.clip((TRUNK - near) / TRUNK, 0.0, 1.0), 0.0).max(axis=(1, 2))
+def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float) -> np.ndarray:
+    """(N,): what it costs that balls of `radius` m on their ways (N, S, 3) m go through the trunk, up to `tall` m, of who
+    gives or receives them, at `place` (2,) m."""
+    near = np.linalg.norm(ways[..., :2] - place, axis=-1) - radius
+    inside = (ways[..., 2] > TRUNK_FROM) & (ways[..., 2] < tall + radius)
+    return OWN_BODY * np.where(inside, np.clip((TRUNK - near) / TRUNK, 0.0, 1.0), 0.0).max(axis=1)
 
 
 def arrivals(starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball) -> np.ndarray:
@@ -138,11 +132,8 @@ def rising(arriving: np.ndarray) -> np.ndarray:
     return PER_RISE * np.maximum(arriving[:, 2] - RISES_STILL, 0.0)
 
 
-def clears_net(
-    starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball, net: Net
-) -> np.ndarray:
-    """(N,) bool: whether flights go over the net wherever they cross it."""
-    ways = ways_of(starts, velocities, seconds, ball)
+def clears_net(ways: np.ndarray, radius: float, net: Net) -> np.ndarray:
+    """(N,) bool: whether balls of `radius` m on their ways (N, S, 3) m go over the net wherever they cross it."""
     start, end = np.array(net.start), np.array(net.end)
     along = end - start
     aside = _cross(along, ways[..., :2] - start) / np.linalg.norm(along)
@@ -150,8 +141,8 @@ def clears_net(
     share = aside[:, :-1] / np.where(crosses, aside[:, :-1] - aside[:, 1:], 1.0)
     at = ways[:, :-1] + np.clip(share, 0.0, 1.0)[..., None] * (ways[:, 1:] - ways[:, :-1])
     on = ((at[..., :2] - start) @ along) / (along @ along)
-    width = ball.radius / np.linalg.norm(along)
-    hit = crosses & (on > -width) & (on < 1.0 + width) & (at[..., 2] < net.height + ball.radius)
+    width = radius / np.linalg.norm(along)
+    hit = crosses & (on > -width) & (on < 1.0 + width) & (at[..., 2] < net.height + radius)
     return ~hit.any(axis=1)
 
 

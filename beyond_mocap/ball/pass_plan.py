@@ -22,9 +22,9 @@ from .flight import Flight, Launch, fly
 from .orders import HitOrder, Stance
 from .pass_costs import (
     THROUGH, TIMES, TRUNK_TO, UPRIGHT, against_the_part, arrivals, clears_net, cost_of_moments, lasting, misses,
-    out_of_the_way, rising, through_bodies, wished,
+    out_of_the_way, rising, through_body, ways_of, wished,
 )  # fmt: skip
-from .pass_scene import GROUND, Net, Pass, PassScene, served_by
+from .pass_scene import GROUND, Pass, PassScene, served_by
 from .physics import FASTEST, Ball
 from .strike_moments import StrikeMoments, launched_from
 
@@ -32,7 +32,7 @@ TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Radians by which a body may face beside where its motion sends the ball by itself."""
 
 EIGHTH = 0.25 * np.pi
-MOST_OPTIONS, MOST_OF_A_HIT = 8, 2
+MOST_OPTIONS, MOST_OF_A_HIT, MOST_TIMES = 8, 2, 4
 SERVED_FROM, SERVED_HEIGHT = 0.4, 1.2
 """Metres before who serves, and above the ground, from where the ball comes in."""
 
@@ -49,6 +49,9 @@ LIMP = {"received": (0.9, 0.4), "dropped": (1.1, 0.9)}
 """m/s ahead and up with which a ball goes that was stopped, or that slipped off."""
 
 ROUNDS, LONGER = 5, 6
+LEAP = 3.0
+"""m/s between two launches above which the ball takes quite another way, such as into the ground instead of up."""
+
 NEARBY = np.array([1, -1, 2, -2, 3, -3, 5, -5, 8, -8, 12])
 """Frames by which a flight may be longer or shorter than was best, where places have moved."""
 
@@ -160,6 +163,26 @@ class _Link:
     natural: Natural
 
 
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Flights (N) of a strike: from which option, starts (N, 3), target (3,), seconds, velocity (N, 3); cost (N,),
+    infinite where it cannot be; reached: whether any comes to the target at all, net or no net."""
+
+    option: np.ndarray
+    starts: np.ndarray
+    target: np.ndarray
+    seconds: np.ndarray
+    velocity: np.ndarray
+    cost: np.ndarray
+    reached: bool
+
+    def and_also(self, more: _Tried) -> _Tried:
+        """Both together."""
+        names = ("option", "starts", "seconds", "velocity", "cost")
+        joined = {name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in names}
+        return _Tried(target=self.target, reached=self.reached or more.reached, **joined)
+
+
 def plan_passes(
     scene: PassScene,
     sites: Sequence[Site],
@@ -186,6 +209,7 @@ class _Planner:
         self.passes = [site.asked for site in sites[:-1]]
         self.warnings: list[str] = []
         self.others = self._standing_by()
+        self.serving = 0.0
 
     def whole(self) -> PassPlan:
         chain = self._chain()
@@ -196,7 +220,7 @@ class _Planner:
             serve = self._served(places[0], first)
             places, normals = self._met(chain, velocities, [serve[1], *arriving])
             chain = self._within_reach(chain, places, missed)
-        velocities, arriving, missed = self._between(chain, places)
+        velocities, arriving, missed = self._between(chain, places, last=True)
         self._tell_misses(missed)
         self._tell_ways(chain, places, velocities)
         serve = self._served(places[0], first)
@@ -212,10 +236,9 @@ class _Planner:
                 places[one.receiver] = np.array(one.at, float)
         return out
 
-    def _in_the_way(self, number: int, starts, velocities, seconds) -> np.ndarray:
-        """(N, P): how far flights of a pass go through each of those who stand by."""
-        places = np.array([place for _, place in self.others[number]]).reshape(-1, 2)
-        return out_of_the_way(starts, velocities, seconds, self.ball, places)
+    def _in_the_way(self, number: int, ways: np.ndarray) -> np.ndarray:
+        """(N, P): how far flights of a pass, on their ways (N, S, 3) m, go through each of those who stand by."""
+        return out_of_the_way(ways, np.array([place for _, place in self.others[number]]).reshape(-1, 2))
 
     # -- Table 1, steps 2 to 7
 
@@ -294,37 +317,51 @@ class _Planner:
         return _Link(options.moments.only([best]), float(options.facing[best]), 0.0, np.zeros(3), options.natural)
 
     def _linked(self, number: int, options: _Options, after: _Link) -> _Link:
-        """The option and the seconds of travel with which the natural velocity is changed least (step 8 for each)."""
-        site, one = self.sites[number], self.passes[number]
+        """The option and the seconds of travel with which the natural velocity is changed least (step 8 for each): all
+        times with the best option, then the best times with all."""
+        seconds = self._seconds(self.passes[number])
+        tried = self._tried(number, options, after, np.zeros(len(seconds), int), seconds)
+        best = np.argsort(tried.cost, kind="stable")[:MOST_TIMES] if np.isfinite(tried.cost).any() else slice(None)
+        others = np.arange(1, len(options.cost))
+        more = self._tried(number, options, after, *_each(others, seconds[best]))
+        tried = tried.and_also(more)
+        if not np.isfinite(tried.cost).any():
+            self._refuse(number, tried)
+        best = int(np.argmin(tried.cost))
+        option = int(tried.option[best])
+        chosen = _nearest_row(options.natural, tried.starts[best])
+        return _Link(
+            options.moments.only([option]), float(options.facing[option]), float(tried.seconds[best]), tried.velocity[best],
+            replace(options.natural, chosen=chosen),
+        )  # fmt: skip
+
+    def _tried(self, number: int, options: _Options, after: _Link, option: np.ndarray, seconds: np.ndarray) -> _Tried:
+        """Flights from `option` (N,) that take `seconds` (N,), and what each costs."""
+        site, one, after_site = self.sites[number], self.passes[number], self.sites[number + 1]
         natural = wished(options.velocities(), site.kind)
-        starts = options.centres(site, _unit(natural), self.ball.radius)
+        starts = options.centres(site, _unit(natural), self.ball.radius)[option]
         target = self._place_of(number + 1, after, -natural[:1] * [1.0, 1.0, 0.0])
-        seconds = self._seconds(one)
-        every, times = np.repeat(np.arange(len(starts)), len(seconds)), np.tile(seconds, len(starts))
-        fastest = FASTEST.get(site.part, FASTEST["foot"])
-        aimed = aim(starts[every], target, self.ball, times, one.bounces, fastest=fastest)
-        good = aimed.possible & (aimed.miss <= ON_TARGET)
-        if not good.any():
-            self._out_of_reach(number, starts[:1], target, fastest)
-        which = np.flatnonzero(good)
-        cost = options.cost[every[which]] + np.linalg.norm(aimed.velocity[which] - natural[every[which]], axis=1)
-        flights = (starts[every[which]], aimed.velocity[which], times[which])
-        cost += self._in_the_way(number, *flights).max(axis=1, initial=0.0)
-        for near in (site, self.sites[number + 1]):
-            tall = near.size * TRUNK_TO.get(near.part, UPRIGHT)
-            cost += through_bodies(*flights, self.ball, near.place[None], tall)
+        aimed = aim(starts, target, self.ball, seconds, one.bounces, fastest=self._fastest(number))
+        flights = (starts, aimed.velocity, seconds)
         arriving = arrivals(*flights, self.ball)
+        cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)
+        ways = ways_of(*flights, self.ball)
+        cost += self._in_the_way(number, ways).max(axis=1, initial=0.0)
+        for near in (site, after_site):
+            cost += through_body(ways, self.ball.radius, near.place, near.size * TRUNK_TO.get(near.part, UPRIGHT))
         cost += against_the_part(arriving, after.velocity, self._pushes(number + 1, after))
-        cost += rising(arriving) + lasting(times[which], site.kind)
-        if self.scene.net is not None:
-            clear = clears_net(*flights, self.ball, self.scene.net)
-            if not clear.any():
-                self._over_the_net(number)
-            cost = np.where(clear, cost, np.inf)
-        best = which[int(np.argmin(cost))]
-        option = int(every[best])
-        return _Link(options.moments.only([option]), float(options.facing[option]), float(times[best]),
-                     aimed.velocity[best], replace(options.natural, chosen=_nearest_row(options.natural, starts[option])))
+        cost += rising(arriving) + lasting(seconds, site.kind)
+        good = aimed.possible & (aimed.miss <= ON_TARGET)
+        clear = good & self._clear(ways)
+        return _Tried(option, starts, target, seconds, aimed.velocity, np.where(clear, cost, np.inf), bool(good.any()))
+
+    def _clear(self, ways: np.ndarray) -> np.ndarray:
+        """(N,) bool: whether flights with ways (N, S, 3) m go over the net, where there is one."""
+        net = self.scene.net
+        return np.ones(len(ways), bool) if net is None else clears_net(ways, self.ball.radius, net)
+
+    def _fastest(self, number: int) -> float:
+        return FASTEST.get(self.sites[number].part, FASTEST["foot"])
 
     def _pushes(self, number: int, link: _Link) -> np.ndarray:
         """(3,): the way in which the part pushes the ball: as it moves; who receives gives way, and has it before him."""
@@ -379,9 +416,10 @@ class _Planner:
         side = np.sign((place[:2] - site.place) @ beside) or 1.0
         return np.array([*(place[:2] + side * BESIDE * beside), place[2]])
 
-    def _between(self, chain, places) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    def _between(self, chain, places, last: bool = False) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         """The velocities (K-1, 3) m/s with which the balls leave, those with which they come to the next strike, and by
-        how many m (K-1,) they miss it."""
+        how many m (K-1,) they miss it. One that only quite another flight would bring there is taken so at the `last`
+        only; before, it is told to miss."""
         targets = np.array([self._target(number, places, chain) for number in range(self.last)])
         seconds = np.array([link.seconds for link in chain[:-1]])
         bounces = np.array([one.bounces for one in self.passes])
@@ -390,7 +428,9 @@ class _Planner:
             same = np.flatnonzero(bounces == count)
             near = np.array([chain[number].velocity for number in same])
             aimed = aim(places[same], targets[same], self.ball, seconds[same], int(count), near=near)
-            velocities[same], missed[same] = aimed.velocity, aimed.miss
+            other = (np.linalg.norm(aimed.velocity - near, axis=1) > LEAP) & (not last)
+            velocities[same] = np.where(other[:, None], near, aimed.velocity)
+            missed[same] = np.where(other, np.inf, aimed.miss)
         return velocities, list(arrivals(places[:-1], velocities, seconds, self.ball)), missed
 
     def _within_reach(self, chain, places, missed: np.ndarray) -> list[_Link]:
@@ -415,7 +455,7 @@ class _Planner:
     def _tell_ways(self, chain, places, velocities) -> None:
         for number, one in enumerate(self.passes):
             seconds = np.array([chain[number].seconds])
-            through = self._in_the_way(number, places[number][None], velocities[number][None], seconds)[0]
+            through = self._in_the_way(number, ways_of(places[number][None], velocities[number][None], seconds, self.ball))[0]
             for (name, _), depth in zip(self.others[number], through):
                 if depth > THROUGH:
                     self.warnings.append(f"pass {number + 1}, from {one.giver} to {one.receiver}: the ball flies through {name}")
@@ -426,7 +466,7 @@ class _Planner:
         if serve == GROUND:
             return Launch(0.0, place, np.zeros(3)), np.zeros(3)
         start = self._serving_place(place)
-        seconds = min(first, self._serving_seconds(place))
+        seconds = min(first, self.serving)
         aimed = aim(start[None], place[None], self.ball, np.array([seconds]), 0)
         launch = Launch(first - seconds, start, aimed.velocity[0])
         return launch, arrivals(start[None], aimed.velocity, np.array([seconds]), self.ball)[0]
@@ -438,9 +478,7 @@ class _Planner:
         tried = np.ceil(np.linspace(quiet, LONGEST_SERVE, 8) * fps) / fps if quiet < LONGEST_SERVE else np.array([quiet])
         starts = np.tile(start, (len(tried), 1))
         aimed = aim(starts, place, self.ball, tried, 0)
-        good = aimed.miss <= ON_TARGET
-        if self.scene.net is not None:
-            good &= clears_net(starts, aimed.velocity, tried, self.ball, self.scene.net)
+        good = (aimed.miss <= ON_TARGET) & self._clear(ways_of(starts, aimed.velocity, tried, self.ball))
         return float(tried[np.argmax(good)])
 
     def _serving_place(self, place: np.ndarray) -> np.ndarray:
@@ -490,7 +528,8 @@ class _Planner:
         start = Stance(tuple(site.place), self.scene.facing(site.player))
         least = max(self.scene.lead_in, self.need(site.player, start, orders[0]))
         if self.scene.serve != GROUND:
-            least = max(least, self._serving_seconds(np.array(orders[0].ball)))
+            self.serving = self._serving_seconds(np.array(orders[0].ball))
+            least = max(least, self.serving)
         return float(np.ceil(least * fps - 1e-6) / fps)
 
     def _longer(self, chain, which, lack: float, places) -> list[_Link]:
@@ -513,11 +552,8 @@ class _Planner:
     def _flies(self, number: int, places, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(S,) bool: whether a pass can take `seconds` (S,), and the velocities (S, 3) m/s that it then takes."""
         start, target = np.tile(places[number], (len(seconds), 1)), places[number + 1]
-        fastest = FASTEST.get(self.sites[number].part, FASTEST["foot"])
-        aimed = aim(start, target, self.ball, seconds, self.passes[number].bounces, fastest=fastest)
-        good = aimed.possible & (aimed.miss <= ON_TARGET)
-        if self.scene.net is not None:
-            good &= clears_net(start, aimed.velocity, seconds, self.ball, self.scene.net)
+        aimed = aim(start, target, self.ball, seconds, self.passes[number].bounces, fastest=self._fastest(number))
+        good = aimed.possible & (aimed.miss <= ON_TARGET) & self._clear(ways_of(start, aimed.velocity, seconds, self.ball))
         return good, aimed.velocity
 
     # -- what came out
@@ -570,25 +606,23 @@ class _Planner:
 
     # -- what cannot be
 
-    def _out_of_reach(self, number: int, start: np.ndarray, target: np.ndarray, fastest: float) -> None:
-        one, part = self.passes[number], self.sites[number].part
+    def _refuse(self, number: int, tried: _Tried) -> None:
+        """InputError that says why no flight of a pass can be."""
+        one, part, net = self.passes[number], self.sites[number].part, self.scene.net
         where = f"pass {number + 1}, from {one.giver} to {one.receiver}"
-        far = np.linalg.norm(target - start[0])
-        free = aim(start, target, self.ball, self._seconds(one) if one.seconds else None, one.bounces)
-        speed = float(np.linalg.norm(free.velocity[0]))
-        bounces = f"{one.bounces} bounces" if one.bounces != 1 else "a bounce"
+        bounces = "a bounce" if one.bounces == 1 else f"{one.bounces} bounces"
+        if tried.reached:
+            raise InputError(where, f"no way over a net of {net.height:g} m with {bounces}", "one that goes over it",
+                             "lower the net, change bounces or seconds, or move them away from it")  # fmt: skip
         within = f" in {one.seconds:g} s" if one.seconds else ""
+        far = np.linalg.norm(tried.target - tried.starts[0])
+        free = aim(tried.starts[:1], tried.target, self.ball, self._seconds(one) if one.seconds else None, one.bounces)
+        speed, fastest = float(np.linalg.norm(free.velocity[0])), self._fastest(number)
         if free.miss[0] <= ON_TARGET and speed > fastest:
-            found = f"{far:.1f} m away{within} with {bounces} takes {speed:.0f} m/s"
-            raise InputError(where, found, f"up to {fastest:.0f} m/s by {part}", "move them nearer, or change bounces or seconds")
-        found = f"no way of {far:.1f} m{within} with {bounces}"
-        raise InputError(where, found, f"one that a human can give by {part}", "move them nearer, or change bounces or seconds")
-
-    def _over_the_net(self, number: int) -> None:
-        one, net = self.passes[number], self.scene.net
-        where = f"pass {number + 1}, from {one.giver} to {one.receiver}"
-        raise InputError(where, f"no way over a net of {net.height:g} m with {one.bounces} bounces", "one that goes over it",
-                         "lower the net, change bounces or seconds, or move them away from it")  # fmt: skip
+            found, expected = f"{far:.1f} m away{within} with {bounces} takes {speed:.0f} m/s", f"up to {fastest:.0f} m/s by {part}"
+        else:
+            found, expected = f"no way of {far:.1f} m{within} with {bounces}", f"one that a human can give by {part}"
+        raise InputError(where, found, expected, "move them nearer, or change bounces or seconds")
 
     def _check(self) -> None:
         if self.cancelled():
@@ -608,6 +642,11 @@ def _best(cost: np.ndarray, which: np.ndarray, most: int) -> np.ndarray:
     return np.array(kept, dtype=int)
 
 
+def _each(options: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every option (N,) with every time (S,): two arrays (N S,)."""
+    return np.repeat(options, len(seconds)), np.tile(seconds, len(options))
+
+
 def _nearest_row(natural: Natural, start: np.ndarray) -> int:
     return int(np.argmin(np.linalg.norm(natural.starts - start, axis=1)))
 
@@ -619,7 +658,3 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 def _turned(vectors: np.ndarray, angle: float) -> np.ndarray:
     return quaternion.rotate(quaternion.about_up(np.array([angle])), vectors)
 
-
-def net_line(net: Net) -> np.ndarray:
-    """(2, 2) m: both ends of a net on the ground."""
-    return np.array([net.start, net.end], dtype=float)
