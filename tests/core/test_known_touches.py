@@ -148,7 +148,9 @@ def test_an_edit_makes_anew_what_it_touches(library, kicked, timeline_of):
     assert changed(kicked, walks).any() and not changed(kicked, walks)[:190].any()
     assert np.array_equal(walks.ball.positions, kicked.ball.positions)
     # another touch
-    course = replace(course_of(kicked.plan.track, at=5.5), touches=(Touched(5.5, True, "foot", "kick"),))
-    later = resynthesize(library, replace(kicked.plan, solved=course), kicked)
+    old = kicked.plan.track
+    course = course_of(old, at=5.5)
+    track = Track(old.times, old.positions, course.at(old.times)[0])
+    later = resynthesize(library, replace(kicked.plan, track=track, solved=course), kicked)
     assert later.keys[0].frame == pytest.approx(165.0, abs=0.5) and changed(kicked, later).any()
-    assert evaluate(later, kicked.plan.track, library)["keys"][0]["contact_gap_m"] < 0.005
+    assert evaluate(later, track, library)["keys"][0]["contact_gap_m"] < 0.005
