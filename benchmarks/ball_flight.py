@@ -16,7 +16,7 @@ from benchmarks import effort
 from benchmarks.markdown import head, row
 
 LAUNCHES, TARGETS, MANY = 40, 300, 10_000
-STEP = 1e-3  # s of the integrator that judges
+STEP = 2e-3  # s of the integrator that judges
 
 
 def launches(count: int, seed: int = 4, spin: float = 60.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -54,7 +54,7 @@ def with_linear_drag(place, velocity, ball: Ball, times: np.ndarray) -> np.ndarr
 
 
 def judged(place, velocity, spin, ball: Ball, seconds: float) -> Callable[[np.ndarray], np.ndarray]:
-    """The way with drag, lift and bounces by classical Runge-Kutta in steps of 1 ms, written from the equations alone:
+    """The way with drag, lift and bounces by classical Runge-Kutta in steps of 2 ms, written from the equations alone:
     quadratic and linear drag, Magnus lift, spin decay; at the ground Cross' grip or slip. Until the hops get small."""
     scale, a, b = ball.lift
 
@@ -91,7 +91,7 @@ def judged(place, velocity, spin, ball: Ball, seconds: float) -> Callable[[np.nd
     when, where = np.array(times), np.array(states)[:, :3]
 
     def at(asked: np.ndarray) -> np.ndarray:
-        """(N, 3) m, NaN after the last big hop; the steps are so small that a straight line between them is within 2 um."""
+        """(N, 3) m, NaN after the last big hop; the steps are so small that a straight line between them is within 5 um."""
         out = np.column_stack([np.interp(asked, when, where[:, i]) for i in range(3)])
         out[asked > when[-1]] = np.nan
         return out
