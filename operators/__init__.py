@@ -73,9 +73,12 @@ from . import (
     show_video,
     solve_ball,
     split_span,
+    stream_end,
     stream_keep,
+    stream_play,
     stream_start,
     stream_stop,
+    stream_target,
     synthesize,
     take_ball,
     track_object,
@@ -180,6 +183,9 @@ CLASSES = (
     stream_start.BEYOND_MOCAP_OT_stream_start,
     stream_stop.BEYOND_MOCAP_OT_stream_stop,
     stream_keep.BEYOND_MOCAP_OT_stream_keep,
+    stream_play.BEYOND_MOCAP_OT_stream_play,
+    stream_target.BEYOND_MOCAP_OT_stream_target,
+    stream_end.BEYOND_MOCAP_OT_stream_end,
 )
 
 

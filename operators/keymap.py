@@ -43,6 +43,10 @@ ENTRIES: tuple[Entry, ...] = (
     Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "NUMPAD_0", ("shift",)),
     Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "J", ("shift",)),
     *(
+        Entry("Object Mode", "EMPTY", "beyond_mocap.stream_target", key, properties={"number": number})
+        for number, key in enumerate(("ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"), 1)
+    ),
+    *(
         Entry("Curve", "EMPTY", "beyond_mocap.nudge_points", key, ("alt",), {"direction": direction}, repeat=True)
         for key, direction in NUDGES.items()
     ),

@@ -6,7 +6,7 @@ import bpy
 
 from ..scene.passes import graph
 from ..scene.passes.settings import active_row, ball_of, subject, told_lines
-from .stream import stream
+from .stream import live, stream
 from .tab import Step, paragraph, table
 
 PART_ICONS = {"foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"}
@@ -69,6 +69,7 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
         section(layout, "hits", "Hit Analysis", lambda opened: hits(opened, context))
         section(layout, "hold", "Carried Ball", lambda opened: carried(opened, context))
         section(layout, "stream", "Live Stream", lambda opened: stream(opened, context))
+        section(layout, "live", "Play Live", lambda opened: live(self, opened, context))
 
 
 def section(layout, name: str, title: str, draw, closed: bool = True) -> None:

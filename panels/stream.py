@@ -28,3 +28,18 @@ def stream(layout, context) -> None:
     if told.hit:
         layout.label(text=f"Last strike: {told.hit}", icon="KEYTYPE_EXTREME_VEC")
     layout.operator("beyond_mocap.stream_keep", icon="REC")
+
+
+def live(panel, layout, context) -> None:
+    """Who has the ball, and to whom it goes."""
+    settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
+    column = layout.column()
+    column.use_property_split, column.use_property_decorate = True, False
+    column.prop_search(settings, "target", context.scene.beyond_mocap_passes, "players")
+    column.prop(settings, "bounces")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.stream_play", icon="OUTLINER_OB_ARMATURE")
+    row.operator("beyond_mocap.stream_end", icon="SNAP_FACE")
+    panel.progress(context, "live")
+    for line in told.played.splitlines():
+        paragraph(layout, line, "BLANK1")

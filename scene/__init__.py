@@ -44,7 +44,7 @@ from .ride import live as ride_live
 from .ride import measure as ride_measure
 from .ride.settings import BeyondMocapRide
 from .stream import follow as stream_follow
-from .stream import receiver
+from .stream import play, receiver
 from .stream import settings as stream
 
 CLASSES = (
@@ -113,6 +113,7 @@ def register():
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
+    play.unregister()
     stream_follow.unregister()
     receiver.unregister()
     passes_live.unregister()

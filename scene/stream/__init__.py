@@ -3,5 +3,6 @@
 - `settings`  where to listen, what to look for, and what is told of it
 - `receiver`  the one listener of the session
 - `streamed`  the armature that does what the user does
-- `follow`    keeps both up to date while Blender has a window
+- `play`      a passing scene that answers the user's strikes
+- `follow`    keeps them up to date while Blender has a window
 """

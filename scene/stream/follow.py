@@ -28,6 +28,7 @@ MOST_BODIES = 20
 _state = {"seen": 0, "told": 0.0, "looked": 0.0, "bodies": 0, "windowed": False}
 _shown: deque[float] = deque(maxlen=60)
 _on_hit: list = []
+_on_look: list = []
 
 
 def on_hit(action) -> None:
@@ -35,10 +36,16 @@ def on_hit(action) -> None:
     _on_hit.append(action)
 
 
+def on_look(action) -> None:
+    """`action(scene)` is called at every look, until `forget`."""
+    _on_look.append(action)
+
+
 def forget(action) -> None:
     """Call it no more."""
-    if action in _on_hit:
-        _on_hit.remove(action)
+    for actions in (_on_hit, _on_look):
+        if action in actions:
+            actions.remove(action)
 
 
 def began() -> None:
@@ -57,31 +64,36 @@ def look(scene: bpy.types.Scene) -> HitMotion | None:
     latest = listener.latest()
     if latest is not None and latest.number != _state["seen"]:
         _state["seen"] = latest.number
-        if _show(scene, listener, latest):
+        if _show(scene, listener, latest) == "posed":
             _shown.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
     found = None
     if now - _state["looked"] >= LOOKED_EVERY:
         _state["looked"] = now
         found = _hit(scene)
+    for action in list(_on_look):
+        action(scene)
     if now - _state["told"] >= TOLD_EVERY:
         _state["told"] = now
         tell()
     return found
 
 
-def _show(scene, listener: Listener, latest) -> bool:
+def _show(scene, listener: Listener, latest) -> str:
+    """Pose the streamed body: "posed", "made" where it had to be made first, "" where it could not be."""
     settings, skeleton = scene.beyond_mocap_stream, listener.skeleton
     root, rotations = listener.poses([latest])
+    made = "posed"
     if not streamed.fits(settings.body, scene, skeleton):
         if _state["bodies"] >= MOST_BODIES:
             receiver.stop()
-            return False
+            return ""
         _state["bodies"] += 1
         settings.body = streamed.create(bpy.context, Motion(skeleton, root, rotations, 60.0))
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message="Streamed Body")
+        made = "made"
     streamed.pose(settings.body, scene, skeleton, root[0], rotations[0])
-    return True
+    return made
 
 
 def _hit(scene) -> HitMotion | None:
@@ -159,3 +171,4 @@ def unregister():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     _on_hit.clear()
+    _on_look.clear()

@@ -49,6 +49,9 @@ def hits() -> LiveHits | None:
 
 @persistent
 def _before_load(*_):
+    from . import play
+
+    play.stop()
     stop()
 
 

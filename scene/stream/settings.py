@@ -36,6 +36,10 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
         name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
         description="Metres above the ground that the part has to rise in a strike; 0: automatic",
     )
+    target: StringProperty(
+        name="Target", description="Who gets the next pass in Play Live; empty: the next one of the list. Keys 1 to 9, or click a player"
+    )
+    bounces: IntProperty(name="Bounces", default=0, min=0, max=5, description="Of the ball on its way in Play Live")
     body: PointerProperty(
         name="Streamed Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
         description="The armature that does what the user does; made where it is missing",
@@ -50,6 +54,8 @@ class BeyondMocapStreaming(bpy.types.PropertyGroup):
     line: StringProperty(description="The same in a sentence")
     figures: StringProperty(description="Lines 'name: value'")
     hit: StringProperty(description="The last strike that was recognised")
+    playing: BoolProperty(description="Whether the passing scene is played live")
+    played: StringProperty(description="Lines about the rally that is played live")
 
 
 CLASSES = (BeyondMocapStream, BeyondMocapStreaming)

@@ -171,6 +171,13 @@ def analyse():
     bpy.ops.beyond_mocap.hit_analysis()
 
 
+def play_live():
+    """Three players stand, the first one has the ball."""
+    fill_scene()
+    bpy.context.scene.beyond_mocap_passes.library_folder = str(worlds.SAMPLE)
+    bpy.ops.beyond_mocap.stream_play()
+
+
 def listen():
     """A stream is listened to, and a few frames have arrived."""
     scene = importlib.import_module(f"{EXTENSION}.scene.stream.receiver")
@@ -291,9 +298,12 @@ ROWS = {
     "show_video": Row("video", changes=False),
     "solve_ball": Row("imported"),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
+    "stream_end": Row("imported", prepare=play_live, changes=False),
     "stream_keep": Row("imported", prepare=listen),
+    "stream_play": Row("imported", prepare=fill_scene),
     "stream_start": Row("imported", changes=False),
     "stream_stop": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.stream_start(), changes=False),
+    "stream_target": Row("imported", lambda places: {"number": 2}, play_live),
     "synthesize": Row("imported"),
     "take_ball": Row("accepted", lambda places: {"first": 3, "last": 8}, a_ball),
     "track_object": Row("imported", prepare=draw),

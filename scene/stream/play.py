@@ -1,0 +1,188 @@
+"""Play live: while the scene plays, who has the ball does what the user does, and passes to whom the user has chosen.
+
+What the user does is recognised by `follow`; the pass is worked out in a thread, from where all stand, and laid into the
+running scene as soon as it is there. The bodies and the ball are those of the passing scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ...beyond_mocap.ball.hits import HitMotion
+from ...beyond_mocap.errors import BeyondMocapError, InputError
+from .. import background, bake, linked
+from ..measure import frames_per_second
+from ..passes import make
+from . import follow, receiver
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.live_passes import Piece, Rally
+
+_held: dict[str, object] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A rally that can begin. order: as `make.order_of` writes it; library; rally."""
+
+    order: make.Order
+    library: Library
+    rally: Rally
+
+
+def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> Begun:
+    """Build the library where it is not there yet, and let everybody stand. Never touches bpy."""
+    from ...beyond_mocap import live_passes
+    from ...beyond_mocap.library.library import build
+
+    library = order.library
+    if library is None:
+        library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    return Begun(order, library, live_passes.begin(library, order.scene, holder, start, progress, cancelled))
+
+
+def show(scene: bpy.types.Scene, begun: Begun) -> None:
+    """Lay it on bodies and ball, and answer the user's strikes from now on."""
+    stop()
+    make.session.keep_library(begun.library, begun.order.unit)
+    _held.update(scene=scene.session_uid, library=begun.library, rally=begun.rally, seen=None, took=0.0)
+    _lay(scene, begun.rally, [player.name for player in begun.rally.scene.players])
+    follow.on_hit(struck)
+    follow.on_look(look)
+    _tell(scene)
+
+
+def stop() -> None:
+    """Answer no more; what was played stays."""
+    background.stop("live")
+    follow.forget(struck)
+    follow.forget(look)
+    _held.clear()
+
+
+def rally() -> Rally | None:
+    """The rally that is played."""
+    return _held.get("rally")
+
+
+def seconds(scene: bpy.types.Scene) -> float:
+    """Where the scene is, on the rally's clock."""
+    return (scene.frame_current_final - scene.beyond_mocap_passes.start_frame) / frames_per_second(scene)
+
+
+def target(scene: bpy.types.Scene) -> str:
+    """To whom the next pass goes: who was chosen, else the next one of the list."""
+    names = [row.name for row in scene.beyond_mocap_passes.players]
+    chosen, holder = scene.beyond_mocap_stream.target, rally().holder
+    if chosen in names and chosen != holder:
+        return chosen
+    return names[(names.index(holder) + 1) % len(names)] if holder in names else names[0]
+
+
+def struck(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
+    """The user has struck: the newest strike counts."""
+    _held["pending"] = hit
+
+
+def look(scene: bpy.types.Scene) -> None:
+    """Begin a pass that is asked for, or lay one that is ready."""
+    if rally() is None or scene.session_uid != _held["scene"]:
+        return
+    _chosen(scene)
+    job = _held.get("job")
+    if job is not None:
+        if job.poll():
+            _held.pop("job")
+            _ended(scene, job)
+    elif _held.get("pending") is not None and seconds(scene) >= rally().free:
+        order = _order(scene, _held.pop("pending"))
+        _held["job"] = background.Job("live", lambda progress, cancelled, _hurry: _answer(*order, progress, cancelled))
+
+
+def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> Piece:
+    """The same at once, for scripts: the pass is worked out and laid before this comes back."""
+    if rally() is None:
+        raise InputError("play live", "nothing is played", "a rally", "press Play Live")
+    piece = _answer(*_order(scene, hit), None, None)
+    _apply(scene, piece)
+    return piece
+
+
+def _order(scene, hit: HitMotion) -> tuple:
+    now = max(seconds(scene), rally().free)
+    return _held["library"], rally(), now, hit, target(scene), scene.beyond_mocap_stream.bounces
+
+
+def _answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, progress, cancelled) -> Piece:
+    from ...beyond_mocap.live_passes import answer
+
+    return answer(library, one, now, hit, to, bounces, progress, cancelled)
+
+
+def _ended(scene, job) -> None:
+    try:
+        if job.error is not None:
+            raise job.error
+        _apply(scene, job.result)
+    except BeyondMocapError as error:
+        bpy.context.window_manager.beyond_mocap_streaming.played = str(error)
+        return
+    if not bpy.app.background:
+        bpy.ops.ed.undo_push(message="Live Pass")
+
+
+def _apply(scene, piece: Piece) -> None:
+    """Lay a pass into the scene, from now on."""
+    after = rally().after(piece, max(seconds(scene), rally().free))
+    _lay(scene, after, list(piece.motions))
+    _held["rally"] = after
+    scene.beyond_mocap_stream.target = ""
+    _tell(scene, piece)
+
+
+def _lay(scene, one: Rally, names: list[str]) -> None:
+    from ...beyond_mocap.passes import ball_of
+
+    rows = {row.name: row for row in scene.beyond_mocap_passes.players}
+    if missing := [name for name in names if name not in rows]:
+        raise InputError("players", f"{missing[0]} is gone from the list", "the same players", "press Play Live again")
+    linked.refuse(*(rows[name].body for name in names), scene.beyond_mocap_passes.rally)
+    start = float(scene.beyond_mocap_passes.start_frame)
+    for name in names:
+        played = one.players[name]
+        make.lay_body(scene, rows[name], SimpleNamespace(motion=played.motion, start_time=played.start), start)
+    make.lay_ball(scene, SimpleNamespace(ball=one.ball, kind=ball_of(one.scene)), start)
+    bake.lengthen(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
+
+
+def _chosen(scene) -> None:
+    """A player that has just been clicked is the target."""
+    active = bpy.context.view_layer.objects.active
+    name = active.name if active is not None else None
+    if name == _held.get("seen"):
+        return
+    _held["seen"] = name
+    for row in scene.beyond_mocap_passes.players:
+        known = {row.body, row.place, *(row.body.children if row.body else ())}
+        if active is not None and active in known and row.name != rally().holder:
+            scene.beyond_mocap_stream.target = row.name
+
+
+def _tell(scene, piece: Piece | None = None) -> None:
+    told, one = bpy.context.window_manager.beyond_mocap_streaming, rally()
+    told.playing = True
+    lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
+    if piece is not None:
+        lines.append(f"{piece.giver} played {piece.clip} to {piece.receiver}")
+        lines += piece.warnings[:2]
+    told.played = "\n".join(lines)
+
+
+def unregister():
+    """End with the add-on."""
+    stop()
