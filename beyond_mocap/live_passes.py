@@ -57,23 +57,28 @@ class Played:
 
 @dataclass(frozen=True, eq=False)
 class Rally:
-    """A rally as it stands. scene: who plays; holder: who has the ball; players: name -> what he does; ball: its way on
-    the scene's clock; free: s from which on the holder can act; passes: how many there were."""
+    """A rally as it stands. scene: who plays; holder: who has the ball; players: name -> what he has done and does; ball:
+    its way on the scene's clock; start: s at which it began; free: s from which on the holder can act; passes: how many
+    there were."""
 
     scene: PassScene
     holder: str
     players: dict[str, Played]
     ball: BallPath
+    start: float
     free: float
     passes: int = 0
 
     def after(self, piece: Piece, at: float) -> Rally:
-        """The rally with a pass that begins at `at` s: what each does fades over into it."""
+        """The rally with a pass that begins at `at` s, on the next frame: what each does fades over into it, what was
+        before stays."""
+        at = self.start + np.ceil((at - self.start) * self.scene.fps - 1e-6) / self.scene.fps
         players = dict(self.players)
         for name, motion in piece.motions.items():
-            players[name] = Played(at, _faded(self.players[name], motion, at))
-        return Rally(
-            self.scene, piece.receiver, players, _on_from(self.ball, piece.ball, at), at + piece.seconds, self.passes + 1
+            players[name] = _going_on(self.players[name], motion, at)
+        ball = _on_from(self.ball, piece.ball, at)
+        return replace(
+            self, holder=piece.receiver, players=players, ball=ball, free=at + piece.seconds, passes=self.passes + 1
         )
 
 
@@ -110,7 +115,7 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
             library, stance, (), ball, radius, None, scene.fps, _settings(scene), cancelled=cancelled
         )
         players[player.name] = Played(start, _lasting(moved.take.motion))
-    return Rally(scene, holder, players, _on_from(None, ball, start), start)
+    return Rally(scene, holder, players, _on_from(None, ball, start), start, start)
 
 
 def answer(
@@ -198,8 +203,17 @@ def _lasting(motion: Motion) -> Motion:
     return replace(motion, root_positions=motion.root_positions[frames], rotations=motion.rotations[frames])
 
 
-def _faded(before: Played, motion: Motion, at: float) -> Motion:
-    """A motion that begins at `at` s, over its first FADE seconds still what was done before."""
+def _going_on(before: Played, motion: Motion, at: float) -> Played:
+    """What was done before `at` s, then `motion`, over whose first FADE seconds the one fades into the other."""
+    root, rotations = _faded(before, motion, at)
+    past = np.clip(np.arange(round((at - before.start) * motion.fps)), 0, len(before.motion) - 1)
+    root = np.concatenate([before.motion.root_positions[past], root])
+    rotations = np.concatenate([before.motion.rotations[past], rotations])
+    return Played(before.start, replace(motion, root_positions=root, rotations=rotations))
+
+
+def _faded(before: Played, motion: Motion, at: float) -> tuple[np.ndarray, np.ndarray]:
+    """Root positions (T, 3) and rotations (T, J, 4) of a motion that begins at `at` s, as faded."""
     count = min(int(FADE * motion.fps) + 1, len(motion))
     first = round((at - before.start) * motion.fps)
     frames = np.clip(np.arange(first, first + count), 0, len(before.motion) - 1)
@@ -209,7 +223,7 @@ def _faded(before: Played, motion: Motion, at: float) -> Motion:
     root[:count] = (1.0 - weight) * before.motion.root_positions[frames] + weight * root[:count]
     old = quaternion.signed_like(before.motion.rotations[frames], rotations[:count])
     rotations[:count] = quaternion.slerp(old, rotations[:count], weight)
-    return replace(motion, root_positions=root, rotations=rotations)
+    return root, rotations
 
 
 def _on_from(before: BallPath | None, path: BallPath, at: float) -> BallPath:

@@ -108,6 +108,7 @@ def register():
     hits_shown.register()
     receiver.register()
     stream_follow.register()
+    play.register()
     passes_live.register()
 
 

@@ -13,6 +13,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import BeyondMocapError
+from .settings import PLAYED
 
 TICK, IDLE = 0.05, 0.4  # seconds between two looks
 SETTLED = 0.15  # seconds without a change after which the hand rests
@@ -31,7 +32,7 @@ def edited(scene: bpy.types.Scene) -> str:
     from . import make
 
     settings = scene.beyond_mocap_passes
-    if not settings.live or not settings.made_of:
+    if not settings.live or settings.made_of in ("", PLAYED):
         return ""
     try:
         digest = make.order_of(scene).digest

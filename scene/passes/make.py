@@ -87,8 +87,8 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
     told = [line for one in made.players for line in riders.leave(rows[one.name].body)]
     start = float(settings.start_frame)
     for one in made.players:
-        _body(scene, rows[one.name], one.take, start)
-    _ball(scene, made, start)
+        lay_body(scene, rows[one.name], one.take, start)
+    lay_ball(scene, made, start)
     _net(scene, result.order.scene.net)
     bake.lengthen(scene, start + made.plan.seconds * frames_per_second(scene))
     settings.made_of = result.order.digest
@@ -170,8 +170,9 @@ def _check(row: BeyondMocapPasser) -> None:
                          "make it editable: Outliner, Library Override, Make")
 
 
-def _body(scene, row: BeyondMocapPasser, take, start: float) -> None:
-    """One player's motion on his body, which is made, dressed or made anew where it does not fit."""
+def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float) -> None:
+    """One player's motion on his body, which is made, dressed or made anew where it does not fit. take: whatever has a
+    `motion` and a `start_time` (s); start: the scene frame of second 0."""
     target, room = row.body, bake.collection(scene)
     if target is not None and not bake.fits(target, take, scene):
         if target.get(KEPT):
@@ -192,8 +193,8 @@ def _body(scene, row: BeyondMocapPasser, take, start: float) -> None:
     action.write(target, take.motion, scene, first, f"{row.name} passes", generated=True)[KEPT] = True
 
 
-def _ball(scene, made: "Passes", start: float) -> None:
-    """The ball's way on the ball."""
+def lay_ball(scene: bpy.types.Scene, made: "Passes", start: float) -> None:
+    """The ball's way on the ball, which is made where there is none. made: whatever has a `ball` and its `kind`."""
     settings, path = scene.beyond_mocap_passes, made.ball
     target = settings.rally
     if target is None or target.name not in scene.objects:

@@ -57,6 +57,7 @@ HOLDS = (
     ("KEEP", "As It Is", "The ball stays where it is beside the bone as it is taken"),
     ("TOUCH", "Touching", "The ball comes to touch the part: the palm, the foot, the brow"),
 )
+PLAYED = "live"  # `made_of` of a scene that was played live: no edit of the lists makes it anew
 KEPT = "beyond_mocap_ball"  # custom property of balls and their actions that were made here
 
 

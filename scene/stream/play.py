@@ -11,12 +11,14 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ...beyond_mocap.ball.hits import HitMotion
 from ...beyond_mocap.errors import BeyondMocapError, InputError
 from .. import background, bake, linked
 from ..measure import frames_per_second
 from ..passes import make
+from ..passes.settings import PLAYED
 from . import follow, receiver
 
 if TYPE_CHECKING:
@@ -51,6 +53,9 @@ def show(scene: bpy.types.Scene, begun: Begun) -> None:
     stop()
     make.session.keep_library(begun.library, begun.order.unit)
     _held.update(scene=scene.session_uid, library=begun.library, rally=begun.rally, seen=None, took=0.0)
+    for name in ("strikes", "figures", "told"):
+        scene.beyond_mocap_passes.property_unset(name)
+    scene.beyond_mocap_passes.made_of = PLAYED
     _lay(scene, begun.rally, [player.name for player in begun.rally.scene.players])
     follow.on_hit(struck)
     follow.on_look(look)
@@ -92,6 +97,9 @@ def struck(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
 def look(scene: bpy.types.Scene) -> None:
     """Begin a pass that is asked for, or lay one that is ready."""
     if rally() is None or scene.session_uid != _held["scene"]:
+        return
+    if scene.beyond_mocap_passes.made_of != PLAYED:
+        _over("The scene has been made anew or cleared: press Play Live to go on")
         return
     _chosen(scene)
     job = _held.get("job")
@@ -173,6 +181,13 @@ def _chosen(scene) -> None:
             scene.beyond_mocap_stream.target = row.name
 
 
+def _over(why: str) -> None:
+    """The rally ends by itself."""
+    stop()
+    told = bpy.context.window_manager.beyond_mocap_streaming
+    told.playing, told.played = False, why
+
+
 def _tell(scene, piece: Piece | None = None) -> None:
     told, one = bpy.context.window_manager.beyond_mocap_streaming, rally()
     told.playing = True
@@ -183,6 +198,20 @@ def _tell(scene, piece: Piece | None = None) -> None:
     told.played = "\n".join(lines)
 
 
+@persistent
+def _after_undo(*_):
+    """What is undone is not what the rally knows any more."""
+    if rally() is not None:
+        _over("Undo has ended Play Live: press it to begin anew")
+
+
+def register():
+    """End with an undo."""
+    bpy.app.handlers.undo_post.append(_after_undo)
+
+
 def unregister():
     """End with the add-on."""
     stop()
+    if _after_undo in bpy.app.handlers.undo_post:
+        bpy.app.handlers.undo_post.remove(_after_undo)

@@ -4,6 +4,7 @@ import importlib
 import pathlib
 import threading
 import time
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -89,8 +90,8 @@ def test_whom_the_user_chooses_gets_it(playing, room, core):
         press(OPS.stream_target, number=1)
     with pytest.raises(RuntimeError, match="1 to 3"):
         press(OPS.stream_target, number=7)
-    assert_one_step(OPS.stream_target, number=3)
     OPS.stream_target(number=3)
+    assert playing.beyond_mocap_stream.target == "Cho"
     assert play.answer_now(playing, kick(core)).receiver == "Cho"
     ben = next(row.body for row in playing.beyond_mocap_passes.players if row.name == "Ben")
     play.look(playing)
@@ -117,7 +118,7 @@ def test_a_stream_is_answered(playing, room, core):
 def test_what_cannot_be_answered_is_told_and_changes_nothing(playing, room, core):
     play = room("stream.play")
     actions = {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
-    tail = core("ball.hits").hit_at(core("files.bvh").read(CLIPS / "volley_pass.bvh").motion, 48, (30, 70), "LeftHand")
+    tail = replace(kick(core), part="tail")
     play.struck(playing, tail, 0.0)
     end = time.monotonic() + 60.0
     while "has the ball" in told().played and time.monotonic() < end:
@@ -141,7 +142,20 @@ def test_a_file_that_is_loaded_ends_it(playing, room):
 
 def test_it_is_one_step(playing, room):
     OPS.stream_end()
+    OPS.passes_clear()
     assert_one_step(OPS.stream_play)
+    assert room("stream.play").rally() is None and "Undo has ended" in told().played
+
+
+def test_a_scene_that_is_cleared_ends_it(playing, room):
+    OPS.passes_clear()
+    assert all(row.body is None for row in playing.beyond_mocap_passes.players)
+    room("stream.play").look(playing)
+    assert room("stream.play").rally() is None and "cleared" in told().played
+
+
+def test_choosing_is_one_step(playing):
+    assert_one_step(OPS.stream_target, number=3)
 
 
 def test_an_unknown_holder_is_told(playing):

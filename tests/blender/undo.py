@@ -30,6 +30,7 @@ def state():
                    bpy.context.mode),
         "settings": plain(scene.beyond_mocap),
         "passes": plain(scene.beyond_mocap_passes),
+        "stream": plain(scene.beyond_mocap_stream),
         "constraints": sorted((o.name, c.name, round(c.influence, 6)) for o in bpy.data.objects for c in o.constraints),
         "players": [(p.name, p.tracking_file, p.annotation_file, p.take, p.quality, p.body.name if p.body else None)
                     for p in scene.beyond_mocap.players],
