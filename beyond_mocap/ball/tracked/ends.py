@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...motion.track import BALL_RADIUS
+from .kinds import GOAL_WIDTH
 
-GOAL_WIDTH, GOAL_HEIGHT = 7.32, 2.44
+GOAL_HEIGHT = 2.44  # m
 _BACK = 0.5  # s in the field before it can go out again
 
 

@@ -17,8 +17,8 @@ from ..physics import FOOTBALL, Ball
 from .coarse import coarse_courses
 
 GRID = 0.04  # s between the moments in which flights are looked at
-LONGEST = 6.0  # s of a stretch
-_ROUGH_ROUNDS, _ROUNDS, _FINE_ROUNDS = 3, 5, 2  # of descending: for each of _UPWARD, by coarse steps and then by the physics as it is
+LONGEST = 5.0  # s of a stretch
+_ROUGH_ROUNDS, _ROUNDS, _FINE_ROUNDS = 3, 5, 1  # of descending: for each of _UPWARD, by coarse steps and then by the physics as it is
 _UPWARD = (0.0, 2.0, 4.5, 7.0, 10.0, 14.0)  # m/s, tried where heights are not known
 _FLAT = 6.0  # m, a stretch so short is on the ground in the end: no more than a hop
 _SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, how far samples lie from the ball, filled-in ones, heights
@@ -26,6 +26,7 @@ _PLACED = 0.12  # m, how far the places of touches are wrong
 _SPUN = 25.0  # rad/s, usual spin about either axis
 _LOFTED = 8.0  # m/s, usual velocity upward
 _HIGH = 2.2  # m, the ball's height at the next touch, usually at most
+_ENOUGH = 0.01  # share of the cost, below which nothing more is won
 _AT_ONCE = 300  # stretches
 _MOST = 40  # samples of a stretch that are looked at
 
@@ -221,24 +222,28 @@ def _descend(stretches: Stretches, unknown, ball: Ball, rounds: int, follow) -> 
         off_tried = _misses(stretches, tried, *_ways(stretches, tried, ball, follow))
         cost_tried = (off_tried**2).sum(axis=1)
         good = cost_tried < cost
+        better = np.where(good, cost - cost_tried, 0.0) > _ENOUGH * cost
         unknown, off = np.where(good[:, None], tried, unknown), np.where(good[:, None], off_tried, off)
         cost, damping = np.where(good, cost_tried, cost), np.clip(np.where(good, damping / 5.0, damping * 8.0), 1e-6, 1e4)
+        if not better.any():
+            break
     return unknown, cost
 
 
 def _slopes(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray:
-    """(7, S, R) changes of the misses with the unknowns; another place moves the whole way alike."""
-    seen, end = _ways(stretches, unknown, ball, _coarsely)
-    here = _misses(stretches, unknown, seen, end)
-    out = []
+    """(7, S, R) changes of the misses with the unknowns, by coarse steps; another place moves the whole way alike."""
+    count = len(unknown)
+    six = stretches.take(np.tile(np.arange(count), 6))
+    nudged = np.tile(unknown, (6, 1))
+    nudged[count:] += np.repeat(np.diag(_NUDGE)[2:], count, axis=0)
+    seen, end = _ways(six, nudged, ball, _coarsely)
+    misses = _misses(six, nudged, seen, end).reshape(6, count, -1)
+    moved = []
     for axis in range(2):
         shift = _NUDGE[axis] * np.eye(3)[axis]
-        out.append(_misses(stretches, unknown + _NUDGE[axis] * np.eye(7)[axis], seen + shift, end + shift))
-    repeated = stretches.take(np.tile(np.arange(len(unknown)), 5))
-    nudged = np.tile(unknown, (5, 1)) + np.repeat(np.diag(_NUDGE)[2:], len(unknown), axis=0)
-    near = _misses(repeated, nudged, *_ways(repeated, nudged, ball, _coarsely))
-    near = near.reshape(5, len(unknown), -1)
-    return (np.concatenate([np.stack(out), near]) - here) / _NUDGE[:, None, None]
+        shifted = unknown + _NUDGE[axis] * np.eye(7)[axis]
+        moved.append(_misses(stretches, shifted, seen[:count] + shift, end[:count] + shift))
+    return (np.concatenate([np.stack(moved), misses[1:]]) - misses[0]) / _NUDGE[:, None, None]
 
 
 def _cropped(stretches: Stretches) -> Stretches:

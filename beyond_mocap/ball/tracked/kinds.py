@@ -12,7 +12,10 @@ _FAST = 7.0  # m/s relative to the player, more than a dribble's touch
 _STOPPED = 4.0  # m/s, less than a pass
 _TURN = np.cos(np.radians(50.0))  # a deflection keeps to its way within this
 _LINE = 1.2  # m, beyond or before the touch line, where a throw-in is taken
-_STILL = 1.0  # s between the touch before and a throw-in
+_STILL = 3.0  # s between the touch before and a throw-in
+AREA_DEPTH, AREA_WIDTH, GOAL_WIDTH = 16.5, 40.32, 7.32  # m
+_SHOT, _BESIDE = 10.0, 1.5  # m/s toward the goal line; m beside the goal
+_LOW, _HELD = 0.35, 0.6  # m of the ball's centre: below, a foot's; above, a keeper's hands
 
 
 def part_of(height: float | None) -> str:
@@ -47,9 +50,29 @@ def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
 
 def is_throw_in(place: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
     """Whether a ball that lay still or was away for `since` s and now leaves from `place` (3,) is thrown in."""
-    side = np.sign(place[1])
-    inward = -side * after[1] > 0.0
-    return bool(abs(place[1]) > width / 2.0 - _LINE and since > _STILL and inward and np.linalg.norm(after[:2]) > 3.0)
+    return since > _STILL and leaves_line(place, after, width)
+
+
+def leaves_line(place: np.ndarray, after: np.ndarray, width: float) -> bool:
+    """Whether a ball comes into the field from its touch line."""
+    inward = -np.sign(place[1]) * after[1] > 0.0
+    return bool(abs(place[1]) > width / 2.0 - _LINE and inward and np.linalg.norm(after[:2]) > 3.0)
+
+
+def keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str, str] | None:
+    """Part and word of a touch by a goalkeeper in his area: a save of a shot, or a ball taken with the hands.
+
+    place (3,) m, before (3,) m/s; goal: x of his goal line. None where it is a touch like any other's.
+    """
+    away = abs(goal - place[0])
+    if away > AREA_DEPTH or abs(place[1]) > AREA_WIDTH / 2.0:
+        return None
+    toward = float(np.sign(goal) * before[0])
+    if toward > _SHOT:
+        across = place[1] + before[1] * away / toward
+        if abs(across) < GOAL_WIDTH / 2.0 + _BESIDE:
+            return ("foot" if known_height and place[2] < _LOW else "hand"), "save"
+    return ("hand", "hand") if known_height and place[2] > _HELD else None
 
 
 def keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:

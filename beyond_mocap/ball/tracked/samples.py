@@ -16,6 +16,7 @@ _STRAIGHT = 0.4  # seconds that must be straight at constant velocity to be call
 _SCATTER_WINDOW = 1.2  # seconds over which the scatter is taken
 _LEAST_SCATTER, _MOST_SCATTER = 0.03, 0.35  # m
 _WRONG = 6.0  # times the scatter
+_FARTHEST = 1e4  # m from the middle; beyond is no place
 _LOW = 0.3  # m, of a ball on the ground
 
 
@@ -56,6 +57,7 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
     place.
     """
     times, ball = np.asarray(times, float), np.asarray(ball, float)
+    ball = np.where(np.abs(ball) < _FARTHEST, ball, np.nan)
     keep = np.isfinite(times)
     highest = np.maximum.accumulate(np.where(keep, times, -np.inf))
     keep[1:] &= times[1:] > highest[:-1]

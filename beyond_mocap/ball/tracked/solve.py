@@ -29,6 +29,7 @@ _SHORTEST = 0.3  # s that can be solved
 _TOGETHER = 0.06  # s in which samples err together: they count as one
 _STEP = 0.04  # s between the knots of a path
 _BLEND = 0.2  # s over which a path is brought to the place of a touch
+_RESTART = 60.0  # s after which a ball over the touch line has been thrown in
 _EVERYBODY = 14  # players who are tracked: a touch by nobody among so many is a corner that the feed made
 _HEIGHTS = 0.8  # share of samples with a height from which heights are used
 
@@ -128,9 +129,11 @@ def solve(
     if progress is not None:
         progress(0.6, "flights")
     moments = np.array([touch.time for touch in solved])
-    path = SolvedPath(tuple(flown(samples, curves, moments, _has_heights(samples), cancelled)))
-    solved = [_along(touch, path) for touch in solved]
+    heights = _has_heights(samples)
+    path = SolvedPath(tuple(flown(samples, curves, moments, heights, cancelled)))
+    solved = [_along(touch, path, heights) for touch in solved]
     ends = ball_ends(samples.times, path.at(samples.times), *pitch)
+    solved = _thrown_in(solved, ends, pitch[1])
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     sure = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
     return SolvedBall(
@@ -237,7 +240,7 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
     order = sorted(range(len(time)), key=lambda k: time[k])
-    known_height = _has_heights(samples)
+    known_height, goals = _has_heights(samples), _goals(positions, teams, pitch[0])
     out = []
     for k in order:
         player = int(chosen[k])
@@ -247,8 +250,10 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
         kind = kinds.kind_of(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
-        if part != "head" and kinds.is_throw_in(place[k], after[k], since, pitch[1]):
+        if kinds.is_throw_in(place[k], after[k], since, pitch[1]):
             part, kind = "hand", "throw-in"
+        elif player in goals:
+            part, kind = kinds.keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
         sure = _sure(margin[k], away[:, k], player)
         centre = np.array([place[k, 0], place[k, 1], kinds.ground_height(place[k, 2])])
         name = players[player] if player >= 0 else ""
@@ -256,14 +261,40 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
     return out
 
 
+def _goals(positions: np.ndarray, teams: Sequence[str], length: float) -> dict[int, float]:
+    """The goalkeepers (indices) and the x of their goal lines, those of this part of the match."""
+    found = kinds.keepers(positions, list(teams)) if len(teams) == len(positions) else {}
+    places = {keeper: np.nanmedian(positions[keeper, :, 0]) for keeper in found.values()}
+    return {keeper: float(np.sign(x)) * length / 2.0 for keeper, x in places.items() if abs(x) > length / 5.0}
+
+
+def _thrown_in(solved: list[SolvedTouch], ends: list[BallEnd], width: float) -> list[SolvedTouch]:
+    """The touches, the first from the touch line after each ball over it being its throw-in."""
+    out = list(solved)
+    for end in ends:
+        later = [k for k, touch in enumerate(solved) if end.time < touch.time < end.time + _RESTART]
+        takes = (k for k in later if out[k].position[1] * end.y > 0.0)
+        first = next((k for k in takes if kinds.leaves_line(out[k].position, out[k].after, width)), None)
+        if end.kind == "touch line" and first is not None:
+            out[first] = replace(out[first], part="hand", kind="throw-in")
+    return out
+
+
 def _has_heights(samples: Samples) -> bool:
     return bool(np.isfinite(samples.positions[samples.used, 2]).mean() > _HEIGHTS)
 
 
-def _along(touch: SolvedTouch, path: SolvedPath) -> SolvedTouch:
-    """The touch with the velocities that the path has just before and after it."""
+def _along(touch: SolvedTouch, path: SolvedPath, heights: bool) -> SolvedTouch:
+    """The touch with the velocities that the path has just before and after it; where the feed has no heights, with the
+    height and the part that a flight into it asks for."""
     before, after = path.velocity(np.array([touch.time - 1e-4, touch.time + 1e-4]))
-    return replace(touch, before=before, after=after)
+    if heights or touch.part == "hand":
+        return replace(touch, before=before, after=after)
+    height = float(path.at(np.array([touch.time - 1e-4]))[0, 2])
+    part = kinds.part_of(height)
+    kind = {"head": "header", "chest": "chest"}.get(part, touch.kind)
+    position = np.array([*touch.position[:2], kinds.ground_height(height)])
+    return replace(touch, before=before, after=after, position=position, part=part, kind=kind)
 
 
 def _three(values: np.ndarray) -> np.ndarray:

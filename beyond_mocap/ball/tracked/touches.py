@@ -16,12 +16,13 @@ from .pieces import Fits, fit_between
 
 USUAL_CHANGE = 9.0  # m/s, the mean change of velocity by a touch
 TOUCH, FREE = 4.0, 3.5  # nats for a cut of either kind beside what is seen there
+_NEAR = 1.0  # nats for a course that changes by itself just where somebody is
 _LONGEST = 6.0  # seconds of one piece
 _STEPS = 14  # cuts that one piece may leave out
 _JOINT = 0.12  # m by which neighbouring pieces may miss each other
 _JUMP = 8.0  # nats at most for missing each other: the feed has lost the ball and found it elsewhere
-_SKIP = 0.13  # s around a cut in which samples may be wrong: bodies hide the ball there
-_SKIPPED = 2.5  # nats for each sample left out so
+_SKIP = 0.16  # s around a cut in which samples may be wrong: bodies hide the ball there, feeds pin it to a player
+_SKIPPED = 40.0  # nats for a second left out so
 _SHORT, _SHORT_PRICE = 0.24, 6.0  # s within which the course hardly changes twice, nats for twice at once
 
 
@@ -130,13 +131,17 @@ def _knots(pieces: Fits, left, right, times, cuts, upto, begin, player_cost) -> 
     change = after - before
     size = np.sqrt((change**2).sum(axis=1))
     joint = -np.logaddexp(-0.5 * miss, -_JUMP)
-    joint = joint + _SKIPPED * (cuts[resumed] - cuts[cut])
+    joint = joint + _SKIPPED * (second - first - _usual(times)) * (resumed > cut)
     near = np.minimum(player_cost[cut], player_cost[resumed])
     touch = TOUCH + joint + near + _log_touch(size, speed_var, axes)
-    free = FREE + joint + _free_cost(before, change, here, speed_var)
+    free = FREE + _NEAR * np.exp(-near) + joint + _free_cost(before, change, here, speed_var)
     place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
     spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
     return _Knots(time, np.minimum(spread, step), place, before, after, touch, free)
+
+
+def _usual(times: np.ndarray) -> float:
+    return float(np.median(np.diff(times)))
 
 
 def _log_touch(size, variance, axes) -> np.ndarray:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.ball.tracked.planted import planted_match
+from beyond_mocap.ball.tracked.planted_feed import sampled
 from beyond_mocap.ball.tracked.solve import solve
 from beyond_mocap.errors import InputError
 
@@ -106,3 +108,13 @@ def test_filled_samples_are_told():
 def test_too_few_samples_are_refused():
     with pytest.raises(InputError, match="samples of the ball"):
         solve(np.arange(9.0), np.full((9, 3), np.nan), np.zeros((1, 9, 2)), ["home_1"])
+
+
+@pytest.mark.parametrize("fps, heights", [(25.0, True), (10.0, False)])
+def test_a_made_match_is_solved(fps, heights):
+    match = planted_match(45.0, 4)
+    feed = sampled(match, fps=fps, heights=heights)
+    solved = solve(feed.times, feed.ball, feed.positions, feed.ids, feed.teams, (feed.length, feed.width))
+    touches = [(touch.time, touch.player) for touch in match.touches if 1.0 < touch.time < 44.0]
+    recall, precision = share_found(touches, solved, 0.1)
+    assert 2.0 * recall * precision / (recall + precision) >= 0.85
