@@ -25,7 +25,7 @@ _SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, how far samples lie from th
 _PLACED = 0.12  # m, how far the places of touches are wrong
 _SPUN = 25.0  # rad/s, usual spin about either axis
 _LOFTED = 8.0  # m/s, usual velocity upward
-_HIGH = 2.2  # m, the ball's height at the next touch, usually at most
+_TAKEN, _HIGH = 1.5, 2.2  # m, the ball's usual height at the next touch; hardly more than this
 _ENOUGH = 0.01  # share of the cost, below which nothing more is won
 _AT_ONCE = 300  # stretches
 _MOST = 40  # samples of a stretch that are looked at
@@ -179,7 +179,7 @@ def _misses(stretches: Stretches, unknown: np.ndarray, seen: np.ndarray, end: np
     high = off[..., 2] * stretches.weight_z * even
     known = np.isfinite(stretches.end[:, 2])
     last = (end - np.nan_to_num(stretches.end)) / _PLACED
-    over = np.where(known, last[:, 2], np.maximum(end[:, 2] - _HIGH, 0.0) / _PLACED)
+    over = np.where(known, last[:, 2], end[:, 2] / _TAKEN + np.maximum(end[:, 2] - _HIGH, 0.0) / _PLACED)
     rise = np.where(np.isfinite(stretches.velocity[:, 2]), 0.0, unknown[:, 4] / _LOFTED)
     prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :2] / _PLACED).T, rise, *(unknown[:, 5:] / _SPUN).T], axis=1)
     return np.concatenate([_soft(flat.reshape(len(off), -1)), _soft(high), prior], axis=1)

@@ -41,7 +41,8 @@ def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, height
         found = _fitted(_stretches(samples, spans_again, heights), spans_again, cancelled)
         for number, flight, off in zip(again, *found):
             flights[number], offs[number] = flight, off
-    return _exchanged(pieces, groups, stretches, flights, offs)
+    exchanged = _exchanged(pieces, groups, stretches, flights, offs)
+    return exchanged if heights else _dropped(exchanged)
 
 
 def _stretches(samples: Samples, spans, heights: bool) -> Stretches:
@@ -187,9 +188,31 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     places, speeds = piece.positions.copy(), piece.velocities.copy()
     places[:, :2] += every @ both
     speeds[:, :2] += slopes @ both
+    higher = ends[1][2] - places[-1, 2] if np.isfinite(stretches.end[number, 2]) else 0.0
+    places[:, 2] = np.maximum(places[:, 2] + every[:, 1] * higher, FOOTBALL.radius)
     path = np.stack([np.interp(since, piece.times - piece.start, places[:, axis]) for axis in range(2)], axis=1)
     residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if measured.any() else np.nan
     return BallPiece(piece.times, places, speeds, piece.kind, piece.spin, residual, piece.bounces)
+
+
+def _dropped(pieces: list[BallPiece]) -> list[BallPiece]:
+    """The pieces, in order; what comes down on somebody falls from there, where heights are not known."""
+    out = []
+    for piece in pieces:
+        joined = out and abs(out[-1].end - piece.start) < 1e-6
+        above = out[-1].positions[-1, 2] - piece.positions[0, 2] if joined else 0.0
+        out.append(_falling(piece, float(out[-1].positions[-1, 2])) if above > 1e-6 else piece)
+    return out
+
+
+def _falling(piece: BallPiece, height: float) -> BallPiece:
+    """The same, from `height` m down to where it is."""
+    since = piece.times - piece.start
+    falls = height - 0.5 * FOOTBALL.gravity * since**2
+    higher = falls > piece.positions[:, 2]
+    places, speeds = piece.positions.copy(), piece.velocities.copy()
+    places[higher, 2], speeds[higher, 2] = falls[higher], -FOOTBALL.gravity * since[higher]
+    return BallPiece(piece.times, places, speeds, piece.kind, piece.spin, piece.residual, piece.bounces)
 
 
 def _waves(share: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:

@@ -290,7 +290,7 @@ def _along(touch: SolvedTouch, path: SolvedPath, heights: bool) -> SolvedTouch:
     before, after = path.velocity(np.array([touch.time - 1e-4, touch.time + 1e-4]))
     if heights or touch.part == "hand":
         return replace(touch, before=before, after=after)
-    height = float(path.at(np.array([touch.time - 1e-4]))[0, 2])
+    height = float(path.at(np.array([touch.time]))[0, 2])
     part = kinds.part_of(height)
     kind = {"head": "header", "chest": "chest"}.get(part, touch.kind)
     position = np.array([*touch.position[:2], kinds.ground_height(height)])
