@@ -6,7 +6,7 @@ import numpy as np
 
 from .batch import after, launched
 from .pass_scene import Net
-from .physics import Ball
+from .physics import Ball, rolling_spin
 from .strike_moments import StrikeMoments
 
 TIMES = np.linspace(0.1, 2.5, 25)
@@ -14,6 +14,9 @@ TIMES = np.linspace(0.1, 2.5, 25)
 
 SPEEDS = {"toss": (4.5, 8.0), "pass": (5.0, 12.0), "attack": (9.0, 25.0)}
 """m/s between which a ball of each kind sets out, by its name."""
+
+SPINS = {"toss": -0.1, "pass": -0.1, "attack": 0.2}
+"""Shares of the spin with which a ball rolls at its speed: struck from below it turns back, struck hard it turns forward."""
 
 LONG = {"toss": 1.5, "pass": 1.5, "attack": 0.9}
 PER_SECOND = 2.0
@@ -79,9 +82,16 @@ def wished(velocities: np.ndarray, kind: str) -> np.ndarray:
     return way * np.clip(speed, *SPEEDS[kind])[:, None]
 
 
-def ways_of(starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball) -> np.ndarray:
+def spun(starts: np.ndarray, target: np.ndarray, seconds: np.ndarray, ball: Ball, kind: str) -> np.ndarray:
+    """(N, 3) rad/s: the spin of balls of a kind that are to go from `starts` (N, 3) m to `target` ((N,) 3) m."""
+    return SPINS[kind] * rolling_spin((target - starts) / np.asarray(seconds)[:, None], ball)
+
+
+def ways_of(
+    starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray, ball: Ball
+) -> np.ndarray:
     """(N, _STEPS + 1, 3) m: flights of N balls, each at even steps of its own `seconds` (N,)."""
-    balls = launched(starts, velocities, None, ball)
+    balls = launched(starts, velocities, spin, ball)
     out = [balls.position]
     for _ in range(_STEPS):
         balls = after(balls, ball, seconds / _STEPS)
@@ -109,9 +119,11 @@ def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float
     return OWN_BODY * np.where(inside, np.clip((TRUNK - near) / TRUNK, 0.0, 1.0), 0.0).max(axis=1)
 
 
-def arrivals(starts: np.ndarray, velocities: np.ndarray, seconds: np.ndarray, ball: Ball) -> np.ndarray:
+def arrivals(
+    starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray, ball: Ball
+) -> np.ndarray:
     """(N, 3) m/s: velocities with which balls come in after `seconds` (N,); one that is met on the ground has not bounced."""
-    return after(launched(starts, velocities, None, ball), ball, seconds - A_MOMENT).velocity
+    return after(launched(starts, velocities, spin, ball), ball, seconds - A_MOMENT).velocity
 
 
 def against_the_part(arriving: np.ndarray, leaving: np.ndarray, part: np.ndarray) -> np.ndarray:

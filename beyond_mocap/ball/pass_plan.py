@@ -22,7 +22,7 @@ from .flight import Flight, Launch, fly
 from .orders import HitOrder, Stance
 from .pass_costs import (
     THROUGH, TIMES, TRUNK_TO, UPRIGHT, against_the_part, arrivals, clears_net, cost_of_moments, lasting, misses,
-    out_of_the_way, rising, through_body, ways_of, wished,
+    out_of_the_way, rising, spun, through_body, ways_of, wished,
 )  # fmt: skip
 from .pass_scene import GROUND, Pass, PassScene, served_by
 from .physics import FASTEST, Ball
@@ -97,7 +97,8 @@ class Natural:
 
 @dataclass(frozen=True, eq=False)
 class Strike:
-    """One strike as it is played. order: what the body has to do. velocity_in, velocity_out (3,) m/s of the ball.
+    """One strike as it is played. order: what the body has to do. velocity_in, velocity_out (3,) m/s of the ball; spin
+    (3,) rad/s with which it leaves.
     outcome: struck, received, missed or dropped. bounces, travel s: of the flight that goes out (0 for the last).
     natural: the ways it was chosen from; None for the last."""
 
@@ -105,6 +106,7 @@ class Strike:
     order: HitOrder
     velocity_in: np.ndarray
     velocity_out: np.ndarray
+    spin: np.ndarray
     outcome: str
     bounces: int
     travel: float
@@ -341,8 +343,9 @@ class _Planner:
         natural = wished(options.velocities(), site.kind)
         starts = options.centres(site, _unit(natural), self.ball.radius)[option]
         target = self._place_of(number + 1, after, -natural[:1] * [1.0, 1.0, 0.0])
-        aimed = aim(starts, target, self.ball, seconds, one.bounces, fastest=self._fastest(number))
-        flights = (starts, aimed.velocity, seconds)
+        spin = spun(starts, target, seconds, self.ball, site.kind)
+        aimed = aim(starts, target, self.ball, seconds, one.bounces, spin, fastest=self._fastest(number))
+        flights = (starts, aimed.velocity, spin, seconds)
         arriving = arrivals(*flights, self.ball)
         cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)
         ways = ways_of(*flights, self.ball)
@@ -423,15 +426,21 @@ class _Planner:
         targets = np.array([self._target(number, places, chain) for number in range(self.last)])
         seconds = np.array([link.seconds for link in chain[:-1]])
         bounces = np.array([one.bounces for one in self.passes])
+        spin = self._spins(places[:-1], targets, seconds)
         velocities, missed = np.empty((self.last, 3)), np.empty(self.last)
         for count in np.unique(bounces):
             same = np.flatnonzero(bounces == count)
             near = np.array([chain[number].velocity for number in same])
-            aimed = aim(places[same], targets[same], self.ball, seconds[same], int(count), near=near)
+            aimed = aim(places[same], targets[same], self.ball, seconds[same], int(count), spin[same], near=near)
             other = (np.linalg.norm(aimed.velocity - near, axis=1) > LEAP) & (not last)
             velocities[same] = np.where(other[:, None], near, aimed.velocity)
             missed[same] = np.where(other, np.inf, aimed.miss)
-        return velocities, list(arrivals(places[:-1], velocities, seconds, self.ball)), missed
+        return velocities, list(arrivals(places[:-1], velocities, spin, seconds, self.ball)), missed
+
+    def _spins(self, places, targets, seconds) -> np.ndarray:
+        """(K-1, 3) rad/s with which the balls leave."""
+        each = zip(places, targets, seconds, self.sites)
+        return np.array([spun(a[None], b, np.array([s]), self.ball, site.kind)[0] for a, b, s, site in each])
 
     def _within_reach(self, chain, places, missed: np.ndarray) -> list[_Link]:
         """The chain with flights that miss some frames longer or shorter, where they then do not."""
@@ -454,8 +463,8 @@ class _Planner:
 
     def _tell_ways(self, chain, places, velocities) -> None:
         for number, one in enumerate(self.passes):
-            seconds = np.array([chain[number].seconds])
-            through = self._in_the_way(number, ways_of(places[number][None], velocities[number][None], seconds, self.ball))[0]
+            flight = (places[number][None], velocities[number][None], None, np.array([chain[number].seconds]))
+            through = self._in_the_way(number, ways_of(*flight, self.ball))[0]
             for (name, _), depth in zip(self.others[number], through):
                 if depth > THROUGH:
                     self.warnings.append(f"pass {number + 1}, from {one.giver} to {one.receiver}: the ball flies through {name}")
@@ -469,7 +478,7 @@ class _Planner:
         seconds = min(first, self.serving)
         aimed = aim(start[None], place[None], self.ball, np.array([seconds]), 0)
         launch = Launch(first - seconds, start, aimed.velocity[0])
-        return launch, arrivals(start[None], aimed.velocity, np.array([seconds]), self.ball)[0]
+        return launch, arrivals(start[None], aimed.velocity, None, np.array([seconds]), self.ball)[0]
 
     def _serving_seconds(self, place: np.ndarray) -> float:
         """How long the ball flies in, on whole frames: a quiet throw, as high as a net needs."""
@@ -478,7 +487,7 @@ class _Planner:
         tried = np.ceil(np.linspace(quiet, LONGEST_SERVE, 8) * fps) / fps if quiet < LONGEST_SERVE else np.array([quiet])
         starts = np.tile(start, (len(tried), 1))
         aimed = aim(starts, place, self.ball, tried, 0)
-        good = (aimed.miss <= ON_TARGET) & self._clear(ways_of(starts, aimed.velocity, tried, self.ball))
+        good = (aimed.miss <= ON_TARGET) & self._clear(ways_of(starts, aimed.velocity, None, tried, self.ball))
         return float(tried[np.argmax(good)])
 
     def _serving_place(self, place: np.ndarray) -> np.ndarray:
@@ -552,8 +561,10 @@ class _Planner:
     def _flies(self, number: int, places, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(S,) bool: whether a pass can take `seconds` (S,), and the velocities (S, 3) m/s that it then takes."""
         start, target = np.tile(places[number], (len(seconds), 1)), places[number + 1]
-        aimed = aim(start, target, self.ball, seconds, self.passes[number].bounces, fastest=self._fastest(number))
-        good = aimed.possible & (aimed.miss <= ON_TARGET) & self._clear(ways_of(start, aimed.velocity, seconds, self.ball))
+        spin = spun(start, target, seconds, self.ball, self.sites[number].kind)
+        aimed = aim(start, target, self.ball, seconds, self.passes[number].bounces, spin, fastest=self._fastest(number))
+        clear = self._clear(ways_of(start, aimed.velocity, spin, seconds, self.ball))
+        good = aimed.possible & (aimed.miss <= ON_TARGET) & clear
         return good, aimed.velocity
 
     # -- what came out
@@ -576,14 +587,16 @@ class _Planner:
         seconds = float(np.ceil((times[-1] + self.scene.lead_out) * fps - 1e-6) / fps)
         outcome = {"missed": "missed", "dropped": "dropped", "": "received"}[self.passes[-1].error]
         leaving = [*velocities, self._limp(outcome, chain[-1], arriving[-1])]
+        targets = np.array([self._target(number, places, chain) for number in range(self.last)])
+        spins = [*self._spins(places[:-1], targets, np.array([link.seconds for link in chain[:-1]])), np.zeros(3)]
         strikes = []
         for number, (time, link) in enumerate(zip(times, chain)):
             order, out = self._order(chain, number, float(time), places, normals), number < self.last
             strikes.append(Strike(
-                self.sites[number].player, order, arriving[number], leaving[number], "struck" if out else outcome,
+                self.sites[number].player, order, arriving[number], leaving[number], spins[number], "struck" if out else outcome,
                 self.passes[number].bounces if out else 0, link.seconds, link.natural if out else None,
             ))  # fmt: skip
-        flights = self._flights(serve, times, places, leaving, seconds, outcome)
+        flights = self._flights(serve, strikes, seconds, outcome)
         return PassPlan(tuple(strikes), flights, seconds, fps, tuple(self.warnings))
 
     def _limp(self, outcome: str, link: _Link, arriving: np.ndarray) -> np.ndarray:
@@ -593,15 +606,13 @@ class _Planner:
         ahead, up = LIMP[outcome]
         return np.array([ahead * np.cos(link.facing), ahead * np.sin(link.facing), up])
 
-    def _flights(self, serve: Launch, times, places, leaving, seconds: float, outcome: str) -> tuple[Flight, ...]:
-        flights = [fly(serve, self.ball, times[0] - serve.time)]
-        ends = [*times[1:], seconds]
-        count = len(times) - (outcome == "missed")
-        if outcome == "missed":
-            ends[count - 1] = seconds  # who misses it leaves it to fly on
-        for number in range(count):
-            launch = Launch(float(times[number]), places[number], leaving[number])
-            flights.append(fly(launch, self.ball, max(ends[number] - times[number], 1.0 / self.scene.fps)))
+    def _flights(self, serve: Launch, strikes: Sequence[Strike], seconds: float, outcome: str) -> tuple[Flight, ...]:
+        flights = [fly(serve, self.ball, strikes[0].order.time - serve.time)]
+        sent = strikes[:-1] if outcome == "missed" else strikes  # a ball that is missed flies on
+        ends = [*(one.order.time for one in strikes[1 : len(sent)]), seconds]
+        for one, end in zip(sent, ends):
+            launch = Launch(one.order.time, np.array(one.order.ball), one.velocity_out, one.spin)
+            flights.append(fly(launch, self.ball, max(end - launch.time, 1.0 / self.scene.fps)))
         return tuple(flights)
 
     # -- what cannot be

@@ -25,6 +25,9 @@ LIMITS = {
 }  # fmt: skip
 """Least and most of a scene's numbers."""
 MOST_PASSES, MOST_PLAYERS = 1000, 100
+BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
+"""Bones whose weights in eq. 1 can be set (`links.BONES`)."""
+
 RESERVED = ("ball", "strikes", "scene")
 """Names that other files of a scene have."""
 
@@ -90,7 +93,7 @@ class Net:
 @dataclass(frozen=True)
 class Weights:
     """What eq. 2 (speed, vectors, times: an example's likeness) and eq. 1 (position, velocity: a transition's) are times,
-    and bones: joint -> what it is times in eq. 1."""
+    and bones: one of BONES -> what it is times in eq. 1."""
 
     speed: float = 1.0
     vectors: float = 1.0
@@ -294,6 +297,9 @@ def _check_numbers(scene: PassScene) -> None:
         raise InputError("errors", f"{scene.missed:g} missed and {scene.dropped:g} dropped", "1 in all at most")
     if scene.directions not in (0, 8):
         raise InputError("directions", f"{scene.directions!r}", "8, or 0 for any")
+    for bone in scene.weights.bones:
+        if bone not in BONES:
+            raise InputError("weights: bones", f"{bone!r}", f"one of {', '.join(BONES)}", "check the spelling")
     for entry in fields(Weights):
         values = [getattr(scene.weights, entry.name)] if entry.name != "bones" else list(scene.weights.bones.values())
         for value in values:

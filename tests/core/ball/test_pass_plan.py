@@ -61,7 +61,7 @@ def test_times_are_a_chain_of_travels_on_whole_frames(plans, name):
 def test_every_ball_comes_to_the_next_strike_with_its_bounces(plans, name):
     scene, plan = plans(name)
     for before, after in zip(plan.strikes, plan.strikes[1:]):
-        flight = fly(Launch(0.0, before.order.ball, before.velocity_out), ball_of(scene), before.travel)
+        flight = fly(Launch(0.0, before.order.ball, before.velocity_out, before.spin), ball_of(scene), before.travel)
         assert np.linalg.norm(flight.at([before.travel])[0] - after.order.ball) <= ON_TARGET
         assert np.sum(flight.bounces < before.travel - 2e-3) == before.bounces
         assert np.allclose(flight.velocity([before.travel - 2e-3])[0], after.velocity_in, atol=0.1)

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.ball.pass_scene import GROUND, Example, PassScene, served_by
+from beyond_mocap.ball import links
+from beyond_mocap.ball.pass_scene import BONES, GROUND, Example, PassScene, served_by
 from beyond_mocap.ball.sample_scenes import SAMPLES as KEPT
 from beyond_mocap.errors import InputError
 from beyond_mocap.files.scene_json import parse_scene, read_scene, scene_dict, scene_text
@@ -77,6 +78,10 @@ def test_samples_are_read_and_written_back(path):
     assert parse_scene(KEPT[path.stem]) == scene
 
 
+def test_bones_are_those_of_equation_1():
+    assert BONES == links.BONES
+
+
 def test_every_kept_sample_is_a_file():
     assert sorted(KEPT) == [path.stem for path in SAMPLES]
 
@@ -120,7 +125,8 @@ def test_every_kept_sample_is_a_file():
     (["errors"], {"missed": 2}, "from 0 to 1"),
     (["errors"], {"missed": 0.7, "dropped": 0.7}, "1 in all"),
     (["weights"], {"speed": -1}, "from 0"),
-    (["weights"], {"bones": {"Hips": "much"}}, "a number"),
+    (["weights"], {"bones": {"root": "much"}}, "a number"),
+    (["weights"], {"bones": {"Tail": 1}}, "one of root, head"),
     (["net"], {"from": [0, 0], "to": [0, 0], "height": 1}, "two places"),
     (["net"], {"from": [0, 0], "to": [0, 1]}, "no 'height'"),
     (["serve"], "A", "ground, [x, y, z]"),
