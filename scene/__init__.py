@@ -24,6 +24,7 @@
 - `key_reduction`   keys that curves do not need are left out
 - `ride`        path editing: armatures whose motion rides a curve
 - `passes`      the ball and who keeps it going: hit analysis, passing scenes, who carries the ball, the solved ball
+- `aimed`       a ball aimed at a target that can be dragged; rigid bodies take it over
 - `stream`      a body that arrives over this machine's own network while it moves
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
@@ -37,6 +38,8 @@ from . import (
     background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, result, rig,
     session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
+from .aimed import live as aimed_live
+from .aimed import settings as aimed
 from .passes import hits_shown
 from .passes import live as passes_live
 from .passes import settings as passes
@@ -52,6 +55,7 @@ CLASSES = (
     BeyondMocapRide,
     *passes.CLASSES,
     *stream.CLASSES,
+    aimed.BeyondMocapAim,
     video.BeyondMocapVideo,
     view_settings.BeyondMocapView,
     view_settings.BeyondMocapPlayhead,
@@ -77,6 +81,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_ride", BeyondMocapRide),
     ("Object", "beyond_mocap_hits", passes.BeyondMocapHits),
     ("Object", "beyond_mocap_ball", passes.BeyondMocapBall),
+    ("Object", "beyond_mocap_aim", aimed.BeyondMocapAim),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
     ("Scene", "beyond_mocap_passes", passes.BeyondMocapPasses),
     ("Scene", "beyond_mocap_stream", stream.BeyondMocapStream),
@@ -106,6 +111,7 @@ def register():
     ride_live.register()
     ride_measure.register()
     hits_shown.register()
+    aimed_live.register()
     receiver.register()
     stream_follow.register()
     play.register()
@@ -118,6 +124,7 @@ def unregister():
     stream_follow.unregister()
     receiver.unregister()
     passes_live.unregister()
+    aimed_live.unregister()
     hits_shown.unregister()
     ride_measure.unregister()
     ride_live.unregister()

@@ -16,11 +16,11 @@ RADIUS = 0.11  # metres, Laws of the Game: circumference 0.68 to 0.70 m
 ROLLING_BELOW = 0.16  # metres of the centre's height up to which the ground turns the ball
 
 
-def create(context: bpy.types.Context, name: str, collection) -> bpy.types.Object:
-    """A ball object with dark patches where a football has its pentagons, in `collection`."""
+def create(context: bpy.types.Context, name: str, collection, radius: float = RADIUS) -> bpy.types.Object:
+    """A ball object of `radius` m with dark patches where a football has its pentagons, in `collection`."""
     mesh = bpy.data.meshes.new(name)
     shape = bmesh.new()
-    bmesh.ops.create_icosphere(shape, subdivisions=4, radius=RADIUS * units_per_metre(context.scene))
+    bmesh.ops.create_icosphere(shape, subdivisions=4, radius=radius * units_per_metre(context.scene))
     patches = _pentagons()
     for face in shape.faces:
         face.smooth = True
@@ -45,9 +45,17 @@ def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start:
     group = "Object Transforms"
     curves = {
         "location": (group, places * units_per_metre(scene)),
-        "rotation_quaternion": (group, rolling(places)),
+        "rotation_quaternion": (group, rolling(places) if path.rotations is None else _turned(path, at)),
     }
     return channels.animate(ball, f"{ball.name} path", frames, curves)
+
+
+def _turned(path: BallPath, at: np.ndarray) -> np.ndarray:
+    """Rotations (F, 4) of a path that has its own, at seconds (F,) after its first sample."""
+    seconds = path.times - path.times[0]
+    after = np.clip(np.searchsorted(seconds, at), 1, len(seconds) - 1)
+    share = np.clip((at - seconds[after - 1]) / (seconds[after] - seconds[after - 1]), 0.0, 1.0)
+    return quaternion.continuous(quaternion.slerp(path.rotations[after - 1], path.rotations[after], share))
 
 
 def rolling(places: np.ndarray) -> np.ndarray:

@@ -53,6 +53,27 @@ def animate(
     return action
 
 
+def rewrite(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np.ndarray]) -> None:
+    """Let the action that `target` plays have other keys, in place: data path -> values (F, n) at frames (F,), rising. Paths
+    without curves get no keys."""
+    found = curves(*playing(target))
+    keys = np.empty((len(frames), 2), np.float32)
+    keys[:, 0] = frames
+    for path, values in channels.items():
+        for index in range(values.shape[1]):
+            curve = found.get((path, index))
+            if curve is None:
+                continue
+            points = curve.keyframe_points
+            if len(points) != len(frames):
+                points.clear()
+                points.add(len(frames))
+            keys[:, 1] = values[:, index]
+            points.foreach_set("co", keys.ravel())
+            points.foreach_set("interpolation", np.full(len(frames), LINEAR, np.int32))
+            curve.update()
+
+
 def check_free(target: bpy.types.ID) -> None:
     """InputError where an NLA strip is being tweaked: Blender lets nobody change the action then."""
     data = target.animation_data
@@ -101,6 +122,16 @@ def curves(action: bpy.types.Action, slot) -> dict[tuple[str, int], bpy.types.FC
             bag = strip.channelbag(slot)
             found.update({(c.data_path, c.array_index): c for c in (bag.fcurves if bag else ())})
     return found
+
+
+def remove_curve(action: bpy.types.Action, slot, curve: bpy.types.FCurve) -> None:
+    """Take a curve out of an action."""
+    for layer in action.layers:
+        for strip in layer.strips:
+            bag = strip.channelbag(slot)
+            if bag is not None and curve in bag.fcurves[:]:
+                bag.fcurves.remove(curve)
+                return
 
 
 def keys_of(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:

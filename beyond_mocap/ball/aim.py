@@ -282,15 +282,21 @@ def _learnt(slope: np.ndarray, step: np.ndarray, moved: np.ndarray) -> np.ndarra
 
 
 def _chosen_times(problem: _Problem, loft: float | None) -> np.ndarray:
-    """(B,) s: of TIMES the one with the slowest launch, or the launch nearest to `loft` rad, as the first guesses have
-    it."""
-    count, times = len(problem.start), len(TIMES)
-    many = problem.only(np.repeat(np.arange(count), times)).at_time(np.tile(TIMES, count))
-    launch, found = many.guessed()
+    """(B,) s: of TIMES, and then of times beside it, the one with the slowest launch, or the launch nearest to `loft` rad, as
+    the first guesses have it."""
+    coarse = _best_time(problem, np.tile(TIMES, (len(problem.start), 1)), loft)
+    return _best_time(problem, coarse[:, None] * np.linspace(0.9, 1.1, 11), loft)
+
+
+def _best_time(problem: _Problem, times: np.ndarray, loft: float | None) -> np.ndarray:
+    """(B,) s: of each row of `times` (B, N) the best one."""
+    count, each = times.shape
+    launch, found = problem.only(np.repeat(np.arange(count), each)).at_time(times.ravel()).guessed()
     worth = length(launch)
     if loft is not None:
         worth = np.abs(np.arctan2(launch[:, 2], length(launch * [1.0, 1.0, 0.0])) - loft)
-    return TIMES[np.argmin(np.where(found, worth, worth + 1e6).reshape(count, times), axis=1)]
+    best = np.argmin(np.where(found, worth, worth + 1e6).reshape(count, each), axis=1)
+    return times[np.arange(count), best]
 
 
 def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np.ndarray:

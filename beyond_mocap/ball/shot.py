@@ -1,0 +1,120 @@
+"""One strike towards a target: of all frames in which a part can strike, the one from which the ball leaves.
+
+From each frame the ball lies where the part touches it on the side of its launch; all launches are aimed at once (Ball
+handling §4, Fig. 6), and the frame in which the part moves fastest along its launch is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion.motion import Motion, at_frames, pose_kinematics
+from ..motion.striking import Surface
+from .aim import CLOSE, Aimed, aim, along_ground, out_of_reach
+from .contact import StruckFrom, ball_centre
+from .physics import Ball, length
+
+RISE = 0.3
+"""How much the first guess of a launch leads up, for one that leads level."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strikes:
+    """Where a part can strike, at frames (N,) of a scene, in the world: start, end (N, 3) m of its line, radius m, velocity
+    (N, 3) m/s."""
+
+    frames: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    radius: float
+    velocity: np.ndarray
+
+    @classmethod
+    def of(cls, motion: Motion, surface: Surface, rows: np.ndarray, frames: np.ndarray) -> Strikes:
+        """Those of a motion's `rows` (N,), which are the scene's `frames` (N,)."""
+        step = 0.5
+        lines = []
+        for offset in (-step, 0.0, step):
+            root, local = at_frames(motion, np.clip(rows + offset, 0, len(motion) - 1))
+            lines.append(np.array(surface.line(*pose_kinematics(motion.skeleton, root, local))))
+        taken = np.clip(rows + step, 0, len(motion) - 1) - np.clip(rows - step, 0, len(motion) - 1)
+        velocity = (lines[2] - lines[0]).mean(axis=0) * (motion.fps / np.maximum(taken, 1e-9))[:, None]
+        return cls(np.asarray(frames), lines[1][0], lines[1][1], surface.radius, velocity)
+
+    def balls(self, towards: np.ndarray, radius: float) -> np.ndarray:
+        """(N, 3) m: the centre of a ball of `radius` m that leaves along `towards` (N, 3)."""
+        return ball_centre(StruckFrom(self.start, self.end, self.radius, self.velocity), towards, radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """The launches from all frames (N,), and which one is taken: starts (N, 3) m, aimed, chosen."""
+
+    frames: np.ndarray
+    starts: np.ndarray
+    aimed: Aimed
+    chosen: int
+
+    @property
+    def start(self) -> np.ndarray:
+        """(3,) m: the ball's centre at the strike."""
+        return self.starts[self.chosen]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(3,) m/s with which it leaves."""
+        return self.aimed.velocity[self.chosen]
+
+    @property
+    def seconds(self) -> float:
+        """s until it is at the target."""
+        return float(self.aimed.seconds[self.chosen])
+
+
+def shoot(
+    strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
+    turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf, near: np.ndarray | None = None,
+    what: str = "aim",
+) -> Shot:
+    """The strike that sends a ball to `target` (3,) m.
+
+    seconds (N,) from each frame on, or one number; None: the slowest launch. turns: back spin and spin to the left, turns a
+    second. ground: it goes along the ground; else after so many bounces. near (N, 3): launches to begin with. InputError
+    where no frame has one that is possible within `fastest` m/s; `what` is named there.
+    """
+    target = np.asarray(target, float)
+    way = target - 0.5 * (strikes.start + strikes.end)
+    towards = np.where(np.isfinite(near), near, way + length(way)[:, None] * [0.0, 0.0, RISE]) if near is not None \
+        else way + length(way)[:, None] * [0.0, 0.0, RISE]
+    spin = spins(way, turns)
+    for _ in range(1 if near is not None else 2):
+        if ground:
+            towards = towards * [1.0, 1.0, 0.0]
+        starts = strikes.balls(towards, ball.radius)
+        if length(starts - target).min() < ball.radius:
+            raise InputError(what, "the target is where the ball is struck", "a target some way off", "move the target")
+        aimed = along_ground(starts, target, ball, seconds, fastest=fastest) if ground else \
+            aim(starts, target, ball, seconds, bounces, spin, fastest, near)
+        towards = near = aimed.velocity
+    if ground:
+        starts[:, 2] = ball.radius
+    if not aimed.possible.any():
+        best = int(np.argmin(np.where(aimed.miss <= CLOSE, length(aimed.velocity), np.inf)))
+        raise out_of_reach(starts, np.broadcast_to(target, starts.shape), aimed, best, fastest, what)
+    return Shot(strikes.frames, starts, aimed, _chosen(strikes, aimed))
+
+
+def spins(way: np.ndarray, turns: tuple[float, float]) -> np.ndarray:
+    """Spins (N, 3) rad/s of balls that leave along `way` (N, 3): back spin and spin to the left, turns a second."""
+    level = way * [1.0, 1.0, 0.0] / np.maximum(length(way * [1.0, 1.0, 0.0]), 1e-9)[:, None]
+    back = np.stack([level[:, 1], -level[:, 0], np.zeros(len(way))], axis=1)
+    return 2.0 * np.pi * (turns[0] * back + turns[1] * np.array([0.0, 0.0, 1.0]))
+
+
+def _chosen(strikes: Strikes, aimed: Aimed) -> int:
+    """Of the launches that are possible, the one along which the part moves fastest."""
+    along = aimed.velocity / np.maximum(length(aimed.velocity), 1e-9)[:, None]
+    return int(np.argmax(np.where(aimed.possible, np.sum(strikes.velocity * along, axis=1), -np.inf)))
