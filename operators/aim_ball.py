@@ -20,8 +20,8 @@ FAR = 10.0  # metres to a target that is made
 
 
 class BEYOND_MOCAP_OT_aim_ball(Verb, bpy.types.Operator):
-    """Let the selected armature strike the selected ball (a new one, if none is) so that it arrives at the selected Empty (a new
-one, if none is). Drag the Empty: the ball follows. Without an armature the ball leaves from where it lies"""
+    """Let the selected armature strike the selected ball (a new one, if none is) so that it arrives at the selected
+Empty (a new one, if none is). Drag the Empty: the ball follows. Without an armature the ball leaves from where it lies"""
 
     bl_idname = "beyond_mocap.aim_ball"
     bl_label = "Aim Ball"
@@ -29,14 +29,19 @@ one, if none is). Drag the Empty: the ball follows. Without an armature the ball
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="What the ball is struck with")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     found: BoolProperty(
-        name="Find the Strike", default=True, description="Take the ball stretch of the strike nearest to the current frame; else From and To"
+        name="Find the Strike", default=True,
+        description="Take the ball stretch of the strike nearest to the current frame; else From and To",
     )
     first: IntProperty(name="From", default=1, description="First frame on which the ball may be struck")
     last: IntProperty(name="To", default=1, description="Last frame on which the ball may be struck")
     way: EnumProperty(name="Way", items=WAYS, default="AIR", description="How the ball gets there")
-    bounces: IntProperty(name="Bounces", default=0, min=0, max=5, description="How often it touches the ground before it arrives")
+    bounces: IntProperty(
+        name="Bounces", default=0, min=0, max=5, description="How often it touches the ground before it arrives"
+    )
     timing: EnumProperty(name="Arrives", items=TIMES, default="FREE", description="When it arrives")
-    seconds: FloatProperty(name="Flight", default=1.0, min=0.05, max=20.0, description="Seconds from the strike to the target")
+    seconds: FloatProperty(
+        name="Flight", default=1.0, min=0.05, max=20.0, description="Seconds from the strike to the target"
+    )
     arrival: IntProperty(name="Frame", default=50, description="Scene frame on which the ball arrives")
     ball: EnumProperty(name="Ball", items=BALLS, default="football", description="What kind of ball it is")
 
@@ -68,7 +73,8 @@ one, if none is). Drag the Empty: the ball follows. Without an armature the ball
             first = last = scene.frame_current
         elif self.found:
             first, last = stretch_of(scene, body, self.part, self.side)
-        own = {name: getattr(self, name) for name in ("part", "side", "way", "bounces", "timing", "seconds", "arrival", "ball")}
+        names = ("part", "side", "way", "bounces", "timing", "seconds", "arrival", "ball")
+        own = {name: getattr(self, name) for name in names}
         place = shots.place_of(scene, ball) if ball is not None else (0.0, 0.0, 0.0)
         wish = shots.Wish(body=body, bone="", first=first, last=last, target=(0.0, 0.0, 0.0), place=place, **own)
         there = shots.place_of(scene, target) if target is not None else shots.ahead(shots.strikes_of(scene, wish), FAR)

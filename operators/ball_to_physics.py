@@ -1,4 +1,4 @@
-"""Ball to Physics: Blender's rigid bodies take the ball over on a frame. Take Ball Back: it goes its keyed way again."""
+"""Ball to Physics: Blender's rigid bodies take the ball over on a frame. Take Ball Back: it goes its keyed way."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_ball_to_physics(Verb, bpy.types.Operator):
-    """From the current frame on Blender's rigid bodies move the ball, as fast and with the spin that it has there: keyed as Animated
-up to then, over a ground that is solid; other selected meshes are in its way. Play from the start to see it"""
+    """From the current frame on Blender's rigid bodies move the ball, as fast and with the spin that it has there: keyed
+as Animated up to then, over a ground that is solid; other selected meshes are in its way. Play from the start to see it"""
 
     bl_idname = "beyond_mocap.ball_to_physics"
     bl_label = "Ball to Physics"
 
     frame: IntProperty(name="Frame", default=0, min=0, description="Frame of the handover; 0: the current one")
     ball: EnumProperty(
-        name="Ball", items=(("OWN", "Own", "The kind that it is aimed as", 9), *((*kind, number) for number, kind in enumerate(BALLS))),
-        default="OWN", description="What kind of ball it is",
+        name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
+        description="What kind of ball it is",
     )
 
     @classmethod
@@ -39,7 +39,8 @@ up to then, over a ground that is solid; other selected meshes are in its way. P
         ball = ball_meant(context)
         frame = self.frame or context.scene.frame_current
         kind = ball.beyond_mocap_aim.ball if self.ball == "OWN" else self.ball
-        solid = [thing for thing in context.selected_objects if thing.type == "MESH" and thing != ball]
+        chosen = [thing for thing in context.selected_objects if thing.type == "MESH" and thing.visible_get()]
+        solid = [thing for thing in chosen if thing != ball]
         handover.hand_over(context.scene, ball, frame, kind, solid)
         self.report({"INFO"}, f"Physics has {ball.name} from frame {frame} on: play from the start")
 

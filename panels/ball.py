@@ -6,6 +6,7 @@ import bpy
 
 from ..scene.passes import graph
 from ..scene.passes.settings import active_row, ball_of, subject, told_lines
+from .aim import aim
 from .stream import live, stream
 from .tab import Step, paragraph, table
 
@@ -68,6 +69,7 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
         section(layout, "tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
         section(layout, "hits", "Hit Analysis", lambda opened: hits(opened, context))
         section(layout, "hold", "Carried Ball", lambda opened: carried(opened, context))
+        section(layout, "aim", "Aim Ball", lambda opened: aim(opened, context))
         section(layout, "stream", "Live Stream", lambda opened: stream(opened, context))
         section(layout, "live", "Play Live", lambda opened: live(self, opened, context))
 

@@ -10,6 +10,7 @@ from .tab import Step
 ICONS = {
     "track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
     "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "ghosts": "GHOST_ENABLED",
+    "shots": "CON_TRACKTO",
 }
 
 

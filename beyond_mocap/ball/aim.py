@@ -30,6 +30,8 @@ HEIGHTS = 20
 """Launch speeds upward that are looked at for a first guess."""
 TIMES = np.geomspace(0.1, 6.0, 40)
 """s that are looked at where the time is free."""
+FASTEST_TRIED = 200.0
+"""m/s beyond which no launch is begun with."""
 NUDGE = 1e-3
 """m/s by which a launch is varied to see where that takes it."""
 
@@ -50,19 +52,19 @@ class Aimed:
 def aim(
     start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
     spin: np.ndarray | None = None, fastest: float | None = None, near: np.ndarray | None = None, ground: float = 0.0,
-    loft: float | None = None,
+    loft: float | None = None, about: np.ndarray | None = None,
 ) -> Aimed:
     """Launches from `start` (B, 3) m so that after exactly `bounces` bounces the ball's centre is at `target` (B, 3) m.
 
     seconds (B,) after the launch; a number: all alike; None: the time with the slowest launch, or the one that leaves
     nearest to `loft` rad over the horizon. spin (B, 3) rad/s, None: none. fastest m/s: launches beyond are not
     possible. near (B, 3) m/s: a launch close to the one wanted (the last one, while a target is dragged); rows of it
-    that are not finite are not used. Any of start, target, spin may be (3,): the same for all. InputError: numbers that
-    cannot be meant.
+    that are not finite are not used. about (B,) s: where the time is free, it is looked for near to these. Any of
+    start, target, spin may be (3,): the same for all. InputError: numbers that cannot be meant.
     """
     problem = _Problem.of(start, target, ball, seconds, bounces, spin, ground)
     if seconds is None:
-        problem = problem.at_time(_chosen_times(problem, loft))
+        problem = problem.at_time(_chosen_times(problem, loft, about))
     velocity, miss = _solved(problem, near)
     possible = miss <= CLOSE
     if fastest is not None:
@@ -227,7 +229,7 @@ def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarra
     The slopes of eq. 7 are taken from launches beside the first one and kept up by what each step shows (Broyden's
     rule); where that no longer helps they are taken anew, and an aim that still does not come nearer is given up.
     """
-    velocity = guess.copy()
+    velocity = guess / np.maximum(length(guess) / FASTEST_TRIED, 1.0)[:, None]
     short, miss = _short(problem, velocity)
     slope = np.empty((len(guess), 3, 3))
     stale, stuck = np.ones(len(guess), bool), np.zeros(len(guess), int)
@@ -281,10 +283,10 @@ def _learnt(slope: np.ndarray, step: np.ndarray, moved: np.ndarray) -> np.ndarra
     return wrong[:, :, None] * step[:, None] / np.maximum(np.sum(step * step, axis=1), 1e-12)[:, None, None]
 
 
-def _chosen_times(problem: _Problem, loft: float | None) -> np.ndarray:
-    """(B,) s: of TIMES, and then of times beside it, the one with the slowest launch, or the launch nearest to `loft` rad, as
-    the first guesses have it."""
-    coarse = _best_time(problem, np.tile(TIMES, (len(problem.start), 1)), loft)
+def _chosen_times(problem: _Problem, loft: float | None, about: np.ndarray | None) -> np.ndarray:
+    """(B,) s: of TIMES (or from `about` on), and then of times beside it, the one with the slowest launch, or the
+    launch nearest to `loft` rad, as the first guesses have it."""
+    coarse = about if about is not None else _best_time(problem, np.tile(TIMES, (len(problem.start), 1)), loft)
     return _best_time(problem, coarse[:, None] * np.linspace(0.9, 1.1, 11), loft)
 
 

@@ -23,8 +23,8 @@ RISE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Strikes:
-    """Where a part can strike, at frames (N,) of a scene, in the world: start, end (N, 3) m of its line, radius m, velocity
-    (N, 3) m/s."""
+    """Where a part can strike, at frames (N,) of a scene, in the world: start, end (N, 3) m of its line, radius m,
+    velocity (N, 3) m/s."""
 
     frames: np.ndarray
     start: np.ndarray
@@ -76,19 +76,19 @@ class Shot:
 
 def shoot(
     strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-    turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf, near: np.ndarray | None = None,
+    turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf, near: Aimed | None = None,
     what: str = "aim",
 ) -> Shot:
     """The strike that sends a ball to `target` (3,) m.
 
-    seconds (N,) from each frame on, or one number; None: the slowest launch. turns: back spin and spin to the left, turns a
-    second. ground: it goes along the ground; else after so many bounces. near (N, 3): launches to begin with. InputError
-    where no frame has one that is possible within `fastest` m/s; `what` is named there.
+    seconds (N,) from each frame on, or one number; None: the slowest launch. turns: back spin and spin to the left,
+    turns a second. ground: it goes along the ground; else after so many bounces. near: the launches of a shot like it,
+    to begin with. InputError where no frame has one that is possible within `fastest` m/s; `what` is named there.
     """
     target = np.asarray(target, float)
     way = target - 0.5 * (strikes.start + strikes.end)
-    towards = np.where(np.isfinite(near), near, way + length(way)[:, None] * [0.0, 0.0, RISE]) if near is not None \
-        else way + length(way)[:, None] * [0.0, 0.0, RISE]
+    towards = way + length(way)[:, None] * [0.0, 0.0, RISE] if near is None else near.velocity
+    launch, about = (None, None) if near is None else (near.velocity, near.seconds)
     spin = spins(way, turns)
     for _ in range(1 if near is not None else 2):
         if ground:
@@ -97,8 +97,8 @@ def shoot(
         if length(starts - target).min() < ball.radius:
             raise InputError(what, "the target is where the ball is struck", "a target some way off", "move the target")
         aimed = along_ground(starts, target, ball, seconds, fastest=fastest) if ground else \
-            aim(starts, target, ball, seconds, bounces, spin, fastest, near)
-        towards = near = aimed.velocity
+            aim(starts, target, ball, seconds, bounces, spin, fastest, launch, about=about)
+        towards, launch, about = aimed.velocity, aimed.velocity, aimed.seconds
     if ground:
         starts[:, 2] = ball.radius
     if not aimed.possible.any():

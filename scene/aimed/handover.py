@@ -1,7 +1,9 @@
-"""Blender's rigid bodies take an animated ball over on a frame, as fast and with the spin that it has there, and give it back.
+"""Blender's rigid bodies take an animated ball over on a frame, as fast and with the spin that it has there, and give
+it back.
 
-Blender takes a body's first velocity from its last keyed step, which is its mean over that frame: while the ball flies, half a
-frame of gravity too little. So the key before the handover is moved by that much (some millimetres), and put back afterwards.
+Blender takes a body's first velocity from its last keyed step, which is its mean over that frame: while the ball flies,
+half a frame of gravity too little. So the key before the handover is moved by that much (some millimetres), and put
+back afterwards.
 """
 
 from __future__ import annotations
@@ -21,19 +23,24 @@ SIZE, THICK = 300.0, 2.0  # metres of the slab that the ball lies on
 OURS = "beyond_mocap_physics"
 """Custom property of what a handover has made."""
 ROLLS_OUT = 0.4  # angular damping, for Blender's balls would roll for ever
+CHOSEN = ("selected_objects", "selected_editable_objects")
 WORLD = ("substeps_per_frame", "solver_iterations")
 FINE = {"substeps_per_frame": 20, "solver_iterations": 20}
 
 
-def hand_over(scene: bpy.types.Scene, ball: bpy.types.Object, frame: int, kind: str, solid: list[bpy.types.Object]) -> None:
-    """From `frame` on Blender's rigid bodies move the ball, over a slab that ends at the ground; `solid` objects are in its way
-    too. kind: of `physics.BALLS`. InputError, and nothing changed, where that cannot be."""
+def hand_over(
+    scene: bpy.types.Scene, ball: bpy.types.Object, frame: int, kind: str, solid: list[bpy.types.Object]
+) -> None:
+    """From `frame` on Blender's rigid bodies move the ball, over a slab that ends at the ground; `solid` objects are in
+    its way too. kind: of `physics.BALLS`. InputError, and nothing changed, where that cannot be."""
     from ...beyond_mocap.ball.physics import BALLS
 
     _check(ball, frame)
     curves = channels.curves(*channels.playing(ball))
-    velocity = _velocity(curves, frame, frames_per_second(scene))
-    kept = {"world": scene.rigidbody_world is not None, "solid": [], "keys": _shift(curves, frame, velocity, frames_per_second(scene))}
+    fps = frames_per_second(scene)
+    velocity = _velocity(curves, frame, fps)
+    shifted = _shift(curves, frame, velocity, fps)
+    kept = {"world": scene.rigidbody_world is not None, "solid": [], "keys": shifted}
     _world(scene, frame, kept)
     _solids(scene, solid, kept)
     _ball(scene, ball, frame, BALLS[kind], np.linalg.norm(velocity) / units_per_metre(scene))
@@ -44,6 +51,7 @@ def hand_over(scene: bpy.types.Scene, ball: bpy.types.Object, frame: int, kind: 
 def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     """The ball goes its keyed way again; what the handover made goes, unless another ball lies on it."""
     linked.refuse(ball)
+    _refuse_hidden(ball)
     aim = ball.beyond_mocap_aim
     kept = json.loads(aim.handed_before or "{}")
     if ball.rigid_body is not None:
@@ -62,11 +70,10 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
         return
     for name in kept.get("solid", ()):
         thing = scene.objects.get(name)
-        if thing is not None and thing.rigid_body is not None:
+        if thing is not None and thing.rigid_body is not None and thing.visible_get():
             _remove(thing)
     slab = scene.objects.get(GROUND)
     if slab is not None and slab.get(OURS):
-        _remove(slab)
         mesh = slab.data
         bpy.data.objects.remove(slab)
         bpy.data.meshes.remove(mesh)
@@ -84,22 +91,32 @@ def _check(ball: bpy.types.Object, frame: int) -> None:
     channels.check_free(ball)
     if ball.type != "MESH":
         raise InputError(f"object {ball.name}", f"of type {ball.type.lower()}", "a mesh", "select the ball")
+    _refuse_hidden(ball)
     if ball.beyond_mocap_aim.handed or ball.rigid_body is not None:
-        raise InputError(f"ball {ball.name}", "a rigid body already", "a ball that is keyed", "press Take Ball Back first")
+        step = "press Take Ball Back first"
+        raise InputError(f"ball {ball.name}", "a rigid body already", "a ball that is keyed", step)
     if ball.parent is not None or any(constraint.influence for constraint in ball.constraints):
-        raise InputError(f"ball {ball.name}", "it has a parent or a constraint", "a ball of its own keys", "free the ball first")
+        found = "it has a parent or a constraint"
+        raise InputError(f"ball {ball.name}", found, "a ball of its own keys", "free the ball first")
     action, slot = channels.playing(ball)
     ends = channels.keyed_range(channels.curves(action, slot)) if action is not None else None
     if ends is None or not ends[0] + 2 <= frame <= ends[1]:
         found = "no keys" if ends is None else f"keys on frames {ends[0]} to {ends[1]}"
-        raise InputError(f"ball {ball.name}", found, f"keys from two frames before the handover on frame {frame} up to it",
-                         "choose another frame")
+        expected = f"keys from two frames before the handover on frame {frame} up to it"
+        raise InputError(f"ball {ball.name}", found, expected, "choose another frame")
     linked.refuse(action)
 
 
+def _refuse_hidden(ball: bpy.types.Object) -> None:
+    """InputError for a ball that is hidden: Blender changes no rigid body then."""
+    if not ball.visible_get():
+        step = "show it with Alt-H, or its collection"
+        raise InputError(f"ball {ball.name}", "it is hidden", "a ball that is shown", step)
+
+
 def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
-    """(3,) units a second of the ball on a frame, by its keys on either side; by those before it where they end there, or where
-    it bounces behind it."""
+    """(3,) units a second of the ball on a frame, by its keys on either side; by those before it where they end there,
+    or where it bounces behind it."""
     at = np.array([frame - 2, frame - 1, frame, frame + 1], float)
     places = np.stack([channels.sample(curves["location", axis], at) for axis in range(3)], axis=1)
     before, last = places[2] - places[1], 1.5 * places[2] - 2.0 * places[1] + 0.5 * places[0]
@@ -109,7 +126,8 @@ def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
 
 
 def _shift(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
-    """Move the key before the handover so that its step there is the ball's velocity; (path, index, frame, old value) each."""
+    """Move the key before the handover so that its step there is the ball's velocity; (path, index, frame, old value)
+    each."""
     kept = []
     for axis in range(3):
         curve = curves["location", axis]
@@ -160,14 +178,15 @@ def _solids(scene, solid: list, kept: dict) -> None:
         slab.hide_render = slab.hide_select = True
         slab.display_type = "BOUNDS"
         scene.collection.objects.link(slab)
-        slab.hide_set(True)
     for thing in (slab, *solid):
         if thing.rigid_body is None:
             _add(thing, "PASSIVE")
             thing.rigid_body.collision_shape = "BOX" if thing is slab else "MESH"
             thing.rigid_body.restitution = thing.rigid_body.friction = 1.0  # Blender multiplies both bodies' values
             thing.rigid_body.use_margin, thing.rigid_body.collision_margin = True, 0.0
-            if thing is not slab:
+            if thing is slab:
+                thing.hide_set(True)
+            else:
                 kept["solid"].append(thing.name)
 
 
@@ -186,10 +205,10 @@ def _ball(scene, ball: bpy.types.Object, frame: int, kind, speed: float) -> None
 
 
 def _add(thing: bpy.types.Object, kind: str) -> None:
-    with bpy.context.temp_override(object=thing, active_object=thing, selected_objects=[thing], selected_editable_objects=[thing]):
+    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(CHOSEN, [thing])):
         bpy.ops.rigidbody.object_add(type=kind)
 
 
 def _remove(thing: bpy.types.Object) -> None:
-    with bpy.context.temp_override(object=thing, active_object=thing, selected_objects=[thing], selected_editable_objects=[thing]):
+    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(CHOSEN, [thing])):
         bpy.ops.rigidbody.object_remove()

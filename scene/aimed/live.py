@@ -1,8 +1,8 @@
 """Aimed balls follow while their target is dragged and their settings or bodies are edited.
 
-Blender says after every change that something has changed; a timer, which runs during modal operators too, then compares what
-each ball's way was made of with what there is now. Our own writes are such changes too, and find nothing to do. What cannot be
-hit just now is told at the ball, which keeps its last way.
+Blender says after every change that something has changed; a timer, which runs during modal operators too, then
+compares what each ball's way was made of with what there is now. Our own writes are such changes too, and find nothing
+to do. What cannot be hit just now is told at the ball, which keeps its last way.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def mark() -> None:
 
 
 def follow(scene: bpy.types.Scene) -> int:
-    """Bring all live balls of a scene up to date; how many had to be."""
+    """Bring all live balls of a scene up to date; of how many there is anything new."""
     count = 0
     for ball in aimed(scene):
         aim = ball.beyond_mocap_aim
@@ -40,7 +40,7 @@ def follow(scene: bpy.types.Scene) -> int:
         try:
             count += renew(scene, ball)
         except BeyondMocapError as error:
-            tell(ball, str(error))
+            count += tell(ball, str(error))
         except Exception:  # a timer that raises is never called again
             traceback.print_exc()
             tell(ball, f"{ball.name}: could not be aimed here; see the system console")
@@ -54,9 +54,7 @@ def renew(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
     played = channels.playing(ball)[0]
     written = played.get(MARK) if played is not None else None
     if known is not None and known.digest == made_of == written:
-        if ball.beyond_mocap_aim.told:
-            tell(ball, "")
-        return False
+        return tell(ball, "")
     solved = shots.solve(scene, wish, ball.name, known)
     if made_of == written:  # another session has written it: only what is drawn is lacking
         shots.remember(ball, solved)
@@ -65,10 +63,20 @@ def renew(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
     return True
 
 
-def tell(ball: bpy.types.Object, text: str) -> None:
-    """Say at the ball what is wrong."""
-    if ball.beyond_mocap_aim.told != text:
+def tell(ball: bpy.types.Object, text: str) -> bool:
+    """Say at the ball what is wrong; whether that is new."""
+    new = ball.beyond_mocap_aim.told != text
+    if new:
         ball.beyond_mocap_aim.told = text
+    return new
+
+
+def redraw() -> None:
+    """Let all 3D views be drawn again: what is drawn over them is no data that Blender watches."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
 
 
 @persistent
@@ -110,7 +118,8 @@ def _tick():
         if window.scene.session_uid not in scenes:
             scenes.add(window.scene.session_uid)
             with bpy.context.temp_override(window=window):
-                follow(window.scene)
+                if follow(window.scene):
+                    redraw()
     return max(TICK, SHARE * (perf_counter() - begun))
 
 

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.motion import quaternion
 from .. import channels, linked
 from ..material import colour
 from ..measure import frames_per_second, units_per_metre
@@ -24,13 +25,14 @@ if TYPE_CHECKING:
 CLOSEST = 0.02  # frames between two keys at least; Blender takes keys within 0.01 for one
 STROKES = 40  # of a candidate's way that is drawn
 CURVE_STEP = 0.04  # s between two points of the curve
-SAME = ("body", "part", "side", "bone", "first", "last", "way", "bounces", "timing", "ball")  # where a launch nearby helps
+SAME = ("body", "part", "side", "bone", "first", "last", "way", "bounces", "timing", "ball")
+"""What of a wish has to be the same for the last launches to be a good beginning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Wish:
-    """What is asked: the values of `BeyondMocapAim`, with the target (3,) and the ball's place (3,) in metres. body is an object:
-    a wish lives no longer than the event that made it."""
+    """What is asked: the values of `BeyondMocapAim`, with the target (3,) and the ball's place (3,) in metres. body is
+    an object: a wish lives no longer than the event that made it."""
 
     body: bpy.types.Object | None
     part: str
@@ -52,7 +54,8 @@ class Wish:
     follow: float = 3.0
 
     def key(self) -> tuple:
-        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits of a number."""
+        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits of a
+        number."""
         values = (getattr(self, field.name) for field in fields(self))
         return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _rounded(value) for value in values)
 
@@ -65,8 +68,9 @@ def _rounded(value):
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A shot in a scene: its core values, the ball's whole way from the strike on (seconds 0), scene frame of the strike, frames
-    a second, and a digest of what it was made of; candidates (N, STROKES, 3) m, of launches that are possible."""
+    """A shot in a scene: its core values, the ball's whole way from the strike on (seconds 0), scene frame of the
+    strike, frames a second, and a digest of what it was made of; candidates (N, STROKES, 3) m, of launches that are
+    possible."""
 
     same: tuple
     digest: str
@@ -86,6 +90,11 @@ _solved: dict[int, Solved] = {}
 def solved_of(ball: bpy.types.Object) -> Solved | None:
     """What was solved last for a ball in this session."""
     return _solved.get(ball.session_uid)
+
+
+def anything() -> bool:
+    """Whether any ball has been aimed in this session."""
+    return bool(_solved)
 
 
 def remember(ball: bpy.types.Object, solved: Solved) -> None:
@@ -109,9 +118,11 @@ def wish_of(scene: bpy.types.Scene, ball: bpy.types.Object) -> Wish:
     """What an aimed ball's settings ask for; InputError where something is gone."""
     aim = ball.beyond_mocap_aim
     if aim.target is None or aim.target.name not in scene.objects:
-        raise InputError(f"ball {ball.name}", "its target is gone", "an object to aim at", "pick a target, or press Leave Aim")
+        step = "pick a target, or press Leave Aim"
+        raise InputError(f"ball {ball.name}", "its target is gone", "an object to aim at", step)
     if aim.body is not None and aim.body.name not in scene.objects:
-        raise InputError(f"ball {ball.name}", f"{aim.body.name} is not in this scene", "a body of this scene", "pick another body")
+        found = f"{aim.body.name} is not in this scene"
+        raise InputError(f"ball {ball.name}", found, "a body of this scene", "pick another body")
     same = {field.name: getattr(aim, field.name) for field in fields(Wish) if field.name not in ("target", "place")}
     return Wish(**same, target=place_of(scene, aim.target), place=tuple(aim.place))
 
@@ -128,7 +139,8 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
     from ...beyond_mocap.ball.shot import Strikes
 
     if wish.last < wish.first:
-        raise InputError("aim", f"frames {wish.first} to {wish.last}", "a last frame not before the first", "set From and To")
+        found = f"frames {wish.first} to {wish.last}"
+        raise InputError("aim", found, "a last frame not before the first", "set From and To")
     frames = np.arange(wish.first, wish.last + 1)
     if wish.body is None:
         there = np.array([wish.place])
@@ -139,8 +151,8 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
         last = first + len(motion) - 1
         inside = frames[(frames >= first) & (frames <= last)]
         if not len(inside):
-            raise InputError(f"armature {wish.body.name}", f"frames {wish.first} to {wish.last}, but it moves on {first} to {last}",
-                             "frames on which it moves", "set From and To")
+            found = f"frames {wish.first} to {wish.last}, but it moves on {first} to {last}"
+            raise InputError(f"armature {wish.body.name}", found, "frames on which it moves", "set From and To")
         surface = striking_surface(motion.skeleton, wish.bone or wish.part, wish.side)
         found = Strikes.of(motion, surface, inside - first, inside)
         if not (np.isfinite(found.start).all() and np.isfinite(found.velocity).all()):
@@ -160,12 +172,13 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str, before: Solved | None =
     made_of = digest(wish, strikes)
     strikes, seconds = _timed(strikes, wish, fps)
     same = tuple(getattr(wish, field) if field != "body" else wish.key()[0] for field in SAME) + (len(strikes.frames),)
-    near = before.shot.aimed.velocity if before is not None and before.same == same and wish.way == "AIR" else None
+    near = before.shot.aimed if before is not None and before.same == same and wish.way == "AIR" else None
     target = np.array(wish.target)
     target[2] = max(target[2], kind.radius)
     fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
     ground = wish.way == "GROUND"
-    shot = shoot(strikes, target, kind, seconds, wish.bounces, (wish.back, wish.left), ground, fastest, near, f"ball {name}")
+    turns = (wish.back, wish.left)
+    shot = shoot(strikes, target, kind, seconds, wish.bounces, turns, ground, fastest, near, f"ball {name}")
     spin = shot.aimed.spin[shot.chosen]
     flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
     can = np.flatnonzero(shot.aimed.possible)
@@ -190,14 +203,15 @@ def _timed(strikes: "Strikes", wish: Wish, fps: float) -> tuple["Strikes", np.nd
     seconds = (wish.arrival - strikes.frames) / fps
     early = seconds > 0.05
     if not early.any():
-        raise InputError("aim", f"arrival on frame {wish.arrival}", f"a frame behind the strike ({strikes.frames[0]})", "set Frame")
+        expected = f"a frame behind the strike ({strikes.frames[0]})"
+        raise InputError("aim", f"arrival on frame {wish.arrival}", expected, "set Frame")
     kept = (getattr(strikes, name)[early] for name in ("frames", "start", "end"))
     return type(strikes)(*kept, strikes.radius, strikes.velocity[early]), seconds[early]
 
 
 def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
-    """Let a ball go the way of a shot: keys on every frame, and where it bounces and arrives; before the strike it does what it
-    did before it was aimed. In place, where it has been aimed already."""
+    """Let a ball go the way of a shot: keys on every frame, and where it bounces and arrives; before the strike it does
+    what it did before it was aimed. In place, where it has been aimed already."""
     aim = ball.beyond_mocap_aim
     if not aim.before.kept:
         put_aside(aim.before, ball)
@@ -232,13 +246,16 @@ def check_ball(ball: bpy.types.Object | None) -> None:
         return
     channels.check_free(ball)
     if ball.parent is not None or len(ball.beyond_mocap_ball.holds) or any(one.influence for one in ball.constraints):
-        raise InputError(f"ball {ball.name}", "it has a parent, a constraint or is carried", "a ball of its own", "free the ball first")
+        found = "it has a parent, a constraint or is carried"
+        raise InputError(f"ball {ball.name}", found, "a ball of its own", "free the ball first")
     if ball.rigid_body is not None and not ball.rigid_body.kinematic:
-        raise InputError(f"ball {ball.name}", "Blender's rigid bodies move it", "a ball of its own", "take its rigid body off")
+        found = "Blender's rigid bodies move it"
+        raise InputError(f"ball {ball.name}", found, "a ball of its own", "take its rigid body off")
 
 
 def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
-    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest; along X where it does not."""
+    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest; along X where it does
+    not."""
     from ...beyond_mocap.ball.physics import FOOTBALL
 
     row = int(np.argmax(np.linalg.norm(strikes.velocity, axis=1)))
@@ -277,16 +294,21 @@ def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tupl
 def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """What the ball did before it was aimed, up to the frame before the strike; None where it did nothing."""
     before = ball.beyond_mocap_aim.before
-    slot = None if before.action is None else next((s for s in before.action.slots if s.identifier == before.slot), None)
+    slots = before.action.slots if before.action is not None else ()
+    slot = next((slot for slot in slots if slot.identifier == before.slot), None)
     curves = channels.curves(before.action, slot) if slot is not None else {}
     ends = channels.keyed_range(curves)
     if ends is None or ends[0] >= strike or ("location", 0) not in curves:
         return None
     frames = np.arange(ends[0], strike, dtype=float)
-    values = [[channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), float(i == 3)) for i in count]
-              for path, count in (("location", range(3)), ("rotation_quaternion", (0, 1, 2, 3)))]
-    turns = np.stack(values[1], axis=1)
-    return frames, np.stack(values[0], axis=1), turns / np.maximum(np.linalg.norm(turns, axis=1, keepdims=True), 1e-9)
+
+    def values(path: str, still: tuple) -> np.ndarray:
+        columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
+                   for i, value in enumerate(still)]
+        return np.stack(columns, axis=1)
+
+    turns = values("rotation_quaternion", (1.0, 0.0, 0.0, 0.0))
+    return frames, values("location", (0.0, 0.0, 0.0)), quaternion.normalized(turns)
 
 
 def draw_curve(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
@@ -321,8 +343,11 @@ def lines(solved: Solved) -> list[str]:
     speed = float(np.linalg.norm(shot.velocity))
     up = float(np.degrees(np.arctan2(shot.velocity[2], np.linalg.norm(shot.velocity[:2]))))
     part = float(np.linalg.norm(solved.strikes.velocity[shot.chosen]))
-    told = [f"Struck on frame {solved.strike}, {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up" + (f"; the part moves {part:.1f} m/s" if part else ""),
-            f"Arrives after {shot.seconds:.2f} s, on frame {solved.strike + shot.seconds * solved.fps:.1f}; off by {1000.0 * aimed.miss[shot.chosen]:.1f} mm"]
+    off, frame = 1000.0 * aimed.miss[shot.chosen], solved.strike + shot.seconds * solved.fps
+    told = [f"Struck on frame {solved.strike}, {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up",
+            f"Arrives after {shot.seconds:.2f} s, on frame {frame:.1f}; off by {off:.1f} mm"]
+    if part:
+        told[0] += f"; the part moves {part:.1f} m/s"
     before = solved.flight.bounces[solved.flight.bounces < shot.seconds]
     if len(before):
         told.append("Bounces on frame " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))

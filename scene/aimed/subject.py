@@ -10,8 +10,8 @@ from .settings import aimed_ball
 
 
 def ball_meant(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The ball that is selected, by its mark or name; an aimed one that is active or whose target is; the only mesh that is
-    selected."""
+    """The ball that is selected, by its mark or name; an aimed one that is active or whose target is; the only mesh
+    that is selected."""
     chosen = [thing for thing in context.selected_objects if thing.type == "MESH"]
     marked = [thing for thing in chosen if thing.beyond_mocap_aim.on or thing.get(KEPT) or "ball" in thing.name.lower()]
     if marked:
@@ -37,7 +37,8 @@ def target_meant(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> tuple[int, int]:
-    """Scene frames of the ball stretch of the strike nearest to the current frame; the current frame where there is none."""
+    """Scene frames of the ball stretch of the strike nearest to the current frame; the current frame where there is
+    none."""
     from ...beyond_mocap.ball.hits import analyse
 
     motion, first = motion_of(scene, body)

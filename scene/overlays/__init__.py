@@ -6,6 +6,7 @@
 - `store`     which takes are prepared: in a thread, once per take, forgotten when no player shows them
 - `place`     where a take lies in the scene now, and its clock
 - `rides`     paths, trackers, residuals and the original motion of what rides a path
+- `ball_shots` the ways of aimed balls, where they are struck and where they bounce
 - `draw`      the handlers of the view: they only look up
 """
 

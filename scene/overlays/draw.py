@@ -15,7 +15,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ..settings import active_player
-from . import colours, legend, place, rides, shapes, store
+from . import ball_shots, colours, legend, place, rides, shapes, store
 from .prepare import Mesh, Prepared
 
 BIAS = 1e-5
@@ -81,8 +81,10 @@ def _forget(now: dict[str, Prepared]) -> None:
 
 
 def _riding(context) -> list[rides.Item]:
-    """What there is to draw of riders in this view; the batches of what is drawn no more are freed."""
-    items = rides.items(context.scene) if context.space_data.overlay.show_overlays else []
+    """What there is to draw of riders and aimed balls in this view; the batches of what is drawn no more are freed."""
+    items = []
+    if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
+        items = rides.items(context.scene) + ball_shots.items(context.scene)
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
@@ -188,8 +190,8 @@ def _disc() -> list[Mesh]:
 
 def _draw_texts():
     context = bpy.context
-    found, riding = _shown(context), _rides(context)
-    if not found and not riding:
+    found, riding, shot = _shown(context), _rides(context), _shots(context)
+    if not found and not riding and not shot:
         return
     view = context.scene.beyond_mocap.view
     on = view.on()
@@ -200,7 +202,7 @@ def _draw_texts():
                 _near_labels(context, view, shown)
             if "seams" in on:
                 _why(context, view, shown)
-        legend.draw(context, [*(on if found else ()), *(["rides"] if riding else ())])
+        legend.draw(context, [*(on if found else ()), *(["rides"] if riding else ()), *(["shots"] if shot else ())])
     finally:
         gpu.state.blend_set("NONE")
 
@@ -208,6 +210,11 @@ def _draw_texts():
 def _rides(context) -> bool:
     """Whether anything of riders is drawn in this view."""
     return context.space_data.overlay.show_overlays and bool(rides.seen(context.scene))
+
+
+def _shots(context) -> bool:
+    """Whether anything of aimed balls is drawn in this view."""
+    return context.space_data.overlay.show_overlays and bool(ball_shots.seen(context.scene))
 
 
 def _near_labels(context, view, shown: Shown) -> None:

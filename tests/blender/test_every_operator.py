@@ -167,6 +167,17 @@ def carry():
     a_ball(carried=True)
 
 
+def aim_a_ball():
+    """The active body kicks a ball, which is active now."""
+    bpy.ops.beyond_mocap.aim_ball(found=False, first=5, last=6)
+    worlds.choose(next(thing for thing in bpy.data.objects if thing.beyond_mocap_aim.on))
+
+
+def hand_the_ball_over():
+    aim_a_ball()
+    bpy.ops.beyond_mocap.ball_to_physics(frame=15)
+
+
 def analyse():
     bpy.ops.beyond_mocap.hit_analysis()
 
@@ -229,10 +240,13 @@ ROWS = {
     "add_preset": Row("imported", lambda places: {"name": "Tried"}, changes=False),
     "add_span": Row("imported", lambda places: {"words": "walking"}),
     "add_stage": Row("imported"),
+    "aim_ball": Row("accepted", lambda places: {"found": False, "first": 5, "last": 6}),
     "annotate": Row("imported", lambda places: {"keys": "2 2 3 5 ENTER"}),
     "annotate_clip": Row("imported", prepare=list_clips),
     "bake_path": Row("accepted", prepare=ride),
     "bake_to_rig": Row("rig"),
+    "ball_from_physics": Row("accepted", prepare=hand_the_ball_over),
+    "ball_to_physics": Row("accepted", lambda places: {"frame": 15}, aim_a_ball),
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
     "choose_player": Row("imported", lambda places: {"player": "player2"}),
@@ -257,6 +271,7 @@ ROWS = {
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
     "keep_bone_map": Row("rig", changes=False),
+    "leave_aim": Row("accepted", prepare=aim_a_ball),
     "leave_path": Row("accepted", prepare=ride),
     "list_clips": Row("imported", changes=False),
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),

@@ -43,7 +43,7 @@ def test_along_the_ground_it_leaves_level():
 def test_a_launch_nearby_gives_the_same_shot():
     strikes = swing()
     one = shoot(strikes, (12.0, 1.0, 0.4), FOOTBALL, seconds=1.2, bounces=1)
-    other = shoot(strikes, (12.0, 1.0, 0.4), FOOTBALL, seconds=1.2, bounces=1, near=one.aimed.velocity)
+    other = shoot(strikes, (12.0, 1.0, 0.4), FOOTBALL, seconds=1.2, bounces=1, near=one.aimed)
     assert other.velocity == pytest.approx(one.velocity, abs=0.05)
 
 
