@@ -216,6 +216,7 @@ class _Problem:
             place, made = many.arrived(np.column_stack([level, upward]))
             gone = np.sum((place - many.start)[:, :2] * way, axis=1) / np.maximum(np.sum(way * way, axis=1), 1e-9)
             level = level * np.clip(1.0 / np.maximum(gone, 1e-2), 0.3, 3.0)[:, None]
+            level /= np.maximum(length(np.column_stack([level, 0.0 * upward])) / FASTEST_TRIED, 1.0)[:, None]
         place, made = many.arrived(np.column_stack([level, upward]))
         short = np.where(made == self.bounces, length(place - many.target), np.inf).reshape(count, HEIGHTS)
         best = np.arange(count) * HEIGHTS + np.argmin(short, axis=1)

@@ -19,8 +19,9 @@ TIMES = (
     ("SECONDS", "Seconds", "This long after the strike"),
     ("FRAME", "On Frame", "On this scene frame"),
 )
-MARK = "beyond_mocap_aim"
-"""Custom property of an action or curve of ours: of an action, a digest of what it was made of."""
+MARK = "beyond_mocap_shot"
+"""Custom property of an action or curve of ours: of an action, a digest of what it was made of. Not the name of the
+group on objects, with which it would share its place before Blender 5.0."""
 
 
 def changed(_settings, _context) -> None:
