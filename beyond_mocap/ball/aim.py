@@ -19,8 +19,10 @@ from ..errors import InputError
 from . import batch
 from .physics import Ball, length
 
-CLOSE = 0.02
+CLOSE = 0.01
 """m: what passes as a hit."""
+NEARLY = 1e-3
+"""m from the target beyond which a better launch is looked for."""
 EXACT = 1e-4
 """m from the target at which the iteration ends."""
 ROUNDS = 14
@@ -32,6 +34,9 @@ TIMES = np.geomspace(0.1, 6.0, 40)
 """s that are looked at where the time is free."""
 FASTEST_TRIED = 200.0
 """m/s beyond which no launch is begun with."""
+ELSE = (1.06, 0.94, 1.15, 0.85)
+"""Of the time with the slowest launch, where the ball's own physics does not allow that one: it lies at the edge of
+what can be, where a rebound just reaches the target's height."""
 NUDGE = 1e-3
 """m/s by which a launch is varied to see where that takes it."""
 
@@ -66,6 +71,15 @@ def aim(
     if seconds is None:
         problem = problem.at_time(_chosen_times(problem, loft, about))
     velocity, miss = _solved(problem, near)
+    for share in ELSE if seconds is None else ():
+        far = np.flatnonzero(~(miss <= CLOSE))
+        if not len(far):
+            break
+        part = problem.only(far).at_time(problem.seconds[far] * share)
+        second, rest = _solved(part, None)
+        hit = rest <= CLOSE
+        velocity[far[hit]], miss[far[hit]] = second[hit], rest[hit]
+        problem.seconds[far[hit]] = part.seconds[hit]
     possible = miss <= CLOSE
     if fastest is not None:
         possible &= length(velocity) <= fastest
@@ -124,7 +138,7 @@ def _solved(problem: _Problem, near: np.ndarray | None) -> tuple[np.ndarray, np.
     if len(known):
         velocity[known], miss[known] = _newton(problem.only(known), velocity[known])
     for guessed in (lambda part: part.guessed()[0], _Problem.searched):
-        far = np.flatnonzero(~(miss <= CLOSE))
+        far = np.flatnonzero(~(miss <= NEARLY))
         if not len(far):
             break
         part = problem.only(far)

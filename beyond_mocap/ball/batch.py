@@ -15,7 +15,7 @@ import numpy as np
 from .flight import LEAST_HOP, STANDS_STILL
 from .physics import Ball, bounced, gripped, in_air, length, rolling_spin, sliding, slip, slowing
 
-STEP = 0.08
+STEP = 0.12
 """s: the longest step of flights that have no closed form."""
 SLIDE_STEP = 0.01
 """s: the longest step of a ball that slides."""
