@@ -17,6 +17,7 @@ from .annotation import KeyMoment, Timeline
 from .ball.tracked.solve import SolvedBall, SolvedTouch
 from .errors import TimedLine
 from .motion.striking import striking_part, surfaces
+from .motion.track import BALL_RADIUS
 from .plan import Plan, SolvedCourse, Touched
 from .polish.dribble import dribble
 from .polish.meeting import led, lofted
@@ -67,7 +68,8 @@ def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
     unknown = (times < begins) | (times > ends)
     for end, start in gone[gone[:, 1] - gone[:, 0] > _STEP]:
         unknown |= (times > end) & (times < start)
-    ball = np.where(unknown[:, None], np.nan, solved.ball.at(times))
+    ball = np.maximum(solved.ball.at(times), [-np.inf, -np.inf, BALL_RADIUS])
+    ball = np.where(unknown[:, None], np.nan, ball)
     seen = solved.times[solved.measured]
     return SolvedCourse(times, ball, _far(times, seen), tuple(_touched(touch, player, plan) for touch in inside))
 

@@ -132,6 +132,8 @@ class Search:
         self.arrives = np.zeros((count, 2))
         self.best, self.last = np.inf, _START
         self.sources = [_START] if self.part.starts else []
+        if not count:  # no foot comes near: it rolls all the way, where it is met at both ends
+            return self._path() if self.part.starts and self.part.ends else None
         if not self.part.starts:
             soon = np.flatnonzero(self.frame <= _FROM_END * self.fps)
             self.into[soon] = _WAIT_COST * self.frame[soon] / self.fps + _FIT_COST * self._off(soon)
@@ -193,7 +195,7 @@ class Search:
     def _sources(self, frame: int) -> np.ndarray:
         """The nodes from which the ball may roll so as to be somewhere at a frame: within _LATEST, or the last ones."""
         found = np.array(self.sources, dtype=int)
-        since = frame - np.where(found == _START, 0, self.frame[found]) if len(found) else found
+        since = frame - np.where(found == _START, 0, self.frame[found])
         enough = since >= SOONEST * self.fps
         soon = enough & (since <= _LATEST * self.fps)
         return found[soon if soon.any() else enough & (since == since[enough].min(initial=frame + 1))]
@@ -282,7 +284,7 @@ class Search:
                 rolled = rolls(place[None], there[None], np.array([to - frame]), self.fps).balls[0]
                 path[frame + 1 : to] = rolled[: to - frame - 1]
             if node == _START:
-                return 0, last, path
+                return 0, last, path[: last + 1]
             entered = int(self.pushed[node])
             swing = (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
             held = np.flatnonzero(swing & (self.frame >= self.frame[entered]) & (self.frame <= frame))

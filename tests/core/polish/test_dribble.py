@@ -1,5 +1,7 @@
 """A made jog with the ball planted in the pelvis, as feeds have it: touched step by step, never in the body, slowing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,6 +86,25 @@ def test_key_moments_stay_where_the_ball_was_met():
         assert np.array_equal(found.ball[frame], ball[frame])
     assert np.array_equal(found.ball[:20], ball[:20]) and np.array_equal(found.ball[89:], ball[89:])
     assert found.pushes
+
+
+@pytest.mark.parametrize("held", [[(19, 20)], [(88, 89)], [(50, 51)], [(20, 20), (40, 41), (89, 89)]])
+def test_wherever_the_ball_is_met_the_dribble_goes_on_around_it(held):
+    motion = gait(2.8, 4.0, FPS)
+    ball = planted_ball(motion, ahead=0.5)
+    found = dribbled(motion, ball, stretches=[(20.0, 90.0)], held=held)
+    assert all(np.array_equal(found.ball[list(pair)], ball[list(pair)]) for pair in held)
+    touched = sorted([20, 90, *(push.first for push in found.pushes), *(frame for pair in held for frame in pair)])
+    assert np.diff(touched).max() <= 1.3 * FPS and len(found.ball) == len(ball)
+
+
+@pytest.mark.parametrize("held, moves", [([(19, 20), (60, 61)], True), ([], False), ([(19, 20)], False)])
+def test_where_no_foot_comes_near_the_ball_only_rolls(held, moves):
+    motion = gait(2.8, 4.0, FPS)
+    motion = replace(motion, root_positions=motion.root_positions + [0.0, 0.0, 5.0])
+    ball = planted_ball(motion, ahead=0.5) + np.sin(np.arange(len(motion)))[:, None] * [0.0, 0.1, 0.0]
+    found = dribbled(motion, ball, stretches=[(20.0, 60.0)], held=held)
+    assert not found.pushes and np.array_equal(found.ball, ball) != moves
 
 
 def test_outside_of_the_stretches_the_ball_only_comes_and_goes():
