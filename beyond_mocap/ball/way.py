@@ -24,8 +24,8 @@ LEAD, TIMELY = 1.6, 0.4
 SLOW = 0.3
 """m/s below which a run-up has not begun, and a run-out is over."""
 
-CROUCHED = 3.0
-"""m/s of unrest that a metre below or above the usual height of the hips is."""
+CROUCHED, LIFTED = 3.0, 0.25
+"""m/s of unrest that a metre below or above the usual height of the hips is, and that a foot in the air is."""
 
 WALK, HASTE = 1.1, 2.2
 """m/s at which he goes from one place to the next where time allows, and where it does not."""
@@ -109,12 +109,13 @@ class Placed:
 
     def _unrest(self) -> np.ndarray:
         """(L,) m/s: how far the clip's body is from standing at each of the library's frames: as fast as it goes, over
-        the ground and up or down, and as low or high."""
+        the ground and up or down, as low or high, and with a foot in the air."""
         frames, clip = self.library.frames, self.order.clip
         own = slice(frames.first[clip], frames.first[clip] + frames.count[clip])
         height = frames.root[own, 2]
         rising = np.gradient(height) * self.library.fps if len(height) > 1 else np.zeros(len(height))
-        return frames.speed[own] + np.abs(rising) + CROUCHED * np.abs(height - np.median(height))
+        lifted = LIFTED * np.sum(~self.library.feet_standing[own], axis=1)
+        return frames.speed[own] + np.abs(rising) + CROUCHED * np.abs(height - np.median(height)) + lifted
 
     def _at(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values (L, K) of the library's frames at seconds (N,): linear, held at the clip's ends."""
