@@ -16,7 +16,9 @@ from scipy.linalg import solveh_banded
 from .annotation import Timeline, automatic_gaits
 from .annotation.gaze import wanted_offset
 from .annotation.timeline import KeyMoment
+from .ball.alike import alike
 from .ball.contact import WORDS, striking_surface
+from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.way import Placed, needed, placed, way
 from .errors import InputError
@@ -34,6 +36,7 @@ from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
 from .polish.strike import Touch
 from .polish.strike_at import Meeting, met_at
 from .synthesis.footage import Footage, fetch
+from .synthesis.path_costs import Alike
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, WantedKey
 from .synthesize import look_of, sources_shown, words_shown
@@ -50,12 +53,14 @@ _WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip'
 
 @dataclass(frozen=True)
 class BodySettings:
-    """transition: seconds of a fade between pieces of clips. watch: whether the head follows the ball. seed: of the
-    take's record; nothing here is left to chance."""
+    """transition: seconds of a fade between pieces of clips (§4: S_T). watch: whether the head follows the ball. seed:
+    of the take's record; nothing here is left to chance. weights: of bones in eq. 1, by which one pose is like another
+    where a clip is left for the next."""
 
     transition: float = TRANSITION
     watch: bool = True
     seed: int = 0
+    weights: BoneWeights = BoneWeights()
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +149,11 @@ class _Body:
         report = progress or (lambda fraction, text: None)
         count = max(int(np.floor((self.times[-1] - self.start) * self.library.fps + 1e-6)) + 1, 2)
         order = self._wanted(self.start + np.arange(count) / self.library.fps)
-        edit = PathSearch(self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled).run()
+        half = int(round(0.5 * self.settings.transition * self.library.fps))
+        measure = Alike(alike(self.library, self.settings.weights), tuple(sorted({-half, half})))
+        edit = PathSearch(
+            self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled, alike=measure
+        ).run()
         index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
         raw = fetch(self.library, edit, index, self.fps)
         track, path = self._track(self.times, self.fps)

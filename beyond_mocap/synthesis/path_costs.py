@@ -58,15 +58,27 @@ Term = tuple[str, np.ndarray]
 """A part of a cost, by name."""
 
 
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """How far two poses are apart: the sum of the distances of their bones (N, P, 3), weighted, of the library's frames;
+    the mean over `offsets` in frames from the cut, so that what follows and went before counts too."""
+
+    bones: np.ndarray
+    offsets: tuple[int, ...] = (0,)
+
+
 class PathCosts:
     """The costs of one order on one library of N frames."""
 
     def __init__(
-        self, library: Library, wanted: Wanted, weights: Weights = Weights(), used: tuple[Used, ...] = ()
+        self, library: Library, wanted: Wanted, weights: Weights = Weights(), used: tuple[Used, ...] = (),
+        alike: Alike | None = None,
     ):
-        """used: footage that another solution is to do without where it can."""
+        """used: footage that another solution is to do without where it can. alike: another measure of how far two poses
+        are apart than that of the features."""
         self.library, self.wanted, self.weights = library, wanted, weights
         self.price = price(library, used) if used else None
+        self.alike = alike
         self.frames, self.offer = library.frames, Offer.of(library, wanted.allowed)
         self.wanted_offset = wanted_offset(wanted.track)
 
@@ -175,14 +187,29 @@ class PathCosts:
     def cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
         """What `cut` is the sum of, by name, each (B, K) or broadcast to it; "pose" first."""
         ends, start = self.inside(ends), self.inside(start)
-        a, b = self.frames.features[ends], self.frames.features[start]
-        square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
-        apart = np.sqrt(np.maximum(square, 0.0, out=square), out=square)
+        apart = self._apart(ends, start)
         apart *= np.float32(self.weights.pose)
         yield "pose", apart
         yield "feet", np.float32(self.weights.feet) * self._feet_apart(ends, start)
         yield "left", (self.weights.wild * self.offer.wild_before[ends]).astype(np.float32)[:, None]
         yield "cut", (self.weights.switch + self.weights.wild * self.offer.wild_after[start]).astype(np.float32)
+
+    def _apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """(B, K) m between the poses of frames ends (B,) and start (K,)."""
+        if self.alike is None:
+            return distances(self.frames.features[ends], self.frames.features[start])
+        total = np.zeros((len(ends), len(start)), np.float32)
+        for offset in self.alike.offsets:
+            a, b = (self.alike.bones[self._beside(frames, offset)] for frames in (ends, start))
+            for bone in range(a.shape[1]):
+                total += distances(a[:, bone], b[:, bone])
+        return total / np.float32(len(self.alike.offsets))
+
+    def _beside(self, frames: np.ndarray, offset: int) -> np.ndarray:
+        """(K,) library frames so many frames from others (K,), held at the ends of their clips."""
+        clip = self.frames.clip[frames]
+        first = self.frames.first[clip]
+        return np.clip(frames + offset, first, first + self.frames.count[clip] - 1)
 
     def _feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """(B, K) m between the feet that stand before and after a cut."""
@@ -193,6 +220,12 @@ class PathCosts:
             away = np.hypot(a[:, :1] - b[:, 0], a[:, 1:] - b[:, 1])
             apart += away * (stands[ends, foot][:, None] & stands[start, foot])
         return apart
+
+
+def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(B, K) distances between points (B, D) and (K, D)."""
+    square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
+    return np.sqrt(np.maximum(square, 0.0, out=square), out=square)
 
 
 def _added(terms: Iterator[Term]) -> np.ndarray:

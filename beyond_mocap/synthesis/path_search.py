@@ -20,7 +20,7 @@ from ..library.library import Library
 from .edit_list import EditList, PlacedKey, find_seams, replaced
 from .key_fit import ball_at, misfit, strikes
 from .offer import RATES, SLOT
-from .path_costs import PathCosts, Weights
+from .path_costs import Alike, PathCosts, Weights
 from .slots import key_pieces, slot_edges, slot_of
 from .style import weak_foot_cost
 from .used import Used
@@ -76,7 +76,8 @@ class States:
 class PathSearch:
     """One search; `run()` gives the edit list.
 
-    between: search this stretch only and keep the rest. used: footage to do without where that can be. hurry: when it
+    between: search this stretch only and keep the rest. used: footage to do without where that can be. alike: another
+    measure of how far poses are apart. hurry: when it
     says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None; before the first
     slot is filled it ends the search as `cancelled` does.
     """
@@ -91,10 +92,11 @@ class PathSearch:
         hurry: Callable[[], bool] | None = None,
         between: Between | None = None,
         used: tuple[Used, ...] = (),
+        alike: Alike | None = None,
     ):
         self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
         self.frames = library.frames
-        self.costs = PathCosts(library, wanted, weights, used)
+        self.costs = PathCosts(library, wanted, weights, used, alike)
         self.offer = self.costs.offer
         self.edges = slot_edges(library, wanted, *((between.first, between.end) if between else ()))
         self.pieces = key_pieces(library, wanted, self.edges)
