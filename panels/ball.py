@@ -51,8 +51,9 @@ class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
         """One touch."""
         row = layout.row(align=True)
         row.prop(item, "use", text="")
-        row.label(text=f"{item.time:.2f} s  {item.name or 'nobody'}: {item.kind} {item.part}")
-        row.label(text=f"{item.confidence:.0%}")
+        named = row.split(factor=0.62)
+        named.label(text=f"{item.time:.2f}  {item.name or '?'}")
+        named.label(text=item.kind)
 
 
 class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
@@ -208,6 +209,7 @@ def tracked(panel, layout, context) -> None:
         return
     layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, "active_touch", rows=5)
     if touch := active_row(settings.touches, settings.active_touch):
+        layout.label(text=f"{touch.kind} by the {touch.part}, {touch.confidence:.0%} sure")
         row = layout.row(align=True)
         row.prop(touch, "words", text="")
         row.operator("beyond_mocap.jump_to", text="", icon="PLAY").seconds = touch.time

@@ -1,4 +1,5 @@
-"""Sees that a passing scene has been edited, waits until the hand has come to rest, and has it made again.
+"""Sees that a passing scene has been edited, waits until the hand has come to rest, and has it made again. While a place is
+being dragged, its flights alone are worked out, again and again, and drawn.
 
 Only where the scene is shown already. What is asked is compared with what the scene shown was made of, so that neither its
 own making nor a walk along the timeline starts anything. The same wish is begun once: what was cancelled, undone or cannot be
@@ -13,13 +14,17 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import BeyondMocapError
+from .. import background
+from . import rally
 from .settings import PLAYED
 
+KIND = "flights"
 TICK, IDLE = 0.05, 0.4  # seconds between two looks
 SETTLED = 0.15  # seconds without a change after which the hand rests
 HOLDING = ("TRANSFORM_OT", "VIEW3D_OT_cursor3d")
 
-_seen = {"dirty": False, "changed": 0.0, "begun": ""}
+_seen = {"dirty": False, "changed": 0.0, "begun": "", "drawn": ""}
+_running: list[background.Job] = []  # at most one
 
 
 def mark() -> None:
@@ -54,14 +59,20 @@ def _tick():
     if not _seen["dirty"]:
         return IDLE
     window = next(iter(bpy.context.window_manager.windows), None)
-    if window is None or perf_counter() - _seen["changed"] < SETTLED or window.screen.is_animation_playing:
+    if window is None or window.screen.is_animation_playing:
         return TICK
-    running = [operator.bl_idname for operator in window.modal_operators]
-    busy = bpy.context.window_manager.beyond_mocap_work.kind not in ("", "passes")
-    if busy or any(name.startswith(HOLDING) for name in running):
+    if bpy.context.window_manager.beyond_mocap_work.kind not in ("", "passes"):
         return TICK
+    if any(operator.bl_idname.startswith(HOLDING) for operator in window.modal_operators):
+        _drag(window.scene)
+        return TICK
+    if perf_counter() - _seen["changed"] < SETTLED:
+        return TICK
+    _rest()
     _seen["dirty"] = False
     digest = edited(window.scene)
+    if not digest:
+        rally.show_dragged(None)
     if digest and digest != _seen["begun"]:
         _seen["begun"] = digest
         with bpy.context.temp_override(window=window):
@@ -70,17 +81,64 @@ def _tick():
     return TICK
 
 
+def _drag(scene) -> None:
+    """Take in the flights that have been worked out, and begin with those of where everybody is now."""
+    from . import make
+
+    if _running:
+        if not _running[0].poll():
+            return
+        job = _running.pop()
+        if job.result is not None:
+            rally.show_dragged(job.result)
+            _redraw()
+    settings = scene.beyond_mocap_passes
+    if not settings.live or not settings.made_of:
+        return
+    try:
+        order = make.order_of(scene)
+    except BeyondMocapError:  # where he is just now nobody can be
+        return
+    if order.library is not None and order.digest != _seen["drawn"]:
+        _seen["drawn"], start = order.digest, float(settings.start_frame)
+        _running.append(background.Job(KIND, lambda _progress, cancelled, _hurry: make.flights(order, start, cancelled)))
+
+
+def _rest() -> None:
+    """The hand rests: nothing is worked out for the drag alone any more."""
+    if _running:
+        _running.pop().cancel()
+    _seen["drawn"] = ""
+
+
+def _redraw() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+@persistent
+def _after_load(*_):
+    rally.forget()
+
+
 def register():
     """Look from now on, where there is a window."""
     if not bpy.app.background:
         bpy.app.handlers.depsgraph_update_post.append(_after_change)
         bpy.app.timers.register(_tick, first_interval=1.0, persistent=True)
+    bpy.app.handlers.load_post.append(_after_load)
 
 
 def unregister():
     """Look no more."""
     if _after_change in bpy.app.handlers.depsgraph_update_post:
         bpy.app.handlers.depsgraph_update_post.remove(_after_change)
+    if _after_load in bpy.app.handlers.load_post:
+        bpy.app.handlers.load_post.remove(_after_load)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    _seen.update(dirty=False, changed=0.0, begun="")
+    _seen.update(dirty=False, changed=0.0, begun="", drawn="")
+    _rest()
+    rally.forget()

@@ -18,7 +18,7 @@ from ..ride import riders
 from ..set_aside import bring_back, drop, put_aside
 from ..settings import absolute
 from . import order as asked
-from . import possession
+from . import possession, rally
 from .settings import KEPT, BeyondMocapPasser
 
 if TYPE_CHECKING:
@@ -79,6 +79,14 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     return Result(order, library, passes(library, order.scene, progress, cancelled))
 
 
+def flights(order: Order, start: float, cancelled) -> rally.Rally:
+    """What is drawn of a scene while it is dragged: its flights alone, without bodies. Never touches bpy."""
+    from ...beyond_mocap.passes import ball_of, planned
+
+    plan = planned(order.library, order.scene, None, cancelled)
+    return rally.of_plan(plan, ball_of(order.scene), start)
+
+
 def show(scene: bpy.types.Scene, result: Result) -> None:
     """Lay the scene on its bodies and its ball, which are made where there are none."""
     settings, made = scene.beyond_mocap_passes, result.passes
@@ -92,6 +100,7 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
     _net(scene, result.order.scene.net)
     bake.lengthen(scene, start + made.plan.seconds * frames_per_second(scene))
     settings.made_of = result.order.digest
+    rally.keep(result.order.digest, rally.of_plan(made.plan, made.kind, start))
     settings.strikes = "\n".join(strike_lines(scene, made, start))
     settings.figures = "\n".join(figures(made))
     settings.told = "\n".join(list(dict.fromkeys([*told, *made.warnings]))[:MOST_LINES])

@@ -76,6 +76,43 @@ def test_bodies_and_ball_do_what_the_recipe_says(two, room, core):
     assert ball.dimensions.x / 100.0 == pytest.approx(2 * found.kind.radius, rel=0.02)
 
 
+def test_what_is_drawn_is_what_is_played(two, room):
+    press(bpy.ops.beyond_mocap.passes_make)
+    rally, overlay = room("passes.rally"), room("overlays.ball_rallies")
+    shown = rally.of(two)
+    ball, lines = settings().rally, settings().strikes.splitlines()
+    for line, place in zip(lines, shown.strikes, strict=True):
+        assert np.allclose(seen(ball, int(line.partition("\t")[0]))[:3, 3] / 100.0, place, atol=2e-3)
+    assert len(shown.ways) == len(lines) + 1 and len(shown.bounces) >= 2 and np.allclose(shown.bounces[:, 2], 0.0)
+    frame = int(lines[0].partition("\t")[0]) + 3
+    two.frame_set(frame)
+    meshes = [mesh for item in overlay.items(two) for mesh in item.meshes()]
+    assert len(meshes) == 5 and all(np.isfinite(mesh.points).all() and len(mesh.points) == len(mesh.colours) for mesh in meshes)
+    start = next(way[0] for way in shown.ways[1:])
+    assert np.allclose(start, shown.strikes[0], atol=1e-3)
+    press(bpy.ops.beyond_mocap.passes_clear)
+    assert not overlay.items(two)
+
+
+def test_an_edit_is_seen_and_its_own_making_is_not(two, room):
+    live = room("passes.live")
+    assert not live.edited(two), "nothing is shown yet"
+    press(bpy.ops.beyond_mocap.passes_make)
+    assert not live.edited(two)
+    two.frame_set(40)
+    assert not live.edited(two)
+    bpy.data.objects["Ann place"].location.x += 30.0
+    bpy.context.view_layer.update()
+    assert live.edited(two)
+    order = room("passes.make").order_of(two)
+    assert room("passes.make").flights(order, 11.0, lambda: False).strikes.shape == (3, 3)
+    settings().live = False
+    assert not live.edited(two)
+    settings().live = True
+    settings().passes[0].to = settings().passes[0].who
+    assert not live.edited(two) and "himself" in settings().told
+
+
 def test_each_is_one_step_of_undo_and_clear_leaves_the_lists(two):
     before = state()
     assert_one_step(bpy.ops.beyond_mocap.passes_make)

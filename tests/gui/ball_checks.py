@@ -4,7 +4,7 @@ import time
 
 import bpy
 import numpy as np
-from tab import PICTURES, assert_no_trouble_since, output, room, run, sample, settings, wait_for_work, window
+from tab import PICTURES, assert_no_trouble_since, output, printed_since, room, run, sample, settings, wait_for_work, window
 
 LIMIT = 400
 BEFORE = {}
@@ -126,8 +126,8 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
     yield 0.5
     window.picture(PICTURES / "ball_solved.png")
     yield from press("accept_touches")
-    lanes = room("scene.lanes")
-    assert [moment.key.words[0] for moment in lanes.moments(settings().players["player2"].dot)] == ["receive", "kick"]
+    found = [moment.key.words for moment in room("scene.lanes").moments(settings().players["player2"].dot)]
+    assert found == [("receive", "foot"), ("kick",)], (found, printed_since(mark)[-600:])
     back()
     assert_no_trouble_since(mark)
 
