@@ -100,8 +100,8 @@ def _drag(scene) -> None:
     except BeyondMocapError:  # where he is just now nobody can be
         return
     if order.library is not None and order.digest != _seen["drawn"]:
-        _seen["drawn"], start = order.digest, float(settings.start_frame)
-        _running.append(background.Job(KIND, lambda _progress, cancelled, _hurry: make.flights(order, start, cancelled)))
+        _seen["drawn"] = order.digest
+        _running.append(background.Job(KIND, lambda _progress, cancelled, _hurry: make.flights(order, cancelled)))
 
 
 def _rest() -> None:

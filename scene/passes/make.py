@@ -32,9 +32,11 @@ MOST_LINES = 12
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What is to be made. scene; the library, or where it is and how it is built; digest of all that."""
+    """What is to be made. scene, and the scene frame of its second 0; the library, or where it is and how it is built; digest
+    of all that."""
 
     scene: PassScene
+    start: float
     folder: str
     unit: float | None
     library: "Library | None"
@@ -44,11 +46,12 @@ class Order:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an order."""
+    """What came of an order; rally: what is drawn of it."""
 
     order: Order
     library: "Library"
     passes: "Passes"
+    rally: rally.Rally
 
 
 def order_of(scene: bpy.types.Scene) -> Order:
@@ -65,7 +68,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
     unit = (common.library_unit or None) if not settings.library_folder else None
     parts = repr((wanted, folder, unit, settings.start_frame)).encode()
     digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
-    return Order(wanted, folder, unit, session.library(folder, unit), digest, preferences.for_build(folder))
+    return Order(wanted, float(settings.start_frame), folder, unit, session.library(folder, unit), digest, preferences.for_build(folder))
 
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
@@ -76,15 +79,16 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     library = order.library
     if library is None:
         library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    return Result(order, library, passes(library, order.scene, progress, cancelled))
+    made = passes(library, order.scene, progress, cancelled)
+    return Result(order, library, made, rally.of_plan(made.plan, made.kind, order.start))
 
 
-def flights(order: Order, start: float, cancelled) -> rally.Rally:
+def flights(order: Order, cancelled) -> rally.Rally:
     """What is drawn of a scene while it is dragged: its flights alone, without bodies. Never touches bpy."""
     from ...beyond_mocap.passes import ball_of, planned
 
     plan = planned(order.library, order.scene, None, cancelled)
-    return rally.of_plan(plan, ball_of(order.scene), start)
+    return rally.of_plan(plan, ball_of(order.scene), order.start)
 
 
 def show(scene: bpy.types.Scene, result: Result) -> None:
@@ -93,14 +97,14 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
     session.keep_library(result.library, result.order.unit)
     rows = {row.name: row for row in settings.players}
     told = [line for one in made.players for line in riders.leave(rows[one.name].body)]
-    start = float(settings.start_frame)
+    start = result.order.start
     for one in made.players:
         lay_body(scene, rows[one.name], one.take, start)
     lay_ball(scene, made, start)
     _net(scene, result.order.scene.net)
     bake.lengthen(scene, start + made.plan.seconds * frames_per_second(scene))
     settings.made_of = result.order.digest
-    rally.keep(result.order.digest, rally.of_plan(made.plan, made.kind, start))
+    rally.keep(result.order.digest, result.rally)
     settings.strikes = "\n".join(strike_lines(scene, made, start))
     settings.figures = "\n".join(figures(made))
     settings.told = "\n".join(list(dict.fromkeys([*told, *made.warnings]))[:MOST_LINES])

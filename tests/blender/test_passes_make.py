@@ -105,7 +105,7 @@ def test_an_edit_is_seen_and_its_own_making_is_not(two, room):
     bpy.context.view_layer.update()
     assert live.edited(two)
     order = room("passes.make").order_of(two)
-    assert room("passes.make").flights(order, 11.0, lambda: False).strikes.shape == (3, 3)
+    assert room("passes.make").flights(order, lambda: False).strikes.shape == (3, 3)
     settings().live = False
     assert not live.edited(two)
     settings().live = True
