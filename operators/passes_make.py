@@ -46,6 +46,13 @@ leaves one body at its strike and arrives at the next one at his"""
         make.show(scene, result)
         self.report({"INFO"}, ", ".join(scene.beyond_mocap_passes.figures.splitlines()[:3]))
 
+    def modal(self, context, event):
+        """One that an edit asked for makes way for the next edit's without a word."""
+        if self.live and self.job.stale:
+            self.ended(context)
+            return {"CANCELLED"}
+        return super().modal(context, event)
+
     def failed(self, message):
         """A live edit that makes no sense just now is told in the panel; the scene shown stays."""
         if not self.live:

@@ -58,7 +58,8 @@ def order_of(scene: bpy.types.Scene) -> Order:
     """What the settings ask for; InputError where that makes no sense, or where a body cannot be animated."""
     settings, common = scene.beyond_mocap_passes, scene.beyond_mocap
     wanted = asked.scene_of(scene)
-    folder = absolute(settings.library_folder or common.library_folder)
+    chosen = settings.library_folder or common.library_folder
+    folder = absolute(chosen)
     if not folder:
         raise InputError("library", "no folder chosen", "a folder of clips with strikes, such as sample_blend/passes/library",
                          "choose one under Choices, or in step 1")
@@ -66,7 +67,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
         _check(row)
     linked.refuse(settings.rally)
     unit = (common.library_unit or None) if not settings.library_folder else None
-    parts = repr((wanted, folder, unit, settings.start_frame)).encode()
+    parts = repr((wanted, chosen, unit, settings.start_frame)).encode()  # a file may be moved with its library
     digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
     return Order(wanted, float(settings.start_frame), folder, unit, session.library(folder, unit), digest, preferences.for_build(folder))
 
