@@ -11,6 +11,7 @@ from ..beyond_mocap.errors import InputError
 from . import bake, blocks, channels, error_curves, hand_keys, linked, session, stage
 from .bake import MARK
 from .clock import of_scene
+from .passes import possession
 from .ride import riders
 from .set_aside import bring_back, drop, play_as_before, put_aside
 from .settings import BeyondMocapPlayer
@@ -86,6 +87,19 @@ def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bp
 
 
 def _keep_shared(context: bpy.types.Context) -> None:
+    _with_free_ball(context, _keep_free)
+
+
+def _with_free_ball(context: bpy.types.Context, change) -> None:
+    """Call `change(context)` while nobody carries the ball; who did carries it afterwards too."""
+    room = context.scene.collection.children.get(bake.COLLECTION)
+    ball = room.objects.get(bake.BALL) if room is not None else None
+    if ball is None or not len(ball.beyond_mocap_ball.holds):
+        return change(context)
+    possession.anew(context.scene, ball, lambda: change(context))
+
+
+def _keep_free(context: bpy.types.Context) -> None:
     """Ball and camera stay with what has been accepted: that is what comes back when previews of others are discarded."""
     shared, players = context.scene.beyond_mocap.shared, context.scene.beyond_mocap.players
     others, takes = any(player.result.state == "PREVIEW" for player in players), _takes(players, "ACCEPTED")
@@ -151,6 +165,10 @@ def forget(player: BeyondMocapPlayer) -> None:
 def share(context: bpy.types.Context) -> None:
     """Let ball and camera follow the takes that are shown; with the last preview what they did before
     comes back."""
+    _with_free_ball(context, _share_free)
+
+
+def _share_free(context: bpy.types.Context) -> None:
     scene, settings = context.scene, context.scene.beyond_mocap
     shared = settings.shared
     takes = _takes(settings.players, "ACCEPTED", "PREVIEW")

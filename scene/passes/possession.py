@@ -106,11 +106,12 @@ def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
 
 def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
     """Let `write()` give the ball another action of its own; who carries it carries it on its new way."""
-    own = ball.beyond_mocap_ball
+    own, name = ball.beyond_mocap_ball, ball.name
+    carried = len(own.holds) > 0
     if own.before.kept:
         bring_back(own.before, ball, KEPT)
     write()
-    if len(own.holds):
+    if carried and bpy.data.objects.get(name) == ball and not own.before.kept:  # `write` may have come here itself
         put_aside(own.before, ball)
         rebuild(scene, ball)
 

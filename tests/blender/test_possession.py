@@ -6,6 +6,7 @@ import bpy
 import made
 import numpy as np
 import pytest
+import worlds
 from conftest import EXTENSION
 from undo import assert_one_step, press
 
@@ -139,3 +140,23 @@ def test_what_makes_no_sense_is_told_and_changes_nothing(ball, body, arguments, 
     with pytest.raises(RuntimeError, match=said):
         press(bpy.ops.beyond_mocap.take_ball, **{"bone": "RightForeArm", "first": 50, "last": 60, **arguments})
     assert len(ball.constraints) == 1 == len(ball.beyond_mocap_ball.holds)
+
+
+def test_the_ball_of_takes_is_carried_on_its_new_way_and_comes_back(tmp_path):
+    places = worlds.make_places(tmp_path)
+    for go_on in (worlds.imported, worlds.synthesized):
+        go_on(places)
+    bpy.ops.beyond_mocap.accept()
+    ball, player = bpy.data.objects["Ball"], bpy.context.scene.beyond_mocap.players[0]
+    free = ball.animation_data.action.name
+    choose(ball, player.body)
+    bpy.ops.beyond_mocap.take_ball(first=10, last=20)
+    for make in (bpy.ops.beyond_mocap.synthesize, bpy.ops.beyond_mocap.discard, bpy.ops.beyond_mocap.synthesize,
+                 bpy.ops.beyond_mocap.accept):
+        assert make() == {"FINISHED"}
+        ball = bpy.data.objects["Ball"]
+        assert ball.animation_data.action.name.startswith("Ball carried") and len(ball.constraints) == 1
+        steps = [seen(ball, frame)[:3, 3] for frame in (19.99, 20.0, 20.01)]
+        assert np.linalg.norm(np.diff(steps, axis=0), axis=1).max() < 0.01
+    bpy.ops.beyond_mocap.free_ball()
+    assert ball.animation_data.action.name.startswith(free) and not len(ball.constraints)
