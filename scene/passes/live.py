@@ -93,7 +93,7 @@ def _drag(scene) -> None:
             rally.show_dragged(job.result)
             _redraw()
     settings = scene.beyond_mocap_passes
-    if not settings.live or not settings.made_of:
+    if not settings.live or settings.made_of in ("", PLAYED):
         return
     try:
         order = make.order_of(scene)

@@ -125,14 +125,13 @@ def _serve(settings):
 
 
 def _weights(row) -> Weights:
-    bones, words = {}, row.bones.replace(",", " ").replace("=", " ").split()
-    for name, number in zip(words[::2], words[1::2]):
+    bones = {}
+    for item in filter(str.strip, row.bones.replace("=", " ").split(",")):
+        name, _, number = item.strip().rpartition(" ")
         try:
-            bones[name] = float(number)
+            bones[name.strip()] = float(number)
         except ValueError:
-            raise InputError("weights of bones", f"{name} {number}", "a bone and a number each, such as LeftFoot 2") from None
-    if len(words) % 2:
-        raise InputError("weights of bones", row.bones, "a bone and a number each, such as LeftFoot 2")
+            raise InputError("weights of bones", item.strip(), "bones with a number each, such as left foot 2, head 0.5") from None
     return Weights(*(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")), bones)
 
 

@@ -183,7 +183,7 @@ class BeyondMocapWeights(bpy.types.PropertyGroup):
     )
     bones: StringProperty(
         name="Bones", update=touch_live,
-        description="Weights of single bones of the library, such as LeftFoot 2, Head 0.5; all others count 1",
+        description="Weights of single bones where two poses are compared, such as: left foot 2, head 0.5; all others count 1",
     )
 
 

@@ -63,6 +63,18 @@ def test_a_file_written_is_the_scene_that_is_shown(core, room, tmp_path):
         assert one.facing == pytest.approx(other.facing, abs=1e-9) and one.place == other.place
 
 
+def test_weights_of_bones_are_typed(core, room):
+    press(bpy.ops.beyond_mocap.passes_sample, sample="three")
+    settings().weights.bones, settings().weights.velocity = "left foot 2, head=0.5,", 3.0
+    found = asked(room).weights
+    assert dict(found.bones) == {"left foot": 2.0, "head": 0.5} and found.velocity == 3.0
+    room("order").fill(bpy.context, asked(room))
+    assert dict(asked(room).weights.bones) == {"left foot": 2.0, "head": 0.5}
+    settings().weights.bones = "left foot"
+    with pytest.raises(core("errors").InputError, match="weights of bones"):
+        asked(room)
+
+
 def test_a_sample_replaces_what_was_there(room):
     press(bpy.ops.beyond_mocap.passes_sample, sample="six")
     press(bpy.ops.beyond_mocap.passes_sample, sample="three")
