@@ -53,7 +53,7 @@ class BeyondMocapView(bpy.types.PropertyGroup):
     path_trackers: _switch("Trackers", "At the current frame, where the body is on either path and where it heads", True)
     path_residuals: _switch("Residuals", "Lines from either path to the pelvis: what of the motion is not the path's")
     path_ghost: _switch("Original Motion", "The original as a stick figure at the current frame")
-    shots: _switch("Aimed Balls", "The ways that aimed balls could take and take, strikes and bounces", True)
+    shots: _switch("Ball Ways", "The ways that aimed and passed balls could take and take, strikes and bounces", True)
     ghosts_at: EnumProperty(name="Ghosts", items=GHOSTS, update=_changed, description="Where the figures stand")
     ghost_step: FloatProperty(
         name="Seconds", default=0.5, min=0.05, max=10.0, precision=2, unit="TIME_ABSOLUTE", update=_changed,

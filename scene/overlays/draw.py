@@ -15,7 +15,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ..settings import active_player
-from . import ball_shots, colours, legend, place, rides, shapes, store
+from . import ball_rallies, ball_shots, colours, legend, place, rides, shapes, store
 from .prepare import Mesh, Prepared
 
 BIAS = 1e-5
@@ -81,10 +81,10 @@ def _forget(now: dict[str, Prepared]) -> None:
 
 
 def _riding(context) -> list[rides.Item]:
-    """What there is to draw of riders and aimed balls in this view; the batches of what is drawn no more are freed."""
+    """What there is to draw of riders and balls in this view; the batches of what is drawn no more are freed."""
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
-        items = rides.items(context.scene) + ball_shots.items(context.scene)
+        items = [*rides.items(context.scene), *ball_shots.items(context.scene), *ball_rallies.items(context.scene)]
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
@@ -213,8 +213,9 @@ def _rides(context) -> bool:
 
 
 def _shots(context) -> bool:
-    """Whether anything of aimed balls is drawn in this view."""
-    return context.space_data.overlay.show_overlays and bool(ball_shots.seen(context.scene))
+    """Whether anything of balls is drawn in this view."""
+    shown = context.space_data.overlay.show_overlays
+    return shown and (bool(ball_shots.seen(context.scene)) or ball_rallies.seen(context.scene) is not None)
 
 
 def _near_labels(context, view, shown: Shown) -> None:
