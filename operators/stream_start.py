@@ -9,8 +9,8 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_stream_start(Verb, bpy.types.Operator):
-    """Receive motion live from a suit's program on this machine, as BVH frames over UDP or TCP; a body shows it. Nothing
-from other machines gets in, and nothing is sent"""
+    """Receive motion live from a suit's program on this machine, as BVH frames over UDP or TCP; a body shows it.
+Nothing from other machines gets in, and nothing is sent"""
 
     bl_idname = "beyond_mocap.stream_start"
     bl_label = "Start Stream"

@@ -34,10 +34,12 @@ def create(context: bpy.types.Context, motion: Motion, name: str = "Stream") -> 
 
 
 def pose(thing: bpy.types.Object, scene: bpy.types.Scene, skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> None:
-    """Put an armature into a pose: root (3,) m and local rotations (J, 4), as `action.write` keys them."""
+    """Put an armature into a pose: root (3,) m and local rotations (J, 4). Where the object lies and which way it is turned
+    about the vertical is left to the user, so that the streamed body can stand beside others."""
     lie, rest = armature.placement_now(thing, scene), armature.rest_rotations(thing, skeleton.names)
-    local = np.array(local)
-    local[0] = quaternion.multiply(quaternion.inverse(lie.rotation), local[0])
+    turn = quaternion.about_up(quaternion.yaw(lie.rotation))
+    root, local = lie.origin + quaternion.rotate(turn, root), np.array(local)
+    local[0] = quaternion.multiply(quaternion.inverse(lie.rotation), quaternion.multiply(turn, local[0]))
     turned = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest))
     bones = thing.pose.bones
     every = np.empty((len(bones), 4), np.float32)

@@ -83,6 +83,22 @@ def test_its_place_and_units_are_the_scenes(room, core, port):
     np.testing.assert_allclose(np.array(hips) / 100.0, motion.root_positions[-1], atol=2e-3)
 
 
+def test_it_can_be_put_aside(room, core, port):
+    """Moved and turned by the user, and lying as some imported armatures do."""
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    body = bpy.context.scene.beyond_mocap_stream.body
+    motion = core("files.bvh").read(CLIP).motion
+    bpy.context.view_layer.update()
+    upright = np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
+    body.location, body.rotation_euler = (3.0, 1.0, 0.0), (0.0, 0.0, np.pi / 2)
+    bpy.context.view_layer.update()
+    follow(room, send(core, port, 600.0))
+    bpy.context.view_layer.update()
+    moved = np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
+    np.testing.assert_allclose(moved, upright[:, (1, 0, 2)] * [-1.0, 1.0, 1.0] + [3.0, 1.0, 0.0], atol=2e-3)
+
+
 def test_a_kick_is_recognised_and_told(room, core, port):
     OPS.stream_start()
     hits = follow(room, send(core, port))

@@ -25,7 +25,7 @@ def own_tab(part):
     part: name of the function that draws it."""
     kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_ball")
     was, draw, drawn = (kind.bl_category, kind.bl_options), kind.draw, getattr(room("panels.ball"), part)
-    kind.draw = lambda self, context: drawn(*([self] if part in ("passing", "tracked") else []), self.layout, context)
+    kind.draw = lambda self, context: drawn(*([self] if part in ("passing", "tracked", "live") else []), self.layout, context)
 
     def place(category, options):
         bpy.utils.unregister_class(kind)
