@@ -14,9 +14,11 @@ import numpy as np
 from .ball.contact import Tool
 from .ball.hit_library import MatchWeights
 from .ball.hits import HitMotion, analyse
+from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
-from .ball.pass_plan import PassPlan, Site, plan_passes
-from .ball.pass_scene import Pass, PassScene, Player
+from .ball.pass_court import Site
+from .ball.pass_plan import PassPlan, plan_passes
+from .ball.pass_scene import BONES, Pass, PassScene, Player, Weights
 from .ball.physics import BALLS, Ball
 from .ball.strike_choice import Choice
 from .ball.strike_moments import StrikeMoments, strike_moments
@@ -141,6 +143,16 @@ def ball_of(scene: PassScene) -> Ball:
 def size_of(player: Player, library: Library) -> float:
     """How many times as large as the library's skeleton a player is."""
     return player.height / stature(library.skeleton) if player.height else 1.0
+
+
+def bone_weights(weights: Weights) -> BoneWeights:
+    """The weights of eq. 1 that a scene asks for: so many times the usual ones."""
+    own = BoneWeights()
+    factors = [weights.bones.get(bone, 1.0) for bone in BONES]
+    return BoneWeights(
+        position=tuple(weights.position * value * factor for value, factor in zip(own.position, factors)),
+        velocity=tuple(weights.velocity * value * factor for value, factor in zip(own.velocity, factors)),
+    )
 
 
 def ball_path(plan: PassPlan) -> BallPath:
@@ -269,7 +281,7 @@ def _played(library, scene: PassScene, plan: PassPlan, path: BallPath, player: P
     orders = [_sized(order, size) for order in plan.orders(player.name)]
     stance = _sized(Stance(player.place, scene.facing(player.name)), size)
     ball = path if size == 1.0 else replace(path, positions=path.positions / size)
-    settings = BodySettings(transition=scene.transition, watch=scene.watch, seed=scene.seed)
+    settings = BodySettings(scene.transition, scene.watch, scene.seed, bone_weights(scene.weights))
     moved = player_motion(
         library, stance, orders, ball, ball_of(scene).radius / size, len(path.times), scene.fps, settings, progress, cancelled
     )

@@ -52,9 +52,7 @@ A_MOMENT = 1e-3
 _STEPS = 30
 
 
-def cost_of_moments(
-    moments: StrikeMoments, kind: str, part: str, facing: np.ndarray, whence: np.ndarray
-) -> np.ndarray:
+def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarray) -> np.ndarray:
     """(N,): what speaks against the moments beside their ball's way: a ball that comes from behind a body that faces
     `facing` (N,) rad, `whence` (2,) m: the way to where it comes from; a hit motion that travels."""
     comes = np.arctan2(whence[1], whence[0])

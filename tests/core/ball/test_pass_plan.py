@@ -8,7 +8,7 @@ import pytest
 
 from beyond_mocap.ball.contact import striking_surface
 from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.ball.pass_plan import ON_TARGET
+from beyond_mocap.ball.pass_court import ON_TARGET
 from beyond_mocap.ball.sample_scenes import SAMPLES
 from beyond_mocap.errors import Cancelled, InputError, NotInLibrary
 from beyond_mocap.files.scene_json import parse_scene
