@@ -201,6 +201,7 @@ class _Play:
     def _drive(self) -> None:
         """One more touch by the holder: the ball rolls on, and he runs after it."""
         angle = self.rng.uniform(-0.8, 0.8) + np.arctan2(*-self.position[1::-1])
+        self.word = "dribble" if self.word == "kick" else self.word
         self._play(self._along(self.rng.uniform(2.0, 6.5), angle), self.time + self.rng.uniform(0.45, 1.4))
         self._meet("dribble", "foot")
 
