@@ -1,10 +1,12 @@
-"""The made match is one that could be played, and its feed hides just what it says."""
+"""The made match is one that could be played, its feed hides just what it says, and the solver finds it again."""
 
 import numpy as np
 import pytest
 
 from beyond_mocap.ball.tracked.planted import planted_match
 from beyond_mocap.ball.tracked.planted_feed import sampled
+from beyond_mocap.ball.tracked.solve import solve
+from beyond_mocap.evaluation.touches import Reading, ReadTouch, scored
 
 TIMES = np.arange(0.0, 60.0, 0.02)
 
@@ -61,3 +63,14 @@ def test_filled_stretches_are_straight_between_their_corners(match):
     inside = feed.filled[:-2] & feed.filled[2:]
     assert (bend[inside] < 0.03).mean() > 0.85
     assert (bend[~inside] < 0.03).mean() < 0.4
+
+
+@pytest.mark.parametrize("how", [{"filled": 0.3}, {"fps": 10.0, "heights": False}])
+def test_the_solver_finds_who_touched_it_when(match, how):
+    feed = sampled(match, **how)
+    solved = solve(feed.times, feed.ball, feed.positions, feed.ids, feed.teams, (feed.length, feed.width))
+    read = tuple(ReadTouch(touch.time, (touch.player,)) for touch in match.touches if 1.2 < touch.time < 59.0)
+    reading = Reading(((1.2, 59.0),), read, (ReadTouch(1.0),))
+    score = scored([touch.time for touch in solved.touches], [touch.player for touch in solved.touches], reading)
+    assert score.f1 >= 0.8, (score.missed, score.false)
+    assert np.median(np.abs(score.errors)) < 0.03
