@@ -20,6 +20,8 @@ GRID = 0.04  # s between the moments in which flights are looked at
 LONGEST = 5.0  # s of a stretch
 _ROUGH_ROUNDS, _ROUNDS, _FINE_ROUNDS = 3, 5, 1  # of descending: for each of _UPWARD, by coarse steps and then by the physics as it is
 _UPWARD = (0.0, 2.0, 4.5, 7.0, 10.0, 14.0)  # m/s, tried where heights are not known
+_LOW_ONES = 2  # of them hardly leave the ground
+_CLEARLY, _MARGIN = 0.7, 3.0  # share of the lower one's cost, and nats twice, by which a loft must be better
 _FLAT = 6.0  # m, a stretch so short is on the ground in the end: no more than a hop
 _SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, how far samples lie from the ball, filled-in ones, heights
 _PLACED = 0.12  # m, how far the places of touches are wrong
@@ -100,14 +102,14 @@ def fit_launches(
     fitted = [_fitted(stretches, start, ball, _ROUNDS, _coarsely, cancelled) for start in tried]
     best, cost = fitted[0]
     for other, costs in fitted[1:]:
-        best = np.where((costs < cost)[:, None], other, best)
-        cost = np.minimum(cost, costs)
+        clearly = costs < _CLEARLY * cost - _MARGIN  # where it cannot be told, the lower one
+        best, cost = np.where(clearly[:, None], other, best), np.where(clearly, costs, cost)
     best, cost = _fitted(stretches, best, ball, _FINE_ROUNDS, _finely, cancelled)
     return Launches(*_launch(stretches, best, ball), cost)
 
 
 def _lofted(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarray]:
-    """Two beginnings (S, 7), the best after some rounds from several velocities upward."""
+    """Two beginnings (S, 7), the best after some rounds from low and from high velocities upward."""
     row = np.arange(len(stretches))
     start = _guess(stretches, np.zeros(len(stretches)))
     far = np.flatnonzero(np.linalg.norm((stretches.end - stretches.start)[:, :2], axis=1) > _FLAT)
@@ -117,11 +119,12 @@ def _lofted(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarray]:
     most = 0.5 * ball.gravity * some.seconds + 2.0  # it has come down again by then
     rough = [_fitted(some, _guess(some, np.minimum(upward, most)), ball, _ROUGH_ROUNDS, _coarsely, cancelled)
              for upward in _UPWARD]  # fmt: skip
-    order = np.argsort([cost for _, cost in rough], axis=0)
-    found = np.stack([unknown for unknown, _ in rough])
+    costs, found = np.array([cost for _, cost in rough]), np.stack([unknown for unknown, _ in rough])
+    low = np.argmin(costs[:_LOW_ONES], axis=0)
+    high = _LOW_ONES + np.argmin(costs[_LOW_ONES:], axis=0)
     both = [start.copy(), start.copy()]
-    for rank, unknown in enumerate(both):
-        unknown[far] = found[order[rank], row[: len(far)]]
+    for chosen, unknown in zip((low, high), both):
+        unknown[far] = found[chosen, row[: len(far)]]
     return both
 
 

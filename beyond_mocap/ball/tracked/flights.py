@@ -13,9 +13,11 @@ from .samples import Samples
 STEP = 0.02  # s between the moments in which a flight is kept
 _SHORTEST, _LEAST_WAY = 0.25, 2.5  # s, m, of a stretch worth a flight
 _WELL, _BARELY = 0.1, 0.2  # m root mean square: as good as the samples; not worse than this
+_BARELY_HIGH = 0.25  # m root mean square in height
 _WORSE = 2.5  # times the curves' own misses, at most
 _FILLED_OFF = 1.2  # m from samples that the feed made
 _TRUSTED = 5.0  # 1/m, the weight of samples that were measured
+_STRAY, _STRAY_LEAST, _MOST_SOUND = 3.0, 0.4, 0.85  # times the median, m: a sample beside; share that is not beside
 _WAVE = 0.4  # s, in which a shift beside the flight may turn
 _SCATTER, _SHIFTED = 0.08, 0.3  # m of samples; m, its usual size
 _END_OFF = 0.5  # m from the place of the next touch
@@ -116,7 +118,8 @@ def _heights(samples: Samples, heights: bool) -> np.ndarray:
 
 
 def _followed(stretches: Stretches, launches, spans) -> tuple[list[BallPiece], list[tuple]]:
-    """The flights as pieces, and how far each is off: (measured root mean square, how many, filled one, end) m."""
+    """The flights as pieces, and how far each is off: root mean squares over the ground and in height of
+    measured samples, of filled ones, and the end, m."""
     found, offs = [None] * len(spans), [None] * len(spans)
     order = np.argsort(stretches.seconds, kind="stable")
     for low in range(0, len(order), 64):
@@ -150,14 +153,24 @@ def _bounces(times, places, speeds) -> np.ndarray:
     return times[turns] + np.minimum(falls, times[turns + 1] - times[turns])
 
 
-def _off(piece: BallPiece, stretches: Stretches, number: int, span) -> tuple[float, int, float, float]:
+def _off(piece: BallPiece, stretches: Stretches, number: int, span) -> tuple[float, float, float, float]:
     since, weight = stretches.since[number], stretches.weight[number]
     at = np.stack([np.interp(since, piece.times - span[0], piece.positions[:, axis]) for axis in range(2)], axis=1)
     off = np.linalg.norm(at - stretches.points[number, :, :2], axis=1)
-    seen = weight > _TRUSTED
-    made = (weight > 0) & ~seen
+    seen = _sound(off, weight > _TRUSTED)
+    made = (weight > 0) & ~(weight > _TRUSTED)
     end = float(np.linalg.norm(piece.positions[-1, :2] - span[3][:2]))
-    return _rms(off[seen]), int(seen.sum()), _rms(off[made]), end
+    height = np.interp(since, piece.times - span[0], piece.positions[:, 2])
+    high = np.abs(height - stretches.points[number, :, 2])[seen & (stretches.weight_z[number] > _TRUSTED)]
+    return _rms(off[seen]), _rms(high), _rms(off[made]), end
+
+
+def _sound(off: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """(K,) bool: measured samples that are not off far more than most; where these are many, all measured ones."""
+    if not measured.any():
+        return measured
+    near = measured & (off < max(_STRAY_LEAST, _STRAY * float(np.median(off[measured]))))
+    return near if near.sum() >= _MOST_SOUND * measured.sum() else measured
 
 
 def _rms(values: np.ndarray) -> float:
@@ -165,10 +178,10 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _fits(group: list[BallPiece], off: tuple) -> bool:
-    measured, count, made, end = off
+    measured, high, made, end = off
     own = [piece.residual for piece in group if np.isfinite(piece.residual)]
     limit = np.clip(_WORSE * max(own, default=0.0), _WELL, _BARELY)
-    return measured <= limit and made <= _FILLED_OFF and end <= _END_OFF
+    return measured <= limit and high <= _BARELY_HIGH and made <= _FILLED_OFF and end <= _END_OFF
 
 
 def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np.ndarray, np.ndarray]) -> BallPiece:
@@ -179,6 +192,9 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     measured = stretches.weight[number] > _TRUSTED
     since = stretches.since[number][measured]
     there = np.stack([np.interp(since, piece.times - piece.start, piece.positions[:, axis]) for axis in range(2)], axis=1)
+    sound = _sound(np.linalg.norm(there - stretches.points[number][measured, :2], axis=1), np.ones(len(since), bool))
+    measured = np.flatnonzero(measured)[sound]
+    since, there = since[sound], there[sound]
     waves, _ = _waves(since / seconds, seconds)
     off = stretches.points[number][measured, :2] - there - waves[:, :2] @ shift
     slow = waves[:, 2:]
@@ -191,7 +207,7 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     higher = ends[1][2] - places[-1, 2] if np.isfinite(stretches.end[number, 2]) else 0.0
     places[:, 2] = np.maximum(places[:, 2] + every[:, 1] * higher, FOOTBALL.radius)
     path = np.stack([np.interp(since, piece.times - piece.start, places[:, axis]) for axis in range(2)], axis=1)
-    residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if measured.any() else np.nan
+    residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if len(measured) else np.nan
     return BallPiece(piece.times, places, speeds, piece.kind, piece.spin, residual, piece.bounces)
 
 

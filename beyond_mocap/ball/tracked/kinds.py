@@ -12,7 +12,8 @@ _FAST = 7.0  # m/s relative to the player, more than a dribble's touch
 _STOPPED = 4.0  # m/s, less than a pass
 _TURN = np.cos(np.radians(50.0))  # a deflection keeps to its way within this
 _LINE = 1.2  # m, beyond or before the touch line, where a throw-in is taken
-_STILL = 3.0  # s between the touch before and a throw-in
+_ON_LINE = 0.35  # m before it, where a ball lies that was out
+_STILL = 0.5  # s between the touch before and a throw-in
 AREA_DEPTH, AREA_WIDTH, GOAL_WIDTH = 16.5, 40.32, 7.32  # m
 _SHOT, _BESIDE = 10.0, 1.5  # m/s toward the goal line; m beside the goal
 _LOW, _HELD = 0.35, 0.6  # m of the ball's centre: below, a foot's; above, a keeper's hands
@@ -48,9 +49,15 @@ def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
     return float(before[:2] @ after[:2]) > _TURN * fast_in * fast_out
 
 
-def is_throw_in(place: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
-    """Whether a ball that lay still or was away for `since` s and now leaves from `place` (3,) is thrown in."""
-    return since > _STILL and leaves_line(place, after, width)
+def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
+    """Whether a ball that nobody has touched for `since` s, slow, on its line or held there, leaves it by a throw-in.
+
+    place (3,) m; before, after (3,) m/s.
+    """
+    on_line = abs(place[1]) > width / 2.0 - _ON_LINE
+    held = place[2] > CHEST
+    slow = np.linalg.norm(before[:2]) < _STOPPED
+    return bool(since > _STILL and slow and (on_line or held) and leaves_line(place, after, width))
 
 
 def leaves_line(place: np.ndarray, after: np.ndarray, width: float) -> bool:

@@ -30,6 +30,9 @@ _TOGETHER = 0.06  # s in which samples err together: they count as one
 _STEP = 0.04  # s between the knots of a path
 _BLEND = 0.2  # s over which a path is brought to the place of a touch
 _RESTART = 60.0  # s after which a ball over the touch line has been thrown in
+_DOUBT = 4.0  # nats, by which what is usual for feeds is told wrongly
+_SINKS = 4.0  # m/s downward, the most after a touch that stops the ball; feeds let heights fall at once
+_MANY = 0.05  # share of filled samples from which it is told
 _EVERYBODY = 14  # players who are tracked: a touch by nobody among so many is a corner that the feed made
 _HEIGHTS = 0.8  # share of samples with a height from which heights are used
 
@@ -139,7 +142,7 @@ def solve(
     return SolvedBall(
         times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled, outlier=samples.outlier,
         measured=frozen_array(samples.measured, bool), residuals=frozen_array(residuals),
-        ends=tuple(_by_whom(end, solved) for end in ends), confidence=sure,
+        ends=tuple(_by_whom(end, solved) for end in ends), confidence=sure, notes=_notes(samples, heights),
     )  # fmt: skip
 
 
@@ -196,11 +199,11 @@ def _pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPie
         at = np.linspace(start, end, count)
         which = np.full(count, index)
         places, speeds = cuts.pieces.position(at, which), cuts.pieces.velocity(at, which)
-        for edge, place in ((index - 1, 0), (index, -1)):
+        for edge, place, way in ((index - 1, 0, -2.0), (index, -1, 2.0)):
             if 0 <= edge < len(cuts.time):
-                miss = cuts.place[edge] - places[place]
-                near = np.maximum(0.0, 1.0 - np.abs(at - at[place]) / min(_BLEND, end - start))
-                places = places + near[:, None] ** 2 * miss
+                miss, over = cuts.place[edge] - places[place], min(_BLEND, end - start)
+                near = np.maximum(0.0, 1.0 - np.abs(at - at[place]) / over)[:, None]
+                places, speeds = places + near**2 * miss, speeds + way / over * near * miss
         out.append(_piece(samples, at, *_lifted(places, speeds)))
     return out
 
@@ -250,7 +253,7 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
         kind = kinds.kind_of(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
-        if kinds.is_throw_in(place[k], after[k], since, pitch[1]):
+        if kinds.is_throw_in(place[k], before[k], after[k], since, pitch[1]):
             part, kind = "hand", "throw-in"
         elif player in goals:
             part, kind = kinds.keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
@@ -259,6 +262,15 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
         name = players[player] if player >= 0 else ""
         out.append(SolvedTouch(float(time[k]), float(spread[k]), name, part, kind, centre, before[k], after[k], sure))
     return out
+
+
+def _notes(samples: Samples, heights: bool) -> tuple[str, ...]:
+    """What people should know of the feed."""
+    filled, wrong = float(samples.filled.mean()), int(np.count_nonzero(samples.outlier))
+    lines = [f"{filled:.0%} of the ball's samples were made by the feed at constant velocity"] if filled > _MANY else []
+    lines += [f"{wrong} samples of the ball were wrong and left out"] if wrong else []
+    lines += [] if heights else ["no heights of the ball: solved from how it slows, good to a metre or two at best"]
+    return tuple(lines)
 
 
 def _goals(positions: np.ndarray, teams: Sequence[str], length: float) -> dict[int, float]:
@@ -288,6 +300,8 @@ def _along(touch: SolvedTouch, path: SolvedPath, heights: bool) -> SolvedTouch:
     """The touch with the velocities that the path has just before and after it; where the feed has no heights, with the
     height and the part that a flight into it asks for."""
     before, after = path.velocity(np.array([touch.time - 1e-4, touch.time + 1e-4]))
+    if touch.kind in ("receive", "dribble", "chest"):
+        after = np.array([after[0], after[1], max(after[2], -_SINKS)])
     if heights or touch.part == "hand":
         return replace(touch, before=before, after=after)
     height = float(path.at(np.array([touch.time]))[0, 2])
@@ -328,7 +342,7 @@ def _player_velocity(samples: Samples, positions: np.ndarray, player: int, time:
 
 def _sure(margin: float, away: np.ndarray, player: int) -> float:
     """0 to 1: that it was a touch, times that it was this player's."""
-    touch = 1.0 / (1.0 + np.exp(-margin))
+    touch = 1.0 / (1.0 + np.exp(-margin / _DOUBT))
     if player < 0:
         return float(0.5 * touch)
     worth = np.exp(-who.reach_cost(away, None) - away / who.STRAY)
