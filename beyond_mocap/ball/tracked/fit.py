@@ -26,6 +26,7 @@ _FLAT = 6.0  # m, a stretch so short is on the ground in the end: no more than a
 _SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, how far samples lie from the ball, filled-in ones, heights
 _PLACED = 0.12  # m, how far the places of touches are wrong
 _SPUN = 25.0  # rad/s, usual spin about either axis
+_HOP = 1.0  # m/s upward, less stays on the ground
 _LOFTED = 8.0  # m/s, usual velocity upward
 _TAKEN, _HIGH = 1.5, 2.2  # m, the ball's usual height at the next touch; hardly more than this
 _ENOUGH = 0.01  # share of the cost, below which nothing more is won
@@ -184,7 +185,10 @@ def _misses(stretches: Stretches, unknown: np.ndarray, seen: np.ndarray, end: np
     last = (end - np.nan_to_num(stretches.end)) / _PLACED
     over = np.where(known, last[:, 2], end[:, 2] / _TAKEN + np.maximum(end[:, 2] - _HIGH, 0.0) / _PLACED)
     rise = np.where(np.isfinite(stretches.velocity[:, 2]), 0.0, unknown[:, 4] / _LOFTED)
-    prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :2] / _PLACED).T, rise, *(unknown[:, 5:] / _SPUN).T], axis=1)
+    speed = np.linalg.norm(unknown[:, 2:4], axis=1)
+    rolls = np.where(unknown[:, 4] < _HOP, np.clip(unknown[:, 5], 0.0, speed / FOOTBALL.radius), 0.0)
+    spun = np.stack([unknown[:, 5] - rolls, unknown[:, 6]])  # along the ground anything between sliding and rolling
+    prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :2] / _PLACED).T, rise, *(spun / _SPUN)], axis=1)
     return np.concatenate([_soft(flat.reshape(len(off), -1)), _soft(high), prior], axis=1)
 
 
