@@ -87,7 +87,9 @@ def _touched(touch: SolvedTouch, player: str, plan: Plan) -> Touched:
     if not touch.player:
         place = [np.interp(touch.time, plan.track.times, plan.track.positions[:, axis]) for axis in (0, 1)]
         mine = None if np.linalg.norm(touch.position[:2] - place) <= _WITHIN else False
-    return Touched(touch.time, mine, touch.part, touch.kind)
+    heights = plan.track.ball_height_known[np.abs(plan.track.times - touch.time).argmin()]
+    part = touch.part if heights or touch.kind == "throw-in" else ""
+    return Touched(touch.time, mine, part, touch.kind)
 
 
 def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
@@ -122,7 +124,8 @@ def _unlike(key: KeyMoment, touch: Touched) -> float:
     if part is None or off > FURTHEST:
         return np.inf
     wanted = _SENT if _SENDING & words else _TAKEN if _TAKING & words else {touch.kind}
-    unlike = _NOT_MINE * (touch.mine is None) + _OTHER_PART * (touch.part != part) + _OTHER_KIND * (touch.kind not in wanted)
+    unlike = _NOT_MINE * (touch.mine is None) + _OTHER_KIND * (touch.kind not in wanted)
+    unlike += _OTHER_PART * (touch.part not in ("", part))
     return off + unlike
 
 

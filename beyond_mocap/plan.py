@@ -65,7 +65,7 @@ class Pin:
 @dataclass(frozen=True)
 class Touched:
     """Somebody changed the ball's course. time: s; mine: whether it was this player, None where nobody tracked was near;
-    part: "foot", "head", "chest" or "hand"; kind: a word such as "kick" or "receive"."""
+    part: "foot", "head", "chest", "hand", or "" where that cannot be told; kind: a word such as "kick" or "receive"."""
 
     time: float
     mine: bool | None
