@@ -10,6 +10,7 @@ import bmesh
 import bpy
 import numpy as np
 
+from ...beyond_mocap.ball.contact import Tool
 from ...beyond_mocap.ball.pass_scene import Net, PassScene
 from ...beyond_mocap.errors import InputError
 from .. import action, armature, bake, ball, body, channels, linked, preferences, session
@@ -18,7 +19,7 @@ from ..ride import riders
 from ..set_aside import bring_back, drop, put_aside
 from ..settings import absolute
 from . import order as asked
-from . import possession, rally
+from . import held_tool, possession, rally
 from .settings import KEPT, BeyondMocapPasser
 
 if TYPE_CHECKING:
@@ -101,6 +102,7 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
     start = result.order.start
     for one in made.players:
         lay_body(scene, rows[one.name], one.take, start)
+        _tool(scene, rows[one.name].body, made.plan.orders(one.name))
     lay_ball(scene, made, start)
     _net(scene, result.order.scene.net)
     bake.lengthen(scene, start + made.plan.seconds * frames_per_second(scene))
@@ -119,6 +121,8 @@ def clear(scene: bpy.types.Scene) -> None:
         if row.body is not None:
             _check(row)
     for row in settings.players:
+        if row.body is not None:
+            held_tool.remove(row.body)
         if row.body is not None and row.body.get(KEPT):
             remove(row.body)
         elif row.body is not None and row.before.kept:
@@ -225,6 +229,15 @@ def lay_ball(scene: bpy.types.Scene, made: "Passes", start: float) -> None:
         ball.write(target, path, scene, first)[KEPT] = True
 
     possession.anew(scene, target, write)
+
+
+def _tool(scene, target: bpy.types.Object, orders) -> None:
+    """What a player strikes with in his hand, where he strikes with anything."""
+    striking = next((order for order in orders if order.part == "tool"), None)
+    if striking is None:
+        held_tool.remove(target)
+    else:
+        held_tool.show(scene, target, striking.tool or Tool(), striking.side, bake.collection(scene))
 
 
 def _net(scene, net: Net | None) -> None:

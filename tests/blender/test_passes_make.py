@@ -25,7 +25,7 @@ def clips(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("clips")
     for path in LIBRARY.iterdir():
-        if path.stem.startswith(("volley_pass", "volley_toss", "volley_receive", "ready", "walking_1_2", "standing_turn", "walking_0")):
+        if path.stem.startswith(("volley_pass", "volley_toss", "volley_receive", "volley_racquet", "ready", "walking_1_2", "standing_turn", "walking_0")):
             shutil.copy(path, folder)
     return folder
 
@@ -158,6 +158,29 @@ def test_who_carries_the_ball_carries_it_on_its_new_way(two):
     assert len(ball.constraints) == 1 and ball.animation_data.action.name.endswith("carried")
     press(bpy.ops.beyond_mocap.free_ball)
     assert not len(ball.constraints) and "carried" not in ball.animation_data.action.name
+
+
+def test_a_racquet_is_where_it_meets_the_ball(two, room):
+    for player in settings().players:
+        player.part, player.side = "tool", "right"
+    settings().players[0].height = 1.5
+    press(bpy.ops.beyond_mocap.passes_make)
+    ball, line = settings().rally, settings().strikes.splitlines()[1]
+    assert "right tool" in line
+    name, frame = line.partition("\t")[2].partition(":")[0], int(line.partition("\t")[0])
+    centre = seen(ball, frame)[:3, 3] / 100.0
+    tool = bpy.data.objects[f"{name} tool"]
+    shown = tool.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = np.array([shown.matrix_world @ vertex.co for vertex in tool.data.vertices]) / 100.0
+    axis = [points[np.linalg.norm(points - end, axis=1) < 0.05].mean(axis=0) for end in (points[-1], points[24])]
+    along = axis[0] - axis[1]
+    share = np.clip(np.dot(centre - axis[1], along) / np.dot(along, along), 0.0, 1.0)
+    gap = np.linalg.norm(centre - axis[1] - share * along) - 0.015 - ball.dimensions.x / 200.0
+    assert abs(gap) < 0.01, gap
+    for player in settings().players:
+        player.part = "foot"
+    press(bpy.ops.beyond_mocap.passes_make)
+    assert not [thing for thing in bpy.data.objects if thing.name.endswith("tool")]
 
 
 def test_a_net_comes_and_goes(two):

@@ -125,7 +125,7 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
     assert found == [("player1", 8.5), ("player2", 16.5), ("player1", 24.8)], found
     yield 0.5
     window.picture(PICTURES / "ball_solved.png")
-    yield from press("accept_touches")
+    yield from press("accept_touches", "touches()")
     found = [moment.key.words for moment in room("scene.lanes").moments(settings().players["player2"].dot)]
     assert found == [("receive", "foot"), ("kick",)], (found, printed_since(mark)[-600:])
     back()

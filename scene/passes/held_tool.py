@@ -1,0 +1,57 @@
+"""What a player strikes with, such as a racquet, as an object that goes with his hand: where the core's contact is, there it is."""
+
+from __future__ import annotations
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ...beyond_mocap.motion.humanoid import identify
+from .. import armature
+from ..material import colour
+from .settings import KEPT
+
+HANDLE = 0.6  # of the thickness of what strikes
+_SIDES = 12
+
+
+def show(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, collection) -> bpy.types.Object:
+    """The tool (`ball.contact.Tool`) in a body's hand, in place of the one before."""
+    remove(body)
+    skeleton = armature.skeleton_of(body, scene)
+    hand = getattr(identify(skeleton), side or "right").hand
+    bone = body.data.bones[skeleton.names[hand]]
+    metres = armature.placement(body, scene).scale
+    along = Vector(skeleton.offsets[hand] / max(np.linalg.norm(skeleton.offsets[hand]), 1e-9))
+    name = f"{body.name} tool"
+    mesh, shape = bpy.data.meshes.new(name), bmesh.new()
+    for start, end, radius in ((0.0, tool.length - tool.reach, HANDLE * tool.radius), (tool.length - tool.reach, tool.length, tool.radius)):
+        if end > start:
+            _rod(shape, start, end, radius)
+    turn = Vector((0.0, 0.0, 1.0)).rotation_difference(along).to_matrix().to_4x4()
+    shape.transform(Matrix.Translation(bone.head_local) @ turn @ Matrix.Scale(1.0 / metres, 4))
+    shape.to_mesh(mesh)
+    shape.free()
+    mesh.materials.append(colour("Tool", (0.05, 0.05, 0.06)))
+    made = bpy.data.objects.new(name, mesh)
+    made[KEPT] = True
+    collection.objects.link(made)
+    made.parent, made.parent_type, made.parent_bone = body, "BONE", bone.name
+    made.matrix_parent_inverse = (bone.matrix_local @ Matrix.Translation((0.0, bone.length, 0.0))).inverted()
+    return made
+
+
+def remove(body: bpy.types.Object) -> None:
+    """Take the tool out of a body's hand."""
+    for child in [child for child in body.children if child.get(KEPT) and child.parent_type == "BONE"]:
+        mesh = child.data
+        bpy.data.objects.remove(child)
+        if not mesh.users:
+            bpy.data.meshes.remove(mesh)
+
+
+def _rod(shape: bmesh.types.BMesh, start: float, end: float, radius: float) -> None:
+    """A rod along Z, metres."""
+    made = bmesh.ops.create_cone(shape, cap_ends=True, segments=_SIDES, radius1=radius, radius2=radius, depth=end - start)
+    bmesh.ops.translate(shape, verts=made["verts"], vec=(0.0, 0.0, 0.5 * (start + end)))
