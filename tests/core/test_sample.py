@@ -89,3 +89,19 @@ def test_the_passage_reads_and_asks_for_what_the_library_has(maker):
         true = maker.true_paths()[1][name][::10]
         error = np.linalg.norm(track.positions - true, axis=1)
         assert 0.03 < np.sqrt(np.mean(error**2)) < 0.14  # a tracking system's noise
+
+
+def test_the_passing_library_is_what_its_script_makes(maker, monkeypatch):
+    """Its clips are of the same skeleton, its strikes begin and end standing, and one of them is made again."""
+    monkeypatch.syspath_prepend(str(SAMPLE))
+    import make_passes
+
+    folder = SAMPLE / "passes" / "library"
+    clips = {clip.name: clip for clip in make_passes.library()}
+    assert {path.stem for path in folder.glob("*.bvh")} == set(clips) == {path.stem for path in folder.glob("*.txt")}
+    for name in ("volley_attack", "ready_2", "start_stop_walking"):
+        shipped = bvh.read(folder / f"{name}.bvh").motion
+        assert np.allclose(shipped.root_positions, clips[name].motion.root_positions, atol=1e-4)
+    assert shipped.skeleton.same_bones(bvh.read(SAMPLE / "library" / "standing_1.bvh").motion.skeleton)
+    keyed = {row.words for path in folder.glob("volley_*.bvh") for row in read_clip_annotations(path.with_suffix(".txt"), 30.0)}
+    assert ("standing",) in keyed and len(keyed) == 9
