@@ -75,6 +75,7 @@ from . import (
     show_video,
     solve_ball,
     split_span,
+    stream_act,
     stream_end,
     stream_keep,
     stream_play,
@@ -191,6 +192,7 @@ CLASSES = (
     stream_keep.BEYOND_MOCAP_OT_stream_keep,
     stream_play.BEYOND_MOCAP_OT_stream_play,
     stream_target.BEYOND_MOCAP_OT_stream_target,
+    stream_act.BEYOND_MOCAP_OT_stream_act,
     stream_end.BEYOND_MOCAP_OT_stream_end,
 )
 

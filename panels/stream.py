@@ -40,6 +40,7 @@ def live(panel, layout, context) -> None:
     row = layout.row(align=True)
     row.operator("beyond_mocap.stream_play", icon="OUTLINER_OB_ARMATURE")
     row.operator("beyond_mocap.stream_end", icon="SNAP_FACE")
+    layout.operator("beyond_mocap.stream_act", icon="ARMATURE_DATA")
     panel.progress(context, "live")
     for line in told.played.splitlines():
         paragraph(layout, line, "BLANK1")

@@ -8,6 +8,7 @@ bounded number of bytes a second, and ends with `stop`, which also closes all so
 from __future__ import annotations
 
 import atexit
+import os
 import select
 import socket
 import statistics
@@ -97,7 +98,7 @@ class Listener:
             kind = socket.SOCK_DGRAM if self.protocol == "udp" else socket.SOCK_STREAM
             self._server = socket.socket(socket.AF_INET, kind)
             try:
-                if self.protocol == "tcp":
+                if self.protocol == "tcp" and os.name != "nt":  # there it lets two programs share a port
                     self._server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 self._server.bind((LOOPBACK, self.port))
                 if self.protocol == "tcp":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 import time
@@ -65,7 +66,8 @@ class Sender:
     def _called(self, stopped: Callable[[], bool]) -> socket.socket | None:
         """The connection of the first who calls; None where it was stopped before."""
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
-            server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if os.name != "nt":  # there it lets two programs share a port
+                server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 server.bind((LOOPBACK, self.port))
             except OSError as error:

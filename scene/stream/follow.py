@@ -57,9 +57,15 @@ def began() -> None:
 
 def look(scene: bpy.types.Scene) -> HitMotion | None:
     """Show what has arrived in a scene, tell how it does, and say which strike has just been recognised, if any."""
-    listener = receiver.listener()
-    if listener is None:
-        return None
+    listener, found = receiver.listener(), None
+    if listener is not None:
+        found = _receive(scene, listener)
+    for action in list(_on_look):
+        action(scene)
+    return found
+
+
+def _receive(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
     now = time.monotonic()
     latest = listener.latest()
     if latest is not None and latest.number != _state["seen"]:
@@ -70,8 +76,6 @@ def look(scene: bpy.types.Scene) -> HitMotion | None:
     if now - _state["looked"] >= LOOKED_EVERY:
         _state["looked"] = now
         found = _hit(scene)
-    for action in list(_on_look):
-        action(scene)
     if now - _state["told"] >= TOLD_EVERY:
         _state["told"] = now
         tell()
@@ -130,14 +134,14 @@ def tell() -> None:
 
 
 def _tick():
-    if receiver.listener() is None:
+    if receiver.listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
             tell()
             _redraw()
         return IDLE
     if bpy.app.is_job_running("RENDER"):
         return IDLE
-    before = bpy.context.window_manager.beyond_mocap_streaming.figures
+    before = (told := bpy.context.window_manager.beyond_mocap_streaming).figures, told.played
     for window in bpy.context.window_manager.windows[:1]:
         with bpy.context.temp_override(window=window):
             try:
@@ -148,7 +152,8 @@ def _tick():
             except Exception:  # a timer that raises is never called again
                 traceback.print_exc()
                 receiver.stop()
-    if bpy.context.window_manager.beyond_mocap_streaming.figures != before:
+    told = bpy.context.window_manager.beyond_mocap_streaming
+    if (told.figures, told.played) != before:
         _redraw()
     return TICK
 

@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 
 from ...beyond_mocap.ball.hits import HitMotion
 from ...beyond_mocap.errors import BeyondMocapError, InputError
-from .. import background, bake, linked
+from .. import action, background, bake, linked
 from ..measure import frames_per_second
 from ..passes import make
 from ..passes.settings import PLAYED
@@ -92,6 +92,20 @@ def target(scene: bpy.types.Scene) -> str:
 def struck(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
     """The user has struck: the newest strike counts."""
     _held["pending"] = hit
+
+
+def shown_by(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
+    """The strike of an armature's own motion that is nearest to the present frame. InputError where there is none."""
+    from ...beyond_mocap.ball.hits import analyse
+
+    settings, motion = scene.beyond_mocap_stream, action.read(body, scene)
+    sided = settings.part in ("foot", "hand", "tool")
+    sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
+    hits = [hit for side in sides for hit in analyse(motion, settings.part, side, settings.threshold or None).motions]
+    if not hits:
+        raise InputError(f"armature {body.name}", f"no strike of the {settings.part}", "one", "choose the part under Live Stream")
+    now = scene.frame_current - (action.first_frame(body) or 0)
+    return min(hits, key=lambda hit: (abs(hit.key - now), -hit.max_speed))
 
 
 def look(scene: bpy.types.Scene) -> None:

@@ -189,6 +189,12 @@ def play_live():
     bpy.ops.beyond_mocap.stream_play()
 
 
+def show_how():
+    """The same, and an armature that kicks is active."""
+    play_live()
+    bpy.ops.beyond_mocap.import_clips(filepath=str(worlds.SAMPLE / "kick_low_inside.bvh"))
+
+
 def listen():
     """A stream is listened to, and a few frames have arrived."""
     scene = importlib.import_module(f"{EXTENSION}.scene.stream.receiver")
@@ -313,6 +319,7 @@ ROWS = {
     "show_video": Row("video", changes=False),
     "solve_ball": Row("imported"),
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
+    "stream_act": Row("imported", prepare=show_how),
     "stream_end": Row("imported", prepare=play_live, changes=False),
     "stream_keep": Row("imported", prepare=listen),
     "stream_play": Row("imported", prepare=fill_scene),

@@ -147,6 +147,16 @@ def test_it_is_one_step(playing, room):
     assert room("stream.play").rally() is None and "Undo has ended" in told().played
 
 
+def test_an_armature_can_show_how(playing, room):
+    """Its strike nearest to the present frame, without any stream; not one that has none."""
+    with pytest.raises(RuntimeError, match="no strike of the foot"):
+        bpy.context.view_layer.objects.active = playing.beyond_mocap_passes.players[1].body
+        press(OPS.stream_act)
+    bpy.ops.beyond_mocap.import_clips(filepath=str(CLIPS / "volley_toss.bvh"))
+    assert press(OPS.stream_act) == {"FINISHED"}
+    assert room("stream.play").rally().passes == 1 and "Ann played volley_toss" in told().played
+
+
 def test_a_scene_that_is_cleared_ends_it(playing, room):
     OPS.passes_clear()
     assert all(row.body is None for row in playing.beyond_mocap_passes.players)

@@ -7,7 +7,7 @@ import time
 import bpy
 import mathutils
 from ball_checks import choose, own_tab, press, thing, until
-from tab import PICTURES, assert_no_trouble_since, output, room, sample, wait_for_work, window
+from tab import PICTURES, assert_no_trouble_since, output, room, sample, window
 
 LIMIT = 500
 PORT = 7361
@@ -86,8 +86,7 @@ def check_strikes_are_answered_while_the_scene_plays():
     look_from((0.0, 0.5, 0.6), 11.0)
     back = yield from own_tab("live")
     yield from press("stream_play")
-    yield from wait_for_work(240)
-    assert told().playing, told().played
+    yield from until(lambda: told().playing, 240.0)
     bpy.ops.screen.animation_play()
     end = send("passes/library/volley_pass.bvh")
     try:
