@@ -157,7 +157,7 @@ def _world(scene, frame: int, kept: dict) -> None:
         setattr(world, name, max(value, getattr(world, name)))
     cache = world.point_cache
     if not cache.is_baked:
-        cache.frame_start = min(cache.frame_start, frame - 2)
+        cache.frame_start = min(cache.frame_start, frame - 2) if kept["world"] else frame - 2
         cache.frame_end = max(cache.frame_end, scene.frame_end, frame + int(5 * frames_per_second(scene)))
 
 

@@ -348,7 +348,7 @@ def lines(solved: Solved) -> list[str]:
             f"Arrives after {shot.seconds:.2f} s, on frame {frame:.1f}; off by {off:.1f} mm"]
     if part:
         told[0] += f"; the part moves {part:.1f} m/s"
-    before = solved.flight.bounces[solved.flight.bounces < shot.seconds]
+    before = solved.flight.bounces[solved.flight.bounces < shot.seconds - 1e-3]
     if len(before):
         told.append("Bounces on frame " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))
     if len(shot.frames) > 1:
