@@ -61,7 +61,7 @@ Empty (a new one, if none is). Drag the Empty: the ball follows. Without an arma
             shots.write(scene, ball, solved)
         else:
             solved = self.new(context, ball)
-        self.report({"INFO"}, shots.lines(solved)[1])
+        self.report({"INFO"}, "; ".join(shots.lines(solved)))
 
     def new(self, context, ball):
         """A ball that is not aimed yet."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..scene.aimed.settings import aimed_ball
-from .tab import paragraph
+from .tab import paragraph, table
 
 
 def aim(layout, context) -> None:
@@ -46,8 +46,7 @@ def of_ball(layout, ball) -> None:
             column.prop(settings, name)
     if settings.told:
         paragraph(layout, settings.told, "ERROR")
-    for line in settings.figures.splitlines():
-        layout.label(text=line)
+    table(layout, settings.figures.splitlines())
 
 
 def physics(layout, context, ball) -> None:

@@ -338,21 +338,21 @@ def draw_curve(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -
 
 
 def lines(solved: Solved) -> list[str]:
-    """A shot in words."""
+    """A shot in lines "name: value"."""
     shot, aimed = solved.shot, solved.shot.aimed
     speed = float(np.linalg.norm(shot.velocity))
     up = float(np.degrees(np.arctan2(shot.velocity[2], np.linalg.norm(shot.velocity[:2]))))
     part = float(np.linalg.norm(solved.strikes.velocity[shot.chosen]))
-    off, frame = 1000.0 * aimed.miss[shot.chosen], solved.strike + shot.seconds * solved.fps
-    told = [f"Struck on frame {solved.strike}, {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up",
-            f"Arrives after {shot.seconds:.2f} s, on frame {frame:.1f}; off by {off:.1f} mm"]
+    told = [f"Struck on frame: {solved.strike}", f"Leaves with: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up"]
     if part:
-        told[0] += f"; the part moves {part:.1f} m/s"
+        told.append(f"Part moves: {part:.1f} m/s")
+    told.append(f"Arrives on frame: {solved.strike + shot.seconds * solved.fps:.1f}")
+    told.append(f"Flight, miss: {shot.seconds:.2f} s, {1000.0 * aimed.miss[shot.chosen]:.1f} mm")
     before = solved.flight.bounces[solved.flight.bounces < shot.seconds - 1e-3]
     if len(before):
-        told.append("Bounces on frame " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))
+        told.append("Bounces on frame: " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))
     if len(shot.frames) > 1:
-        told.append(f"Possible from {int(aimed.possible.sum())} of {len(shot.frames)} frames")
+        told.append(f"Possible frames: {int(aimed.possible.sum())} of {len(shot.frames)}")
     return told
 
 
