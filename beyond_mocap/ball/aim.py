@@ -186,10 +186,11 @@ class _Problem:
 
     def arrived(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the balls (B, 3) m are in time, and after how many bounces (B,); more bounces than asked for are not
-        made."""
+        made. A ball that lies on the ground is not struck into it: -1 bounces."""
         balls = batch.launched(self.start, velocity, self.spin, self.ball, self.ground)
         balls = batch.after(balls, self.ball, self.seconds, self.ground, self.bounces)
-        return balls.position, balls.bounces
+        lies = self.start[:, 2] < self.ground + self.ball.radius + 1e-3
+        return balls.position, np.where(lies & (velocity[:, 2] < 0.0), -1, balls.bounces)
 
     def guessed(self) -> tuple[np.ndarray, np.ndarray]:
         """Launch velocities (B, 3) of balls that linear drag as strong as theirs slows; exact for such balls. And (B,)

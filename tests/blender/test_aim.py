@@ -174,3 +174,18 @@ def test_physics_wants_keys_around_the_frame(aimed, frame):
     with pytest.raises(RuntimeError, match="keys on frames"):
         bpy.ops.beyond_mocap.ball_to_physics(frame=frame)
     assert bpy.context.scene.rigidbody_world is None
+
+
+def test_a_path_with_rotations_is_baked_with_them(core, room):
+    scene = bpy.context.scene
+    times = np.arange(11) / frames(scene)
+    turns = core("motion.quaternion").about_up(np.linspace(0.0, 2.0, 11))
+    path = core("take").BallPath(times, np.full((11, 3), 0.11), np.ones(11, bool), turns)
+    ball = room("ball").create(bpy.context, "Ball", scene.collection)
+    room("ball").write(ball, path, scene, 5.0)
+    scene.frame_set(10)
+    assert np.array(ball.rotation_quaternion) == pytest.approx(turns[5], abs=1e-6)
+
+
+def frames(scene):
+    return scene.render.fps / scene.render.fps_base

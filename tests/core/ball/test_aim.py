@@ -117,6 +117,11 @@ def test_what_no_human_can_kick_is_not_possible():
     assert all(part in str(error) for part in ("pass 3", "90.0 m", "38 m/s"))
 
 
+def test_a_ball_on_the_ground_is_not_struck_into_it():
+    aimed = aim((0.0, 0.0, 0.11), (20.0, 0.0, 1.0), FOOTBALL, [1.2, 2.0], bounces=1)
+    assert aimed.velocity[1, 2] > 0.0 and aimed.possible.tolist() == [False, True]
+
+
 def test_a_height_that_no_second_bounce_reaches_is_not_possible():
     aimed = aim((0.0, 0.0, 0.3), (5.0, 0.0, 2.5), FOOTBALL, 0.6, bounces=2)
     assert not aimed.possible[0] and np.isfinite(aimed.velocity).all()
