@@ -55,14 +55,15 @@ def test_one_offset_of_a_whole_file_is_found():
     assert score.f1 == 1.0
 
 
-def test_the_list_read_by_hand_is_whole():
+@pytest.mark.parametrize("name, least", [("touches_by_hand.csv", 70), ("touches_by_hand_later.csv", 15)])
+def test_the_lists_read_by_hand_are_whole(name, least):
     for match in ("dutch", "nl2019"):
-        reading = read_touches(Path(__file__).parents[3] / "benchmarks" / "touches_by_hand.csv", match)
+        reading = read_touches(Path(__file__).parents[3] / "benchmarks" / name, match)
         for touch in (*reading.touches, *reading.doubts):
             ends = [touch.time, touch.time if touch.until is None else touch.until]
             assert any(start <= ends[0] <= ends[1] <= end for start, end in reading.stretches), touch
         assert all(touch.players for touch in reading.touches)
-        assert len(reading.touches) >= 70
+        assert len(reading.touches) >= least
 
 
 def test_bad_lists_are_told(tmp_path):
