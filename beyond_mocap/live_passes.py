@@ -24,7 +24,7 @@ from .library.library import Library
 from .motion import quaternion
 from .motion.humanoid import heading
 from .motion.motion import Motion
-from .passes import ball_of, ball_path, planned
+from .passes import ball_of, ball_path, bone_weights, planned
 from .take import BallPath
 
 LONG = 60.0
@@ -162,7 +162,8 @@ def answer(
 
 
 def _settings(scene: PassScene) -> BodySettings:
-    return BodySettings(transition=scene.transition, watch=scene.watch, seed=scene.seed)
+    weights = bone_weights(scene.weights)
+    return BodySettings(transition=scene.transition, watch=scene.watch, seed=scene.seed, weights=weights)
 
 
 def _planned(library: Library, scene: PassScene, stance: Stance, lies: np.ndarray, progress, cancelled) -> PassPlan:
