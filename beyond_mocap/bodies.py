@@ -34,7 +34,7 @@ from .plan import Plan
 from .polish.gaze import CHEST, following
 from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
 from .polish.strike import Touch
-from .polish.strike_at import Meeting, met_at
+from .polish.strike_at import Meeting, Met, met_at
 from .synthesis.footage import Footage, fetch
 from .synthesis.path_costs import Alike
 from .synthesis.path_search import PathSearch
@@ -44,6 +44,9 @@ from .take import BallPath, Take
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""
+
+FASTER = 1.15
+"""Times the library's highest speed that a player may go without being told."""
 
 OWN_HEAD = 0.3
 """Seconds around a header in which the head moves as recorded; it goes over within as many more."""
@@ -177,7 +180,7 @@ class _Body:
             correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=plan, edit=edit,
         )
         report(1.0, "Done")
-        return PlayerMotion(_with_sources(take, self.library, raw), struck.gap, struck.moved, self._warnings(struck))
+        return PlayerMotion(_with_sources(take, self.library, raw), struck.gap, struck.moved, self._warnings(struck, track))
 
     def _wanted(self, times: np.ndarray) -> Wanted:
         """What the search is asked for, at the library's rate."""
@@ -276,8 +279,14 @@ class _Body:
             out.append(Meeting(frame, surface, ball, self.ball_radius, entry, leave))
         return out
 
-    def _warnings(self, struck) -> tuple[str, ...]:
-        told = []
+    def _warnings(self, struck: Met, track: SampledTrack) -> tuple[str, ...]:
+        told, fastest = [], int(np.argmax(track.speed))
+        if track.speed[fastest] > FASTER * self.library.fastest:
+            asks, has = track.speed[fastest], self.library.fastest
+            told.append(
+                f"{self.times[fastest]:.2f} s: he would have to run {asks:.1f} m/s to be there in time; the library has "
+                f"{has:.1f} m/s: give him more time, or a place nearer by"
+            )
         for order, gap in zip(self.orders, struck.gap):
             if gap > 0.005:
                 told.append(f"{order.time:.2f} s: the {order.part} is {100.0 * gap:.1f} cm off the ball")

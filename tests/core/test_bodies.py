@@ -94,6 +94,15 @@ def test_the_same_bits(library, orders, made):
     assert again.take.motion.root_positions.tobytes() == made.take.motion.root_positions.tobytes()
 
 
+def test_a_place_too_far_off_is_told_and_a_crowd_of_strikes_is_played(library):
+    far = [kick(library, 2.0, (25.0, 0.0), 0.0)]
+    made = player_motion(library, Stance((0.0, 0.0), 0.0), far, straight(far, 4.0), RADIUS)
+    assert made.gaps[0] < 0.005 and len(made.warnings) == 1 and "m/s" in made.warnings[0]
+    crowd = [kick(library, time, (0.0, 0.0), 0.0) for time in (0.0, 2.0, 2.5, 3.0)]
+    made = player_motion(library, Stance((0.0, 0.0), 0.0), crowd, straight(crowd, 3.0), RADIUS)
+    assert np.all(made.gaps < 0.005) and np.all(np.isfinite(made.take.motion.rotations))
+
+
 def test_who_has_nothing_to_do_stands(library):
     orders = []
     made = player_motion(library, Stance((2.0, 1.0), 1.0), orders, straight(orders, 6.0), RADIUS)
