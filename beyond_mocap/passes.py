@@ -1,7 +1,7 @@
 """The recipe of a passing scene: several players keep a ball going (Ball handling).
 
-`ball.pass_plan` says when, where and with what each of them strikes and how the ball flies; `bodies` moves each player; the
-ball's path is the flights, one after the other.
+`ball.pass_plan` says when, where and with what each of them strikes and how the ball flies; `bodies` moves each player;
+the ball's path is the flights, one after the other.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ _SIDED = ("foot", "hand", "tool")
 
 @dataclass(frozen=True, eq=False)
 class PlayerPasses:
-    """One player of the scene. take: his motion, contacts and where its frames came from; gaps (K,) m between part and ball
-    at each of his strikes (NaN where he misses), moved (K,) m that the part was moved for it."""
+    """One player of the scene. take: his motion, contacts and where its frames came from; gaps (K,) m between part and
+    ball at each of his strikes (NaN where he misses), moved (K,) m that the part was moved for it."""
 
     name: str
     take: Take
@@ -97,9 +97,9 @@ def passes(
             raise Cancelled("cancelled")
         players.append(_played(library, scene, plan, path, player, _part_of(report, number, scene.players), stop))
     told = [f"{player.name}: {line}" for player, motion in zip(scene.players, players) for line in motion.warnings]
-    parts = tuple(PlayerPasses(player.name, one.take, one.gaps, one.moved) for player, one in zip(scene.players, players))
+    moved = tuple(PlayerPasses(who.name, one.take, one.gaps, one.moved) for who, one in zip(scene.players, players))
     report(1.0, "Done")
-    return Passes(scene, ball_of(scene), plan, path, parts, (*plan.warnings, *told))
+    return Passes(scene, ball_of(scene), plan, path, moved, (*plan.warnings, *told))
 
 
 def _part_of(report, number: int, players: tuple[Player, ...]):
@@ -135,7 +135,8 @@ def ball_of(scene: PassScene) -> Ball:
     for name, value in choice.changes.items():
         low, high = BALL_LIMITS[name]
         values = value if isinstance(value, tuple) else (value,)
-        if len(values) != len(np.atleast_1d(getattr(BALLS[choice.kind], name))) or not all(low <= one <= high for one in values):
+        count = len(np.atleast_1d(getattr(BALLS[choice.kind], name)))
+        if len(values) != count or not all(low <= one <= high for one in values):
             raise InputError(f"ball: {name}", f"{value}", "three numbers" if name == "lift" else f"{low:g} to {high:g}")
     return replace(BALLS[choice.kind], **choice.changes)
 
@@ -209,7 +210,8 @@ class _Reach:
     def site(self, name: str, place: np.ndarray, one: Pass | None, number: int) -> Site:
         """A strike of one player; `one`: the pass that goes out, `number`: which pass an error names."""
         player = self.scene.player(name)
-        part, side = (player.part, player.side) if one is None else (one.part or player.part, player.side if one.side is None else one.side)
+        part = (one and one.part) or player.part
+        side = player.side if one is None or one.side is None else one.side
         tool = (player.tool or Tool()) if part == "tool" else None
         kind = "receive" if one is None else one.kind
         try:
@@ -255,7 +257,8 @@ class _Reach:
         first = int(np.floor(example.start * motion.fps))
         last = len(motion) if example.end is None else int(np.ceil(example.end * motion.fps)) + 1
         if first > len(motion) - 3:
-            raise InputError("example", f"{example.clip} from {example.start:g} s", f"seconds up to {motion.duration:.2f}")
+            found = f"{example.clip} from {example.start:g} s"
+            raise InputError("example", found, f"seconds up to {motion.duration:.2f}")
         sides = [side] if side else (["left", "right"] if part in _SIDED else [""])
         stretch = motion.frames(first, min(last, len(motion)))
         found = [hit for one in sides if (hit := analyse(stretch, part, one, tool=tool).strongest)]
@@ -275,7 +278,9 @@ def _needs(library: Library, sizes: dict[str, float]):
 # -- the bodies
 
 
-def _played(library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress, cancelled) -> PlayerMotion:
+def _played(
+    library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress, cancelled
+) -> PlayerMotion:
     """One player's motion in his own size; the work is done in the library's."""
     size = size_of(player, library)
     orders = [_sized(order, size) for order in plan.orders(player.name)]
@@ -283,8 +288,9 @@ def _played(library, scene: PassScene, plan: PassPlan, path: BallPath, player: P
     ball = path if size == 1.0 else replace(path, positions=path.positions / size)
     settings = BodySettings(scene.transition, scene.watch, scene.seed, bone_weights(scene.weights))
     moved = player_motion(
-        library, stance, orders, ball, ball_of(scene).radius / size, len(path.times), scene.fps, settings, progress, cancelled
-    )
+        library, stance, orders, ball, ball_of(scene).radius / size, len(path.times), scene.fps, settings, progress,
+        cancelled,
+    )  # fmt: skip
     if size == 1.0:
         return moved
     grown = in_own_size(moved.take, size, _grown_plan(moved.take.plan, size, player.height))

@@ -1,8 +1,9 @@
-"""Which frame of which hit motion makes each strike, facing where, and how long its ball travels (Table 1, steps 2 to 7).
+"""Which frame of which hit motion makes each strike, facing where, and how long its ball travels (Table 1, steps
+2 to 7).
 
 All natural ways of a ball stretch are looked at, and those that come nearest to the next player are kept. From the last
-strike to the first, since each flight goes to where the next strike is, the exact flights of all these and of many times
-of travel are worked out, and the one is taken that changes the natural velocity least.
+strike to the first, since each flight goes to where the next strike is, the exact flights of all these and of many
+times of travel are worked out, and the one is taken that changes the natural velocity least.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ LIES = 0.2
 
 @dataclass(frozen=True, eq=False)
 class _Options:
-    """What is left of a strike's moments after the natural ways: moments (M), facing (M,) rad, cost (M,) m/s, natural."""
+    """What is left of a strike's moments after the natural ways: moments (M), facing (M,) rad, cost (M,) m/s,
+    natural."""
 
     moments: StrikeMoments
     facing: np.ndarray
@@ -124,7 +126,8 @@ def _options(court: Court, number: int, site: Site, used: dict, random: np.rando
 
 
 def _faced(court: Court, moments: StrikeMoments, site: Site, toward: np.ndarray) -> tuple[StrikeMoments, np.ndarray]:
-    """Each moment with each way to face, and these (N,) rad: where the natural way goes at `toward` (3,) m, and beside."""
+    """Each moment with each way to face, and these (N,) rad: where the natural way goes at `toward` (3,) m, and
+    beside."""
     velocity = moments.struck.velocity
     natural = np.arctan2(velocity[:, 1], velocity[:, 0]) * (site.asked is not None)  # a trap gives way
     bearing = np.arctan2(*(toward[:2] - site.place)[::-1])
@@ -142,7 +145,8 @@ def _possible(court: Court, number: int, site: Site) -> StrikeMoments:
         return moments
     height = moments.ball(np.broadcast_to([1.0, 0.0, 0.0], (len(moments), 3)), radius)[:, 2]
     if height.min() >= radius + LIES:
-        found = f"the ball lies on the ground, and no {site.part} of {site.player}'s motions is below {height.min():.2f} m"
+        lowest = f"no {site.part} of {site.player}'s motions is below {height.min():.2f} m"
+        found = f"the ball lies on the ground, and {lowest}"
         raise InputError("serve", found, "a motion that strikes lower", "let the ball come from a player or a place")
     return moments.only(height < radius + LIES)
 
@@ -153,8 +157,8 @@ def _simplest(options: _Options) -> Link:
 
 
 def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
-    """The option and the seconds of travel with which the natural velocity is changed least (step 8 for each): all times
-    with the best option, then the best times with all."""
+    """The option and the seconds of travel with which the natural velocity is changed least (step 8 for each): all
+    times with the best option, then the best times with all."""
     seconds = seconds_of(court.passes[number], court.scene.fps)
     tried = _tried(court, number, options, after, np.zeros(len(seconds), int), seconds)
     best = np.argsort(tried.cost, kind="stable")[:MOST_TIMES] if np.isfinite(tried.cost).any() else slice(None)
@@ -171,7 +175,9 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
     )  # fmt: skip
 
 
-def _tried(court: Court, number: int, options: _Options, after: Link, option: np.ndarray, seconds: np.ndarray) -> _Tried:
+def _tried(
+    court: Court, number: int, options: _Options, after: Link, option: np.ndarray, seconds: np.ndarray
+) -> _Tried:
     """Flights from `option` (N,) that take `seconds` (N,), and what each costs."""
     site, one, receiver = court.sites[number], court.passes[number], court.sites[number + 1]
     natural = wished(options.velocities(), site.kind)
@@ -203,8 +209,9 @@ def _refusal(court: Court, number: int, tried: _Tried) -> InputError:
     one, part, net = court.passes[number], court.sites[number].part, court.scene.net
     bounces = "a bounce" if one.bounces == 1 else f"{one.bounces} bounces"
     if tried.reached:
-        return InputError(court.name(number), f"no way over a net of {net.height:g} m with {bounces}", "one that goes over it",
-                          "lower the net, change bounces or seconds, or move them away from it")  # fmt: skip
+        found = f"no way over a net of {net.height:g} m with {bounces}"
+        next_step = "lower the net, change bounces or seconds, or move them away from it"
+        return InputError(court.name(number), found, "one that goes over it", next_step)
     within = f" in {one.seconds:g} s" if one.seconds else ""
     far = np.linalg.norm(tried.target - tried.starts[0])
     seconds = seconds_of(one, court.scene.fps) if one.seconds else None
@@ -212,7 +219,8 @@ def _refusal(court: Court, number: int, tried: _Tried) -> InputError:
     speed, fastest = float(np.linalg.norm(free.velocity[0])), court.fastest(number)
     found, expected = f"no way of {far:.1f} m{within} with {bounces}", f"one that a human can give by {part}"
     if free.miss[0] <= ON_TARGET and speed > fastest:
-        found, expected = f"{far:.1f} m away{within} with {bounces} takes {speed:.0f} m/s", f"up to {fastest:.0f} m/s by {part}"
+        found = f"{far:.1f} m away{within} with {bounces} takes {speed:.0f} m/s"
+        expected = f"up to {fastest:.0f} m/s by {part}"
     return InputError(court.name(number), found, expected, "move them nearer, or change bounces or seconds")
 
 

@@ -16,7 +16,8 @@ SPEEDS = {"toss": (4.5, 8.0), "pass": (5.0, 12.0), "attack": (9.0, 25.0)}
 """m/s between which a ball of each kind sets out, by its name."""
 
 SPINS = {"toss": -0.1, "pass": -0.1, "attack": 0.2}
-"""Shares of the spin with which a ball rolls at its speed: struck from below it turns back, struck hard it turns forward."""
+"""Shares of the spin with which a ball rolls at its speed: struck from below it turns back, struck hard it turns
+forward."""
 
 LONG = {"toss": 1.5, "pass": 1.5, "attack": 0.9}
 PER_SECOND = 2.0
@@ -61,8 +62,8 @@ def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarr
 
 
 def misses(ways: np.ndarray, speeds: np.ndarray, toward: np.ndarray, bounces: int) -> np.ndarray:
-    """(N,): by how many metres natural ways (N, T, 3) with velocities (N, T, 3) pass `toward` (3,) after so many bounces,
-    MOST_MISS at most."""
+    """(N,): by how many metres natural ways (N, T, 3) with velocities (N, T, 3) pass `toward` (3,) after so many
+    bounces, MOST_MISS at most."""
     up = speeds[..., 2] > 0.0
     bounced = np.cumsum(up[:, 1:] & ~up[:, :-1], axis=1)
     counted = np.concatenate([np.zeros((len(ways), 1), int), bounced], axis=1)
@@ -110,8 +111,8 @@ def out_of_the_way(ways: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float) -> np.ndarray:
-    """(N,): what it costs that balls of `radius` m on their ways (N, S, 3) m go through the trunk, up to `tall` m, of who
-    gives or receives them, at `place` (2,) m."""
+    """(N,): what it costs that balls of `radius` m on their ways (N, S, 3) m go through the trunk, up to `tall` m, of
+    who gives or receives them, at `place` (2,) m."""
     near = np.linalg.norm(ways[..., :2] - place, axis=-1) - radius
     inside = (ways[..., 2] > TRUNK_FROM) & (ways[..., 2] < tall + radius)
     return OWN_BODY * np.where(inside, np.clip((TRUNK - near) / TRUNK, 0.0, 1.0), 0.0).max(axis=1)
@@ -120,13 +121,14 @@ def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float
 def arrivals(
     starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray, ball: Ball
 ) -> np.ndarray:
-    """(N, 3) m/s: velocities with which balls come in after `seconds` (N,); one that is met on the ground has not bounced."""
+    """(N, 3) m/s: velocities with which balls come in after `seconds` (N,); one that is met on the ground has not
+    bounced."""
     return after(launched(starts, velocities, spin, ball), ball, seconds - A_MOMENT).velocity
 
 
 def against_the_part(arriving: np.ndarray, leaving: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """(N,): what it costs that balls which come in with `arriving` (N, 3) m/s and leave with `leaving` (3,) are not pushed
-    the way that the part moves, `part` (3,) m/s."""
+    """(N,): what it costs that balls which come in with `arriving` (N, 3) m/s and leave with `leaving` (3,) are not
+    pushed the way that the part moves, `part` (3,) m/s."""
     push = leaving - arriving
     along = push @ part / np.maximum(np.linalg.norm(push, axis=1) * np.linalg.norm(part), 1e-9)
     return PUSHED * (1.0 - along)

@@ -31,9 +31,9 @@ SERVED_SECONDS, SERVED_PER_METRE, LONGEST_SERVE = 0.5, 0.07, 3.0
 class Site:
     """Where, with what and how one of the strikes is to be made.
 
-    player: his name. place (2,) m; facing rad before it. kind: toss, pass, attack, or receive (the last one). part; tool.
-    size: of the body against the library's. moments: what it can strike with. asked: the pass that goes out, None for
-    the last strike.
+    player: his name. place (2,) m; facing rad before it. kind: toss, pass, attack, or receive (the last one). part;
+    tool. size: of the body against the library's. moments: what it can strike with. asked: the pass that goes out, None
+    for the last strike.
     """
 
     player: str
@@ -55,7 +55,8 @@ class Site:
 
 @dataclass(frozen=True, eq=False)
 class Natural:
-    """The balls' natural ways of a strike (Fig. 6, black): starts, velocities (M, 3), chosen: which of them was taken."""
+    """The balls' natural ways of a strike (Fig. 6, black): starts, velocities (M, 3), chosen: which of them was
+    taken."""
 
     starts: np.ndarray
     velocities: np.ndarray
@@ -64,8 +65,8 @@ class Natural:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A strike as chosen: the option (a single moment), its facing rad, the seconds that the ball travels on from it, and
-    about which velocity (3,) m/s it leaves with."""
+    """A strike as chosen: the option (a single moment), its facing rad, the seconds that the ball travels on from it,
+    and about which velocity (3,) m/s it leaves with."""
 
     moment: StrikeMoments
     facing: float
@@ -75,8 +76,8 @@ class Link:
 
 
 class Court:
-    """A scene with the sites of all its strikes, the last one where the last pass ends. passes: those that go out of the
-    sites but the last; others: for each pass, who has nothing to do with it, and where (2,) m he stands by then."""
+    """A scene with the sites of all its strikes, the last one where the last pass ends. passes: those that go out of
+    the sites but the last; others: for each pass, who has nothing to do with it, and where (2,) m he stands by then."""
 
     def __init__(self, scene: PassScene, sites: list[Site], ball: Ball, cancelled: Callable[[], bool]):
         self.scene, self.sites, self.ball, self.cancelled = scene, sites, ball, cancelled
@@ -123,9 +124,11 @@ class Court:
         net = self.scene.net
         return np.ones(len(ways), bool) if net is None else clears_net(ways, self.ball.radius, net)
 
-    def flown(self, number: int, start: np.ndarray, target: np.ndarray, seconds: np.ndarray) -> tuple[Aimed, np.ndarray]:
-        """The launches (S) of a pass from `start` (S, 3) m to `target` (3,) m that take `seconds` (S,), and whether each is
-        what a human can give and clear of the net."""
+    def flown(
+        self, number: int, start: np.ndarray, target: np.ndarray, seconds: np.ndarray
+    ) -> tuple[Aimed, np.ndarray]:
+        """The launches (S) of a pass from `start` (S, 3) m to `target` (3,) m that take `seconds` (S,), and whether
+        each is what a human can give and clear of the net."""
         spin = spun(start, target, seconds, self.ball, self.sites[number].kind)
         aimed = aim(start, target, self.ball, seconds, self.passes[number].bounces, spin, fastest=self.fastest(number))
         clear = self.clear(ways_of(start, aimed.velocity, spin, seconds, self.ball))

@@ -1,7 +1,7 @@
 """The exact flights between chosen strikes, and where each ball meets its part (Table 1, step 8).
 
-A ball lies on its part along the change of its velocity; that moves it a little, and with it the flights: after some rounds
-both fit.
+A ball lies on its part along the change of its velocity; that moves it a little, and with it the flights: after some
+rounds both fit.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ NEARBY = np.array([1, -1, 2, -2, 3, -3, 5, -5, 8, -8, 12])
 @dataclass(frozen=True, eq=False)
 class Flown:
     """The flights of K strikes. serve: the ball's launch before the first. places, normals (K, 3): the ball's at each
-    strike, m, and the way from part to ball. arriving (K, 3), leaving (K-1, 3) m/s and spin (K-1, 3) rad/s of the balls;
-    missed (K-1,): by how many metres each passes the next strike."""
+    strike, m, and the way from part to ball. arriving (K, 3), leaving (K-1, 3) m/s and spin (K-1, 3) rad/s of the
+    balls; missed (K-1,): by how many metres each passes the next strike."""
 
     serve: Launch
     places: np.ndarray
@@ -49,8 +49,8 @@ def laid(court: Court, chain: Sequence[Link]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) -> tuple[list[Link], Flown]:
-    """The chain, some of whose flights may be some frames longer or shorter, and its flights. places (K, 3) m: the balls'
-    at first; first: s of the first strike."""
+    """The chain, some of whose flights may be some frames longer or shorter, and its flights. places (K, 3) m: the
+    balls' at first; first: s of the first strike."""
     serving = 0.0 if court.scene.serve == GROUND else min(first, court.serving_seconds(places[0]))
     for _ in range(ROUNDS):
         leaving, spin, missed = _between(court, chain, places)
@@ -69,8 +69,8 @@ def _laid(court: Court, chain: Sequence[Link], normals: np.ndarray) -> tuple[np.
 
 
 def _between(court: Court, chain, places, last: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Velocities and spins (K-1, 3) with which the balls leave, and by how many m (K-1,) they miss the next strike. One that
-    only quite another flight would bring there is taken so at the `last` only; before, it is told to miss."""
+    """Velocities and spins (K-1, 3) with which the balls leave, and by how many m (K-1,) they miss the next strike. One
+    that only quite another flight would bring there is taken so at the `last` only; before, it is told to miss."""
     targets = np.array([_target(court, number, places, chain) for number in range(court.last)])
     seconds, spin = np.array([link.seconds for link in chain[:-1]]), _spins(court, chain, places, targets)
     bounces = np.array([one.bounces for one in court.passes])
@@ -87,8 +87,8 @@ def _between(court: Court, chain, places, last: bool = False) -> tuple[np.ndarra
 
 def _spins(court: Court, chain, places, targets) -> np.ndarray:
     """(K-1, 3) rad/s with which the balls leave."""
-    each = zip(places, targets, chain, court.sites)
-    return np.array([spun(a[None], b, np.array([link.seconds]), court.ball, site.kind)[0] for a, b, link, site in each][: court.last])
+    each = zip(places[:-1], targets, chain, court.sites)
+    return np.array([spun(a[None], b, np.array([link.seconds]), court.ball, site.kind)[0] for a, b, link, site in each])
 
 
 def _target(court: Court, number: int, places: np.ndarray, chain: Sequence[Link]) -> np.ndarray:
@@ -105,8 +105,8 @@ def _target(court: Court, number: int, places: np.ndarray, chain: Sequence[Link]
 
 
 def _arriving(court: Court, chain, places, begun: tuple[float, float], leaving, spin) -> tuple[Launch, np.ndarray]:
-    """The serve, and the velocities (K, 3) m/s with which all balls come to their strikes. begun: s of the first strike, and
-    for how many the ball has flown by then."""
+    """The serve, and the velocities (K, 3) m/s with which all balls come to their strikes. begun: s of the first
+    strike, and for how many the ball has flown by then."""
     serve, served = _served(court, places[0], *begun)
     seconds = np.array([link.seconds for link in chain[:-1]])
     return serve, np.concatenate([served[None], arrivals(places[:-1], leaving, spin, seconds, court.ball)])

@@ -1,9 +1,8 @@
-"""Who strikes the ball when, where, with which frame of which motion, and how it flies between (Ball handling §4, Table 1,
-Fig. 5).
+"""Who strikes the ball when, where, with which frame of which motion, and how it flies between (Ball handling §4).
 
-The paper lets the natural flights of all frames of a ball stretch choose the strike (`pass_choice`), and then solves the
-flight between two strikes exactly (`pass_flights`); strikes follow one another as the ball travels (`pass_times`). They lie
-on whole frames of the output.
+The paper lets the natural flights of all frames of a ball stretch choose the strike (`pass_choice`), and then solves
+the flight between two strikes exactly (`pass_flights`); strikes follow one another as the ball travels (`pass_times`).
+They lie on whole frames of the output.
 """
 
 from __future__ import annotations
@@ -47,8 +46,8 @@ class Strike:
 
 @dataclass(frozen=True, eq=False)
 class PassPlan:
-    """strikes in order of time; flights: to the first strike, from each strike to the next, and from the last on; seconds:
-    of the whole scene; fps; warnings."""
+    """strikes in order of time; flights: to the first strike, from each strike to the next, and from the last on;
+    seconds: of the whole scene; fps; warnings."""
 
     strikes: tuple[Strike, ...]
     flights: tuple[Flight, ...]
@@ -109,7 +108,8 @@ def _strikes(court: Court, chain: Sequence[Link], flown: Flown, first: float) ->
     fps = court.scene.fps
     times = np.round(np.cumsum([first, *(link.seconds for link in chain[:-1])]) * fps) / fps
     outcome = {"missed": "missed", "dropped": "dropped", "": "received"}[court.passes[-1].error]
-    orders = [_order(court, chain, number, float(time), flown.places, flown.normals) for number, time in enumerate(times)]
+    met = (flown.places, flown.normals)
+    orders = [_order(court, chain, number, float(time), *met) for number, time in enumerate(times)]
     struck = [
         Strike(site.player, order, arriving, leaving, spin, "struck", site.asked.bounces, link.seconds, link.natural)
         for site, order, arriving, leaving, spin, link in zip(

@@ -19,7 +19,8 @@ GROUND = "ground"
 LEAST_APART = 0.5
 """Metres between two players' places."""
 LIMITS = {
-    "fps": (10.0, 240.0), "transition": (0.1, 2.0), "lead_in": (0.0, 60.0), "lead_out": (0.0, 60.0), "repeat": (1, 1000),
+    "fps": (10.0, 240.0), "transition": (0.1, 2.0), "lead_in": (0.0, 60.0), "lead_out": (0.0, 60.0),
+    "repeat": (1, 1000),
     "bounces": (0, 5), "seconds": (0.2, 10.0), "height": (0.5, 3.0), "net": (0.1, 10.0), "weight": (0.0, 1000.0),
     "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1),
 }  # fmt: skip
@@ -92,8 +93,8 @@ class Net:
 
 @dataclass(frozen=True)
 class Weights:
-    """What eq. 2 (speed, vectors, times: an example's likeness) and eq. 1 (position, velocity: a transition's) are times,
-    and bones: one of BONES -> what it is times in eq. 1."""
+    """What eq. 2 (speed, vectors, times: an example's likeness) and eq. 1 (position, velocity: a transition's) are
+    times, and bones: one of BONES -> what it is times in eq. 1."""
 
     speed: float = 1.0
     vectors: float = 1.0
@@ -119,11 +120,11 @@ class BallChoice:
 
 @dataclass(frozen=True)
 class PassScene:
-    """What is asked. players; passes in their order, played `repeat` times. fps: of the output. seed: of what is left to
-    chance. serve: where the ball comes from first: a player's name, (x, y, z) m, GROUND, or None: the player who would
-    pass to the first one. missed, dropped: how likely each ball is. transition: seconds from one motion into the next.
-    lead_in, lead_out: s before the first strike, at least, and after the last. directions: 8: strikes turn in steps of
-    45 degrees; 0: any way. watch: heads follow the ball.
+    """What is asked. players; passes in their order, played `repeat` times. fps: of the output. seed: of what is left
+    to chance. serve: where the ball comes from first: a player's name, (x, y, z) m, GROUND, or None: the player who
+    would pass to the first one. missed, dropped: how likely each ball is. transition: seconds from one motion into the
+    next. lead_in, lead_out: s before the first strike, at least, and after the last. directions: 8: strikes turn in
+    steps of 45 degrees; 0: any way. watch: heads follow the ball.
 
     InputError for what cannot be: two players on one spot or of one name, a pass to oneself or to somebody unknown,
     passes that do not go on where the one before went, numbers outside LIMITS.
@@ -235,7 +236,8 @@ def _check_passes(scene: PassScene) -> None:
         raise InputError("passes", "none", "at least one")
     number_within(scene.repeat, "repeat", "repeat", whole=True)
     if len(scene.passes) * scene.repeat > MOST_PASSES:
-        raise InputError("passes", f"{len(scene.passes) * scene.repeat} in all", f"{MOST_PASSES} at most", "repeat fewer")
+        count = len(scene.passes) * scene.repeat
+        raise InputError("passes", f"{count} in all", f"{MOST_PASSES} at most", "repeat fewer")
     names = [one.name for one in scene.players]
     for number, one in enumerate(scene.passes, start=1):
         _check_pass(one, f"pass {number}", names, scene)
@@ -272,7 +274,8 @@ def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> No
     goal = one.at or scene.player(one.receiver).place
     far = math.dist(scene.player(one.giver).place, goal)
     if far > FAR:
-        raise InputError(where, f"{one.receiver} is {far:.0f} m away", f"{FAR:.0f} m at most", "move one of them nearer")
+        found = f"{one.receiver} is {far:.0f} m away"
+        raise InputError(where, found, f"{FAR:.0f} m at most", "move one of them nearer")
 
 
 def _check_meetings(scene: PassScene) -> None:

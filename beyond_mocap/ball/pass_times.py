@@ -30,7 +30,8 @@ def first_time(court: Court, order: HitOrder, need: Need) -> float:
 def in_time(
     court: Court, chain: list[Link], orders: Sequence[HitOrder], places: np.ndarray, first: float, need: Need
 ) -> tuple[list[Link], list[str]]:
-    """The chain with flights long enough for who strikes next, and a line for everybody who still has too little time."""
+    """The chain with flights long enough for who strikes next, and a line for everybody who still has too little
+    time."""
     told: list[str] = []
     last_of: dict[str, int] = {}
     for number, site in enumerate(court.sites):

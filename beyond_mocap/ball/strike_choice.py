@@ -1,6 +1,7 @@
-"""Which hit motions of a library may serve a strike: by what its words say, and by the part's speed (Ball handling §5).
+"""Which hit motions of a library may serve a strike: by what its words say and the part's speed (Ball handling §5).
 
-Words go before measuring: a clip that is called a header serves heads and no hands, though its arms swing as in a strike.
+Words go before measuring: a clip that is called a header serves heads and no hands, though its arms swing as in a
+strike.
 """
 
 from __future__ import annotations

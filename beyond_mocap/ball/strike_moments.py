@@ -1,4 +1,5 @@
-"""Every moment in which some hit motion can meet the ball: the frames of all ball stretches (Table 1, steps 2 and 5)."""
+"""Every moment in which some hit motion can meet the ball: the frames of all ball stretches (Table 1, steps
+2 and 5)."""
 
 from __future__ import annotations
 

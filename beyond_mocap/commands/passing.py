@@ -92,10 +92,12 @@ def strikes(library, played) -> list[dict]:
         order, clip = one.order, library.clips[one.order.clip]
         x, y, z = order.ball
         out.append({
-            "time_s": order.time, "frame": int(round(order.time * played.plan.fps)), "player": one.player, "kind": order.kind,
+            "time_s": order.time, "frame": int(round(order.time * played.plan.fps)), "player": one.player,
+            "kind": order.kind,
             "part": order.part, "side": order.side, "clip": clip.path, "clip_frame": float(order.strike_frame),
             "mirrored": clip.mirrored, "x_m": x, "y_m": y, "z_m": z,
-            "speed_in_m_s": float(np.linalg.norm(one.velocity_in)), "speed_out_m_s": float(np.linalg.norm(one.velocity_out)),
+            "speed_in_m_s": float(np.linalg.norm(one.velocity_in)),
+            "speed_out_m_s": float(np.linalg.norm(one.velocity_out)),
             "travel_s": one.travel, "bounces": one.bounces, "facing_deg": float(np.degrees(order.facing)),
             "contact_gap_m": played.gap(number), "outcome": one.outcome,
         })  # fmt: skip
@@ -119,7 +121,8 @@ def _of_player(player) -> dict:
 
     whole = evaluate(player.take, None, None)
     kept = ("skate", "seam_jerk_ratio", "foot_correction_m", "ik_miss_share", "ground_mm")
-    return {"name": player.name, "strikes": len(player.gaps), "moved_m": player.moved, **{name: whole[name] for name in kept}}
+    own = {"name": player.name, "strikes": len(player.gaps), "moved_m": player.moved}
+    return {**own, **{name: whole[name] for name in kept}}
 
 
 def _write(folder: Path, played, table: list[dict], report: dict) -> None:

@@ -60,7 +60,7 @@ def scene_text(scene: PassScene) -> str:
 def scene_dict(scene: PassScene) -> dict:
     """The scene as the object that stands in a file; what is as usual is left out."""
     usual = PassScene(scene.players, scene.passes)
-    out: dict = {"players": [_player_out(one) for one in scene.players], "passes": [_pass_out(one) for one in scene.passes]}
+    out: dict = {"players": list(map(_player_out, scene.players)), "passes": list(map(_pass_out, scene.passes))}
     for name in ("repeat", "fps", "seed", "transition", "lead_in", "lead_out", "directions", "watch"):
         if getattr(scene, name) != getattr(usual, name):
             out[name] = getattr(scene, name)
@@ -133,7 +133,10 @@ def _scene(whole) -> PassScene:
 
 
 def _player(value, where: str) -> Player:
-    read = {"name": _text, "place": _place, "facing": _angle, "part": _text, "side": _text, "tool": _tool, "height": _number}
+    read = {
+        "name": _text, "place": _place, "facing": _angle, "part": _text, "side": _text, "tool": _tool,
+        "height": _number,
+    }  # fmt: skip
     _check_names(value, where, read, ("name", "place"))
     return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
 
@@ -157,7 +160,8 @@ def _settings(value, where: str) -> dict:
 
 def _example(value, where: str) -> Example:
     _check_names(value, where, ("clip", "from", "to"), ("clip",))
-    found = {new: _number(value[old], f"{where}: {old}") for old, new in (("from", "start"), ("to", "end")) if old in value}
+    names = {"from": "start", "to": "end"}
+    found = {names[old]: _number(value[old], f"{where}: {old}") for old in names if old in value}
     return Example(_text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
 
 

@@ -50,7 +50,8 @@ def test_every_strike_meets_the_ball(played, name):
         for order in whole.plan.orders(player.name):
             frame = int(round(order.time * whole.plan.fps))
             surface = striking_surface(motion.skeleton, order.part, order.side, order.tool)
-            gap = ball_gap(surface.line(places[frame], world[frame]), surface.radius, whole.ball.positions[frame], radius)
+            line, ball = surface.line(places[frame], world[frame]), whole.ball.positions[frame]
+            gap = ball_gap(line, surface.radius, ball, radius)
             assert abs(gap) < (0.005 if name != "tall" else 0.01)
     assert max(whole.gap(number) for number in range(len(whole.plan.strikes))) < 0.005
     assert whole.warnings == ()
@@ -107,7 +108,8 @@ def run(capfd, tmp_path, strikes_library):
     def call(scene, *more, out="out", library=strikes):
         capfd.readouterr()
         (tmp_path / "scene.json").write_text(scene if isinstance(scene, str) else json.dumps(scene))
-        words = ("passes", tmp_path / "scene.json", "--library", library, "--out", tmp_path / out, "--cache", kept, *more)
+        files = (tmp_path / "scene.json", "--library", library, "--out", tmp_path / out, "--cache", kept)
+        words = ("passes", *files, *more)
         status = main([str(word) for word in words])
         said, error = capfd.readouterr()
         return status, said, error.splitlines()
@@ -122,7 +124,8 @@ def test_what_is_written(run, tmp_path):
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
     names = [f"{name}{end}" for name in ("Ann", "Ben", "Cho") for end in (".bvh", ".provenance.csv")]
     assert files == sorted([*names, "ball.csv", "strikes.csv", "scene.report.json"])
-    ball, report = read_ball(tmp_path / "out" / "ball.csv"), json.loads((tmp_path / "out" / "scene.report.json").read_text())
+    ball = read_ball(tmp_path / "out" / "ball.csv")
+    report = json.loads((tmp_path / "out" / "scene.report.json").read_text())
     rows = list(csv.DictReader((tmp_path / "out" / "strikes.csv").open()))
     assert [row["outcome"] for row in rows] == ["struck", "dropped"] == [one["outcome"] for one in report["strikes"]]
     assert len(ball.times) == report["frames"] == len(bvh.read(tmp_path / "out" / "Ann.bvh").motion)

@@ -16,7 +16,9 @@ from beyond_mocap.files.scene_json import parse_scene, read_scene, scene_dict, s
 
 SAMPLES = sorted((Path(__file__).resolve().parents[3] / "sample_blend" / "passes").glob("*.json"))
 THREE = {
-    "players": [{"name": "A", "place": [0, 3]}, {"name": "B", "place": [-2.6, -1.5]}, {"name": "C", "place": [2.6, -1.5]}],
+    "players": [
+        {"name": "A", "place": [0, 3]}, {"name": "B", "place": [-2.6, -1.5]}, {"name": "C", "place": [2.6, -1.5]},
+    ],
     "passes": [{"from": "A", "to": "B"}, {"from": "B", "to": "C"}, {"from": "C", "to": "A"}],
 }
 
@@ -58,7 +60,8 @@ def test_everything_that_can_be_said():
     })  # fmt: skip
     scene = parse_scene(text)
     one = scene.passes[0]
-    assert (one.kind, one.bounces, one.part, one.side, one.seconds, one.at) == ("attack", 0, "head", "left", 1.5, (1.0, -1.0))
+    assert (one.kind, one.bounces, one.part, one.side) == ("attack", 0, "head", "left")
+    assert (one.seconds, one.at) == (1.5, (1.0, -1.0))
     assert one.example == Example("a/b.bvh", 1.0, 2.5) and one.error == "missed"
     assert len(scene.order) == 1, "nothing is passed after a missed ball"
 
@@ -171,16 +174,17 @@ def test_an_ascii_file_with_a_mark_is_read(tmp_path):
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
-    | st.sampled_from(["A", "B", "C", "foot", "head", "left", "toss", "missed", "paper", GROUND, -1, 0, 1, 1e308, 10**400]),
+    | st.sampled_from(["A", "B", "C", "foot", "head", "left", "toss", "missed", "paper", GROUND])
+    | st.sampled_from([-1, 0, 1, 1e308, 10**400]),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
-        st.sampled_from(["name", "place", "from", "to", "kind", "height", "length", "reach", "clip", "bones", "missed"]),
+        st.sampled_from(["name", "place", "from", "to", "kind", "height", "length", "reach", "clip", "bones"]),
         inner, max_size=3,
     ),
     max_leaves=6,
 )  # fmt: skip
 NAMES = [
-    "fps", "seed", "ball", "net", "serve", "errors", "transition", "lead_in", "lead_out", "directions", "watch", "weights",
-    "repeat", "defaults", "players", "passes",
+    "fps", "seed", "ball", "net", "serve", "errors", "transition", "lead_in", "lead_out", "directions", "watch",
+    "weights", "repeat", "defaults", "players", "passes",
 ]  # fmt: skip
 OF_PLAYER = ["name", "place", "facing", "part", "side", "tool", "height"]
 OF_PASS = ["from", "to", "kind", "bounces", "part", "side", "seconds", "at", "example", "error"]
