@@ -55,7 +55,7 @@ def renew(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
     written = played.get(MARK) if played is not None else None
     if known is not None and known.digest == made_of == written:
         return tell(ball, "")
-    solved = shots.solve(scene, wish, ball.name, known)
+    solved = shots.solve(scene, wish, ball.name)
     if made_of == written:  # another session has written it: only what is drawn is lacking
         shots.remember(ball, solved)
         return False
@@ -81,7 +81,7 @@ def redraw() -> None:
 
 @persistent
 def _after_change(scene, depsgraph):
-    if bpy.context.window_manager is None or not any(thing.beyond_mocap_aim.on for thing in scene.objects):
+    if not shots.anything():
         return
     bodies = {ball.beyond_mocap_aim.body for ball in aimed(scene)}
     for update in depsgraph.updates:

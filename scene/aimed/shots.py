@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 CLOSEST = 0.02  # frames between two keys at least; Blender takes keys within 0.01 for one
 STROKES = 40  # of a candidate's way that is drawn
 CURVE_STEP = 0.04  # s between two points of the curve
-SAME = ("body", "part", "side", "bone", "first", "last", "way", "bounces", "timing", "ball")
-"""What of a wish has to be the same for the last launches to be a good beginning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +70,6 @@ class Solved:
     strike, frames a second, and a digest of what it was made of; candidates (N, STROKES, 3) m, of launches that are
     possible."""
 
-    same: tuple
     digest: str
     shot: "Shot"
     strikes: "Strikes"
@@ -161,8 +158,9 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
     return _strikes[key]
 
 
-def solve(scene: bpy.types.Scene, wish: Wish, name: str, before: Solved | None = None) -> Solved:
-    """Work the shot out; `name` is told where that cannot be. InputError as `shoot`."""
+def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
+    """Work the shot out, anew each time, so that undo finds the same one; `name` is told where that cannot be.
+    InputError as `shoot`."""
     from ...beyond_mocap.ball.batch import courses
     from ...beyond_mocap.ball.flight import Launch, fly
     from ...beyond_mocap.ball.physics import BALLS, FASTEST
@@ -171,20 +169,18 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str, before: Solved | None =
     strikes, kind, fps = strikes_of(scene, wish), BALLS[wish.ball], frames_per_second(scene)
     made_of = digest(wish, strikes)
     strikes, seconds = _timed(strikes, wish, fps)
-    same = tuple(getattr(wish, field) if field != "body" else wish.key()[0] for field in SAME) + (len(strikes.frames),)
-    near = before.shot.aimed if before is not None and before.same == same and wish.way == "AIR" else None
     target = np.array(wish.target)
     target[2] = max(target[2], kind.radius)
     fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
     ground = wish.way == "GROUND"
     turns = (wish.back, wish.left)
-    shot = shoot(strikes, target, kind, seconds, wish.bounces, turns, ground, fastest, near, f"ball {name}")
+    shot = shoot(strikes, target, kind, seconds, wish.bounces, turns, ground, fastest, what=f"ball {name}")
     spin = shot.aimed.spin[shot.chosen]
     flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
     can = np.flatnonzero(shot.aimed.possible)
     times = np.linspace(0.0, shot.seconds, STROKES)
     ways, _ = courses(shot.starts[can], shot.aimed.velocity[can], shot.aimed.spin[can], kind, times)
-    return Solved(same, made_of, shot, strikes, flight, int(strikes.frames[shot.chosen]), fps,
+    return Solved(made_of, shot, strikes, flight, int(strikes.frames[shot.chosen]), fps,
                   tuple(target), ways)
 
 

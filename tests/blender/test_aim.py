@@ -71,6 +71,16 @@ def test_a_dragged_target_is_followed_in_the_same_action(aimed, room):
     assert live.follow(bpy.context.scene) == 1
 
 
+def test_the_way_does_not_hang_on_how_the_target_came_there(aimed, room):
+    aim, live = aimed.beyond_mocap_aim, room("aimed.live")
+    before = aim.arrived
+    for step in (2.5, 3.0, -5.5):
+        aim.target.location.y += step
+        bpy.context.view_layer.update()
+        live.follow(bpy.context.scene)
+    assert aim.arrived == pytest.approx(before, abs=0.05)
+
+
 def test_what_is_out_of_reach_is_told_and_the_way_stays(aimed, room):
     aim, live = aimed.beyond_mocap_aim, room("aimed.live")
     kept = place(aimed, aim.arrived)
