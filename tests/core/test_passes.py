@@ -8,6 +8,8 @@ import pytest
 
 from beyond_mocap.__main__ import main
 from beyond_mocap.ball.contact import striking_surface
+from beyond_mocap.ball.links import BONES, BoneWeights
+from beyond_mocap.ball.pass_scene import Weights
 from beyond_mocap.ball.sample_scenes import SAMPLES
 from beyond_mocap.commands.told import Told
 from beyond_mocap.errors import Cancelled
@@ -17,7 +19,7 @@ from beyond_mocap.files.tables import read_ball, read_provenance
 from beyond_mocap.motion.humanoid import stature
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.striking import ball_gap
-from beyond_mocap.passes import ball_of, passes
+from beyond_mocap.passes import ball_of, bone_weights, passes
 
 TALL = {
     "players": [{"name": "Ann", "place": [0, 0], "height": 1.5}, {"name": "Ben", "place": [4, 0], "height": 2.0}],
@@ -95,6 +97,13 @@ def test_progress_goes_up_and_work_can_be_stopped(strikes_library):
     with pytest.raises(Cancelled):
         passes(strikes_library, parse_scene(SAMPLES["dropped"]), lambda share, text: shares.append(share), stop)
     assert shares == sorted(shares) and shares[-1] < 0.9
+
+
+def test_weights_of_equation_1_are_so_many_times_the_usual_ones():
+    own, asked = BoneWeights(), bone_weights(Weights(position=2.0, bones={"left foot": 3.0}))
+    foot = BONES.index("left foot")
+    assert asked.position[foot] == 6.0 * own.position[foot] and asked.velocity[foot] == 3.0 * own.velocity[foot]
+    assert asked.position[0] == 2.0 * own.position[0] and asked.velocity[0] == own.velocity[0]
 
 
 # -- the verb
