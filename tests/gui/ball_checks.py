@@ -1,12 +1,13 @@
 """Ball & Passes in the window: strikes of a clip, the ball of a match, players who pass, and a ball that is carried."""
 
+import shutil
 import time
 
 import bpy
 import numpy as np
 from tab import PICTURES, assert_no_trouble_since, output, printed_since, room, run, sample, settings, wait_for_work, window
 
-LIMIT = 400
+LIMIT = 800
 BEFORE = {}
 
 
@@ -44,11 +45,21 @@ def own_tab(part):
 def press(verb, *words):
     """Find a button of the panel by its call and click it."""
     area = window.area("VIEW_3D")
-    wanted = f"bpy.ops.beyond_mocap.{verb}("
-    place = yield from window.find(area, window.sidebar(area), lambda call: call.startswith(wanted) and all(w in call for w in words),
-                                   window.command_under_pointer)
-    yield from window.click(*place)
-    yield 0.5
+    region = window.sidebar(area)
+
+    def meant(call):
+        return call.startswith(f"bpy.ops.beyond_mocap.{verb}(") and all(word in call for word in words)
+
+    for _ in range(4):  # a busy machine may be behind the pointer: then what is found lies beside it
+        x, y = yield from window.find(area, region, meant, window.command_under_pointer)
+        for aside in (0, -90, 90):
+            yield from window.move(x + aside, y)
+            yield 0.5
+            if meant(window.command_under_pointer(area, region)):
+                yield from window.press("LEFTMOUSE")
+                yield 0.5
+                return
+    raise AssertionError(f"{verb} is not found")
 
 
 def until(true, limit=60.0):
@@ -132,13 +143,23 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
     assert_no_trouble_since(mark)
 
 
+def few_clips():
+    """A library that is built in a moment."""
+    folder = PICTURES / "few_clips"
+    folder.mkdir(exist_ok=True)
+    for path in (sample() / "passes" / "library").iterdir():
+        if path.stem.startswith(("volley_pass", "volley_toss", "volley_attack", "volley_receive", "ready", "walking_1_2", "standing_turn")):
+            shutil.copy(path, folder)
+    return str(folder.resolve())
+
+
 def check_a_passing_scene_is_made_by_a_button():
     mark = len(output.text())
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
     bpy.context.scene.render.fps = 30
     run("beyond_mocap.passes_sample", "EXEC_DEFAULT", sample="three")
-    passes().library_folder = str(sample() / "passes" / "library")
+    passes().library_folder = few_clips()
     passes().repeat = 1
     back = yield from own_tab("passing")
     start = time.monotonic()
