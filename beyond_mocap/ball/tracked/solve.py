@@ -91,14 +91,6 @@ class SolvedBall:
         return tuple(touch for touch in self.touches if touch.player == player)
 
 
-@dataclass(frozen=True)
-class _Found:
-    """The touches of one window before they have players: cuts, and the touches' indices in them."""
-
-    cuts: touches.Cuts
-    samples: Samples
-
-
 def solve(
     times: np.ndarray,
     ball: np.ndarray,
