@@ -14,7 +14,7 @@ import numpy as np
 from .aim import aim
 from .flight import Launch
 from .pass_costs import arrivals, spun
-from .pass_court import ON_TARGET, Court, Link, turned, unit
+from .pass_court import LONGEST_SERVE, ON_TARGET, Court, Link, turned, unit
 from .pass_scene import GROUND
 
 BESIDE = 0.45
@@ -51,7 +51,7 @@ def laid(court: Court, chain: Sequence[Link]) -> tuple[np.ndarray, np.ndarray]:
 def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) -> tuple[list[Link], Flown]:
     """The chain, some of whose flights may be some frames longer or shorter, and its flights. places (K, 3) m: the
     balls' at first; first: s of the first strike."""
-    serving = 0.0 if court.scene.serve == GROUND else min(first, court.serving_seconds(places[0]))
+    serving = 0.0 if court.scene.serve == GROUND else min(first, LONGEST_SERVE)  # it sets out as the scene begins
     for _ in range(ROUNDS):
         leaving, spin, missed = _between(court, chain, places)
         _, arriving = _arriving(court, chain, places, (first, serving), leaving, spin)

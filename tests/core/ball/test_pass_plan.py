@@ -224,6 +224,13 @@ def test_chance_ends_the_rally(strikes_library):
     assert len(planned(strikes_library, replace(scene, dropped=0.0, missed=1.0)).strikes) == 2
 
 
+def test_a_served_ball_is_in_the_air_from_the_beginning(plans):
+    _, plan = plans("three")
+    path = ball_path(plan)
+    first = int(round(plan.strikes[0].order.time * plan.fps))
+    assert np.linalg.norm(np.diff(path.positions[: first + 1], axis=0), axis=1).min() > 0.01, "it never hangs"
+
+
 def test_a_ball_that_lies_on_the_ground(strikes_library):
     plan = planned(strikes_library, scene_of("dropped", serve="ground"))
     path = ball_path(plan)
