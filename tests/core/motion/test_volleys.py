@@ -25,7 +25,7 @@ def test_begins_and_ends_as_who_stands(made):
     _, gesture = made
     places, _ = forward_kinematics(gesture.motion)
     edge = int(0.5 * 60)
-    for part in (places[: min(edge, int(gesture.start))], places[-edge:]):
+    for part in (places[: min(edge, int(60 * gesture.start))], places[-edge:]):
         assert np.linalg.norm(np.diff(part, axis=0), axis=-1).max() * 60 < 0.35
     assert abs(gesture.motion.duration - BEFORE - AFTER) < 0.02 and gesture.start < gesture.key < gesture.end
 
