@@ -65,7 +65,8 @@ def aim(
     nearest to `loft` rad over the horizon. spin (B, 3) rad/s, None: none. fastest m/s: launches beyond are not
     possible. near (B, 3) m/s: a launch close to the one wanted (the last one, while a target is dragged); rows of it
     that are not finite are not used. about (B,) s: where the time is free, it is looked for near to these. Any of
-    start, target, spin may be (3,): the same for all. InputError: numbers that cannot be meant.
+    start, target, spin may be (3,): the same for all. Starts and targets lower than a ball can lie are set onto the
+    ground. InputError: numbers that cannot be meant.
     """
     problem = _Problem.of(start, target, ball, seconds, bounces, spin, ground)
     if seconds is None:
@@ -173,7 +174,8 @@ class _Problem:
             raise InputError("aim", "a place or spin that is not a number")
         if not (np.isfinite(timed).all() and (timed > 0.0).all()):
             raise InputError("aim", f"{np.min(timed):g} s of flight", "a time of more than 0 s")
-        start[:, 2] = np.maximum(start[:, 2], ground + ball.radius)
+        for place in (start, target):
+            place[:, 2] = np.maximum(place[:, 2], ground + ball.radius)
         return cls(start, target, spin, np.broadcast_to(timed, shape[:1]).copy(), ball, int(bounces), ground)
 
     def at_time(self, seconds: np.ndarray) -> _Problem:

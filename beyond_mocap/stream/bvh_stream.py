@@ -37,10 +37,12 @@ _PLACE = Path("the stream")
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One frame: values (C,) in the file's own units and degrees; sent: seconds of the Unix clock, or None."""
+    """One frame: values (C,) in the file's own units and degrees; sent: seconds of the Unix clock, or None; rows: how
+    such values become poses."""
 
     values: np.ndarray
-    sent: float | None = None
+    sent: float | None
+    rows: BvhRows
 
 
 class BvhStream:
@@ -55,7 +57,7 @@ class BvhStream:
         self.unit = unit
         self.rows: BvhRows | None = None
         self.frame_time: float | None = None
-        self.rubbish = self.others = self.skeletons = 0
+        self.rubbish = self.others = 0
         self.told = ""
         self._text: str | None = None
         self._columns = 0
@@ -89,8 +91,8 @@ class BvhStream:
         return [frame for frame in found if frame is not None]
 
     def lost(self) -> None:
-        """The connection was lost: what is half there will not be completed."""
-        self._waiting, self._opened, self._depth, self._sent = b"", [], 0, None
+        """The connection was lost: what is half there will not be completed, and who comes next may have another name."""
+        self._waiting, self._opened, self._depth, self._sent, self._avatar = b"", [], 0, None, None
 
     def _piece(self, line: str) -> Frame | None:
         if not line:
@@ -134,10 +136,9 @@ class BvhStream:
     def _frame(self, line: str) -> Frame | None:
         words = line.split()
         sent, self._sent = self._sent, None
-        if len(words) > 2 and _number(words[1]) is None:  # the avatar's number and name
-            if self._avatar is None:
-                self._avatar = words[1]
-            if words[1] != self._avatar:
+        name = words[1] if len(words) > 2 and words[0].isdigit() and _number(words[1]) is None else None
+        if name is not None:  # the avatar's, behind its number
+            if name != (self._avatar or name):
                 self.others += 1
                 return None
             words = words[2:]
@@ -153,7 +154,8 @@ class BvhStream:
             return self._reject("numbers that no body has")
         if self.rows is None and not self._start(values):
             return None
-        return Frame(values, sent)
+        self._avatar = name or self._avatar
+        return Frame(values, sent, self.rows)
 
     def _start(self, values: np.ndarray) -> bool:
         try:
@@ -161,7 +163,6 @@ class BvhStream:
         except InputError as error:
             self._reject(str(error))
             return False
-        self.skeletons += 1
         return True
 
     def _reject(self, what: str) -> None:

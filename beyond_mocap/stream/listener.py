@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..files.bvh import BvhRows
 from ..motion.skeleton import Skeleton
 from .bvh_stream import BvhStream
 
@@ -45,12 +46,13 @@ _alive: weakref.WeakSet[Listener] = weakref.WeakSet()
 @dataclass(frozen=True, eq=False)
 class Arrived:
     """A frame that came in. number: counts up from 1. time: s of the monotonic clock when it was here. sent: s of the
-    same clock when it was sent, or None. values (C,): as the stream has them."""
+    same clock when it was sent, or None. values (C,): as the stream has them; rows: how they become poses."""
 
     number: int
     time: float
     sent: float | None
     values: np.ndarray
+    rows: BvhRows
 
 
 @dataclass(frozen=True)
@@ -123,12 +125,6 @@ class Listener:
         _alive.discard(self)
 
     @property
-    def skeleton(self) -> Skeleton | None:
-        """The streamed body's, as soon as it is known."""
-        rows = self.stream.rows
-        return None if rows is None else rows.skeleton
-
-    @property
     def running(self) -> bool:
         """Whether the thread still listens."""
         return self._thread is not None and self._thread.is_alive() and not self._stop.is_set()
@@ -147,10 +143,6 @@ class Listener:
         """The newest frame."""
         with self._lock:
             return self._ring[-1] if self._ring else None
-
-    def poses(self, frames: list[Arrived]) -> tuple[np.ndarray, np.ndarray]:
-        """Root positions (T, 3) m, Z up, and local rotations (T, J, 4) of frames that came in."""
-        return self.stream.rows.poses(np.array([frame.values for frame in frames]))
 
     def status(self) -> Status:
         """How it does, now."""
@@ -263,12 +255,19 @@ class Listener:
         for frame in self.stream.feed(data, whole):
             with self._lock:
                 self._count += 1
-                if self._ring and len(frame.values) != len(self._ring[-1].values):
+                if self._ring and frame.rows is not self._ring[-1].rows:
                     self._ring.clear()  # another body
-                self._ring.append(Arrived(self._count, now, _clock(frame.sent, now), frame.values))
+                self._ring.append(Arrived(self._count, now, _clock(frame.sent, now), frame.values, frame.rows))
                 while now - self._ring[0].time > self.seconds:
                     self._ring.popleft()
             self._state = "receiving"
+
+
+def poses(frames: list[Arrived]) -> tuple[Skeleton, np.ndarray, np.ndarray]:
+    """The skeleton of frames (T) of one body that came in, their root positions (T, 3) m, Z up, and local rotations (T,
+    J, 4)."""
+    rows = frames[-1].rows
+    return rows.skeleton, *rows.poses(np.array([frame.values for frame in frames]))
 
 
 def _way(frame: Arrived) -> float | None:

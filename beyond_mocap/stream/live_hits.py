@@ -11,7 +11,7 @@ import numpy as np
 from ..ball.contact import Tool
 from ..ball.hits import HitMotion, analyse
 from ..motion.motion import Motion
-from .listener import Arrived, Listener
+from .listener import Arrived, Listener, poses
 
 WINDOW = 4.0
 """Seconds that are looked at."""
@@ -44,7 +44,7 @@ class LiveHits:
         frames = [frame for frame in frames if frame.time > frames[-1].time - WINDOW]
         if frames[-1].time - frames[0].time < _LEAST:
             return None
-        motion, times = even(self.listener, frames, _RATE)
+        motion, times = even(frames, _RATE)
         found = [hit for side in self.sides for hit in self._hits(motion, side)]
         new = [hit for hit in found if times[hit.first] > self._after]
         if not new:
@@ -65,15 +65,15 @@ def recorded(listener: Listener, seconds: float, rate: float | None = None) -> M
     than this. Networks bring frames in bunches, so they are taken to be evenly apart from the first to the last."""
     frames = listener.since(0)
     frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
-    return even(listener, frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None
+    return even(frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None
 
 
-def even(listener: Listener, frames: list[Arrived], rate: float | None = None) -> tuple[Motion, np.ndarray]:
+def even(frames: list[Arrived], rate: float | None = None) -> tuple[Motion, np.ndarray]:
     """Frames that came in, two or more, as a motion, and the seconds (T,) of its frames; `rate` as above."""
     seconds = frames[-1].time - frames[0].time
     step = 1 if rate is None else max(1, int(len(frames) / (seconds * rate)))
     frames = frames[::-1][::step][::-1]
-    root, rotations = listener.poses(frames)
+    skeleton, root, rotations = poses(frames)
     seconds = max(frames[-1].time - frames[0].time, 1e-3)
     fps = (len(frames) - 1) / seconds
-    return Motion(listener.skeleton, root, rotations, fps), frames[0].time + np.arange(len(frames)) / fps
+    return Motion(skeleton, root, rotations, fps), frames[0].time + np.arange(len(frames)) / fps

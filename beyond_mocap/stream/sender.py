@@ -84,8 +84,9 @@ class Sender:
         begun, frame, header_due = time.monotonic(), 0, 0.0
         while not stopped() and (self.loop or frame < len(self.rows)):
             due = begun + frame * self.frame_time
-            if due > time.monotonic():
-                time.sleep(min(_TICK, due - time.monotonic()))
+            early = due - time.monotonic()
+            if early > 0.0:
+                time.sleep(min(_TICK, early))
                 continue
             if self.form == "bvh" and due >= header_due:
                 self._put(out, self.header)

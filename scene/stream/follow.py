@@ -16,7 +16,7 @@ import bpy
 from ...beyond_mocap.ball.hits import HitMotion
 from ...beyond_mocap.errors import BeyondMocapError
 from ...beyond_mocap.motion.motion import Motion
-from ...beyond_mocap.stream.listener import Listener
+from ...beyond_mocap.stream.listener import Listener, poses
 from . import receiver, streamed
 
 TICK, IDLE = 1.0 / 60.0, 0.25
@@ -84,8 +84,7 @@ def _receive(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
 
 def _show(scene, listener: Listener, latest) -> str:
     """Pose the streamed body: "posed", "made" where it had to be made first, "" where it could not be."""
-    settings, skeleton = scene.beyond_mocap_stream, listener.skeleton
-    root, rotations = listener.poses([latest])
+    settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, poses([latest])
     made = "posed"
     if not streamed.fits(settings.body, scene, skeleton):
         if _state["bodies"] >= MOST_BODIES:

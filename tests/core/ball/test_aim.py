@@ -151,6 +151,12 @@ def test_the_ground_may_lie_anywhere():
     assert high.velocity == pytest.approx(low.velocity, abs=1e-3)
 
 
+def test_a_target_below_where_a_ball_can_lie_is_on_the_ground():
+    low = aim((0.0, 0.0, 0.3), (9.0, 0.0, -0.5), FOOTBALL, bounces=1)
+    lies = aim((0.0, 0.0, 0.3), (9.0, 0.0, FOOTBALL.radius), FOOTBALL, bounces=1)
+    assert low.possible.all() and np.array_equal(low.velocity, lies.velocity)
+
+
 def test_same_input_same_launch():
     start, target, seconds = aims(6)
     one, other = (aim(start, target, FOOTBALL, seconds, 1) for _ in range(2))

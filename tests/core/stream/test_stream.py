@@ -14,7 +14,7 @@ from beyond_mocap.files import bvh
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.gestures import strike
 from beyond_mocap.stream.bvh_stream import BvhStream, hierarchy_of
-from beyond_mocap.stream.listener import LOOPBACK, Listener
+from beyond_mocap.stream.listener import LOOPBACK, Listener, poses
 from beyond_mocap.stream.live_hits import LiveHits
 from beyond_mocap.stream.sender import Sender
 
@@ -79,6 +79,14 @@ def test_only_the_first_avatar_is_taken(clip, text):
     assert len(frames) == 2 and stream.others == 1 and stream.rubbish == 0
 
 
+def test_rubbish_is_no_avatar_and_after_a_loss_another_one_may_come(clip, text):
+    stream = BvhStream(hierarchy_of(clip))
+    assert stream.feed(b"hello there friend\n7 Nobody 1 2 ||") == [] and stream.rubbish == 2
+    for name in ("First", "Second"):
+        assert len(stream.feed(f"0 {name} {rows_of(text)[0]} ||".encode())) == 1 and stream.others == 0
+        stream.lost()
+
+
 def test_the_clock_is_read(clip, text):
     stream = BvhStream(hierarchy_of(clip))
     frames = stream.feed(f"# a remark\n# sent 12.5\n{rows_of(text)[0]}\n{rows_of(text)[1]}\n".encode())
@@ -140,9 +148,9 @@ def test_what_is_sent_arrives(clip, port, way, protocol, form):
         thread.join(10.0)
         wait_for(lambda: listener.status().frames >= len(sender.rows))
         motion, status = bvh.read(clip).motion, listener.status()
-        root, rotations = listener.poses(listener.since(0))
+        skeleton, root, rotations = poses(listener.since(0))
         np.testing.assert_allclose(root, motion.root_positions, atol=1e-5)
-        assert status.rubbish == 0 and listener.skeleton.same_bones(motion.skeleton)
+        assert status.rubbish == 0 and skeleton.same_bones(motion.skeleton)
         assert (status.way is not None and status.way < 0.5) == (form == "bvh")
         assert [one.number for one in listener.since(status.frames - 3)] == list(range(status.frames - 2, status.frames + 1))
     finally:
@@ -220,6 +228,22 @@ def test_rubbish_over_the_network_hangs_nothing(port):
         listener.stop()
 
 
+def test_another_hierarchy_takes_no_frame_from_the_body_that_is_shown(port, text):
+    """Frames keep the hierarchy that they came with, also while the next one's first frame is not there yet."""
+    listener = Listener(port).start()
+    other = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n}\n"
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            out.connect((LOOPBACK, port))
+            for piece in (text.split("MOTION")[0], rows_of(text)[0], rows_of(text)[1], other, "1 2"):
+                out.send(piece.encode())
+        wait_for(lambda: listener.status().rubbish == 1)
+        skeleton, root, _ = poses(listener.since(0))
+        assert len(root) == 2 and len(skeleton.names) > 10
+    finally:
+        listener.stop()
+
+
 def test_a_second_connection_takes_over(clip, port):
     listener = Listener(port, "tcp").start()
     try:
@@ -237,16 +261,14 @@ class Played:
     def __init__(self, path):
         stream = BvhStream()
         self.frames, self.now = stream.feed(path.read_bytes()), 0.0
-        self.rows, self.skeleton, self.step = stream.rows, stream.rows.skeleton, stream.frame_time
+        self.step = stream.frame_time
 
     def since(self, number):
         from beyond_mocap.stream.listener import Arrived
 
         count = min(int(self.now / self.step) + 1, len(self.frames))
-        return [Arrived(n + 1, n * self.step, None, self.frames[n].values) for n in range(number, count)]
-
-    def poses(self, frames):
-        return self.rows.poses(np.array([frame.values for frame in frames]))
+        some = enumerate(self.frames[number:count], start=number)
+        return [Arrived(n + 1, n * self.step, None, frame.values, frame.rows) for n, frame in some]
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])
