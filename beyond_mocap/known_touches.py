@@ -15,7 +15,7 @@ import numpy as np
 
 from .annotation import KeyMoment, Timeline
 from .ball.tracked.solve import SolvedBall, SolvedTouch
-from .errors import TimedLine
+from .errors import InputError, TimedLine
 from .motion.striking import striking_part, surfaces
 from .motion.track import BALL_RADIUS
 from .plan import Plan, SolvedCourse, Touched
@@ -38,23 +38,23 @@ _SENT, _TAKEN = {"kick", "header", "throw-in", "dribble"}, {"receive", "chest", 
 
 
 def in_force(plan: Plan, known: SolvedCourse | None = None) -> Plan:
-    """The plan with the ball's course solved and its key moments at the touches that they mean; as it is, where it is not
-    to be solved or has no ball. known: the course, where an earlier take of the same track has it."""
-    if not plan.solve_touches or not _has_ball(plan):
-        return plan
+    """The plan with the ball's course solved and its key moments at the touches that they mean; without a course where it
+    is not to be solved or has no ball. known: the course, where an earlier take of the same track has it."""
+    if not plan.solve_touches:
+        return plan if plan.solved is None else replace(plan, solved=None)
     course = plan.solved or known or course_of_track(plan)
-    return replace(plan, solved=course, timeline=_moved(plan.timeline, course.touches))
+    return plan if course is None else replace(plan, solved=course, timeline=_moved(plan.timeline, course.touches))
 
 
-def _has_ball(plan: Plan) -> bool:
-    return int(np.count_nonzero(np.isfinite(plan.track.ball[:, :2]).all(axis=1))) >= 5
-
-
-def course_of_track(plan: Plan) -> SolvedCourse:
-    """The course of the ball of one player's track, solved from its samples alone."""
+def course_of_track(plan: Plan) -> SolvedCourse | None:
+    """The course of the ball of one player's track, solved from its samples alone; None where these are too few."""
     from .solve_ball import solve_ball
 
-    return course_of(solve_ball(plan.track), plan.track.name, plan)
+    try:
+        solved = solve_ball(plan.track)
+    except InputError:
+        return None
+    return course_of(solved, plan.track.name, plan)
 
 
 def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
@@ -143,7 +143,8 @@ def _in_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 def untouched(plan: Plan) -> list[str]:
     """A line for every key moment that asks for a touch where the ball's course has none."""
     if plan.solved is None:
-        return ["the touches of the ball are not solved: the track has no ball"] if plan.solve_touches else []
+        told = "the touches of the ball are not solved: the track has no ball, or too few samples of it"
+        return [told] if plan.solve_touches else []
     return [
         TimedLine(
             f"{key.time:g} s: the ball's course tells of no touch for '{' '.join(key.words)}' within {FURTHEST:g} s, "

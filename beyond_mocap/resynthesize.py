@@ -143,7 +143,8 @@ def _edited(
 
 def _same_ball(plan: Plan, old: Plan) -> bool:
     """Whether the ball's course is solved from the same samples."""
-    pairs = [(getattr(plan.track, name), getattr(old.track, name)) for name in ("times", "positions", "ball")]
+    names = ("times", "positions", "ball", "ball_height_known")
+    pairs = [(getattr(plan.track, name), getattr(old.track, name)) for name in names]
     return all(np.array_equal(new, before, equal_nan=True) for new, before in pairs)
 
 

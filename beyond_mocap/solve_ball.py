@@ -26,9 +26,11 @@ def solve_ball(
     low, high = -np.inf if start is None else start, np.inf if end is None else end
     part = (source.times >= low) & (source.times <= high)
     if not part.any():
-        raise InputError("times", f"no sample from {start} to {end} s", f"{source.times[0]:g} to {source.times[-1]:g} s")
+        span = f"{source.times[0]:g} to {source.times[-1]:g} s"
+        raise InputError("times", f"no sample from {low:g} to {high:g} s", span)
     if isinstance(source, Track):
-        ball = np.where([True, True, False], source.ball, np.where(source.ball_height_known, source.ball[:, 2], np.nan)[:, None])
+        unknown = ~source.ball_height_known[:, None] & [False, False, True]
+        ball = np.where(unknown, np.nan, source.ball)
         return solve(
             source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
             pitch=PITCH, progress=progress, cancelled=cancelled,

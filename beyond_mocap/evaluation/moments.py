@@ -21,11 +21,11 @@ from .played import Played
 class Moment:
     """How one key moment was served.
 
-    asked: the timeline's line. frame: output frame nearest to the time in force (the asked or the solved one). clip, clip_frame (the clip's key frame,
-    in its own rate), None where no key of a clip is played there. played_at: seconds on the track's clock at which that
-    key frame is played, NaN where it is not. words: those that the source carries at `frame`. entry, exit: first and
-    last output frame, without a seam between, that the clip's annotated row covers. used_instead: words in place of the
-    asked ones, None where the asked ones were had.
+    asked: the timeline's line. frame: output frame nearest to the time in force (the asked or the solved one). clip,
+    clip_frame (the clip's key frame, in its own rate), None where no key of a clip is played there. played_at: seconds on
+    the track's clock at which that key frame is played, NaN where it is not. words: those that the source carries at
+    `frame`. entry, exit: first and last output frame, without a seam between, that the clip's annotated row covers.
+    used_instead: words in place of the asked ones, None where the asked ones were had.
     """
 
     asked: KeyMoment

@@ -102,9 +102,19 @@ def test_a_key_moment_without_a_touch_stays_and_is_told(library, planted, timeli
     assert any("3 s" in line and "no touch" in line for line in take.warnings)
 
 
-def test_a_track_without_a_ball_is_told(library, track_of, timeline_of):
-    take = synthesize(library, Plan(track_of(), timeline_of((3.0, KICK)), solve_touches=True))
+@pytest.mark.parametrize("seen", [0, 1, 5])
+def test_a_track_without_a_ball_is_told(library, track_of, timeline_of, seen):
+    bare = track_of()
+    ball = np.full((len(bare), 3), np.nan)
+    ball[:: len(bare) // max(seen, 1)][:seen] = [1.0, 0.0, BALL_RADIUS]  # too far apart, if several
+    track = Track(bare.times, bare.positions, ball)
+    take = synthesize(library, Plan(track, timeline_of((3.0, KICK)), solve_touches=True))
     assert any("no ball" in line for line in take.warnings) and take.solved is None
+
+
+def test_a_course_is_left_alone_where_touches_are_not_to_be_solved(planted, timeline_of):
+    plan = replace(planted(timeline_of((5.3, KICK))), solve_touches=False)
+    assert in_force(plan).solved is None and in_force(plan).timeline == plan.timeline
 
 
 def test_solved_from_the_samples_of_a_track(library, planted, timeline_of):

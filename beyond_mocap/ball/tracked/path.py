@@ -44,7 +44,8 @@ class BallPiece:
 
 @dataclass(frozen=True, eq=False)
 class SolvedPath:
-    """Pieces one after the other; before the first and after the last the ball rests where they begin and end."""
+    """Pieces one after the other; before the first and after the last the ball rests where they begin and end, and
+    where none is in between it goes straight and evenly from one to the next."""
 
     pieces: tuple[BallPiece, ...]
 
@@ -52,6 +53,11 @@ class SolvedPath:
     def _knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         names = ("times", "positions", "velocities")
         return tuple(np.concatenate([getattr(piece, name) for piece in self.pieces]) for name in names)
+
+    @cached_property
+    def _begins(self) -> np.ndarray:
+        """The numbers of the knots at which pieces begin."""
+        return np.cumsum([0, *(len(piece.times) for piece in self.pieces[:-1])])
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """(N, 3) m, the ball's centre at `times` (N,) s."""
@@ -69,7 +75,8 @@ class SolvedPath:
         safe = np.maximum(step, 1e-9)
         share = np.clip((at - times[before])[:, None] / safe, 0.0, 1.0)
         p, q = places[before], places[after]
-        m, n = speeds[before] * step, speeds[after] * step
+        nowhere = np.isin(after, self._begins)[:, None]
+        m, n = (np.where(nowhere, q - p, speeds[knot] * step) for knot in (before, after))
         if not slope:
             s2, s3 = share**2, share**3
             return (2 * s3 - 3 * s2 + 1) * p + (s3 - 2 * s2 + share) * m + (3 * s2 - 2 * s3) * q + (s3 - s2) * n

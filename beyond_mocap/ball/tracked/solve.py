@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import Cancelled
+from ...errors import Cancelled, InputError
 from ...motion.runs import runs
 from ...motion.skeleton import frozen_array
 from ...motion.track import BALL_RADIUS
@@ -25,7 +25,7 @@ from .samples import Samples, read_samples
 
 PITCH = (105.0, 68.0)
 _GAP = 1.5  # s without a sample, over which nothing is solved
-_SHORTEST = 0.3  # s that can be solved
+_SHORTEST, _FEWEST = 0.3, 5  # s and samples that can be solved
 _TOGETHER = 0.06  # s in which samples err together: they count as one
 _STEP = 0.04  # s between the knots of a path
 _BLEND = 0.2  # s over which a path is brought to the place of a touch
@@ -105,13 +105,13 @@ def solve(
     """Solves a feed: times (N,) s, ball (N, 3) m with NaN where unknown, positions (P, N, 2) m of the `players`.
 
     teams: (P,) names, () where unknown. pitch: length, width m. where: the feed's name, for messages. InputError where
-    the ball has fewer than five samples.
+    the ball has fewer than five samples, or never so many without a long gap.
     """
     samples = read_samples(times, ball, where)
-    kept = np.isin(np.asarray(times, float), samples.times)
-    positions = np.asarray(positions, float)[:, kept][:, : len(samples.times)]
+    every, first = np.unique(np.asarray(times, float), return_index=True)
+    positions = np.asarray(positions, float)[:, first[np.searchsorted(every, samples.times)]]
     stranger = who.STRANGER if len(players) > 1 else who.ALONE
-    windows = _windows(samples)
+    windows = _windows(samples, where)
     found = []
     for number, window in enumerate(windows):
         if cancelled is not None and cancelled():
@@ -138,14 +138,18 @@ def solve(
     )  # fmt: skip
 
 
-def _windows(samples: Samples) -> list[slice]:
-    """The stretches in which the ball is known, gaps of up to _GAP bridged."""
+def _windows(samples: Samples, where: str) -> list[slice]:
+    """The stretches in which the ball is known, gaps of up to _GAP bridged; the longest at least."""
     there = np.flatnonzero(samples.used)
     breaks = np.flatnonzero(np.diff(samples.times[there]) > _GAP)
     firsts, lasts = [there[0], *there[breaks + 1]], [*there[breaks], there[-1]]
     spans = [slice(int(first), int(last) + 1) for first, last in zip(firsts, lasts)]
-    kept = [s for s in spans if samples.times[s.stop - 1] - samples.times[s.start] >= _SHORTEST and s.stop - s.start >= 5]
-    return kept or [spans[0]]
+    kept = [s for s in spans if samples.times[s.stop - 1] - samples.times[s.start] >= _SHORTEST and s.stop - s.start >= _FEWEST]
+    longest = max(spans, key=lambda span: span.stop - span.start)
+    if longest.stop - longest.start < _FEWEST:
+        found = f"the ball's samples are mostly more than {_GAP:g} s apart"
+        raise InputError(where, found, "at least five closer together", "a feed that sees the ball more often")
+    return kept or [longest]
 
 
 def _bridged(samples: Samples, window: slice) -> np.ndarray:
@@ -225,7 +229,9 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
     """The touches with their players, parts and kinds."""
     fields = ("time", "spread", "margin", "place", "before", "after")
     rows = [tuple(_three(getattr(cuts, name)[cuts.touch]) for name in fields) for cuts in found]
-    time, spread, margin, place, before, after = (np.concatenate(column) for column in zip(*rows))
+    columns = [np.concatenate(column) for column in zip(*rows)]
+    order = np.argsort(columns[0], kind="stable")
+    time, spread, margin, place, before, after = (column[order] for column in columns)
     if not len(time):
         return []
     away = who.distances(samples.times, place[:, :2], positions, time)
@@ -234,10 +240,9 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
     kept = np.flatnonzero((chosen >= 0) | ~everybody)
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
-    order = sorted(range(len(time)), key=lambda k: time[k])
     known_height, goals = _has_heights(samples), _goals(positions, teams, pitch[0])
     out = []
-    for k in order:
+    for k in range(len(time)):
         player = int(chosen[k])
         moving = _player_velocity(samples, positions, player, time[k])
         part = kinds.part_of(place[k, 2] if known_height else None)
@@ -260,7 +265,7 @@ def _notes(samples: Samples, heights: bool) -> tuple[str, ...]:
     """What people should know of the feed."""
     filled, wrong = float(samples.filled.mean()), int(np.count_nonzero(samples.outlier))
     lines = [f"{filled:.0%} of the ball's samples were made by the feed at constant velocity"] if filled > _MANY else []
-    lines += [f"{wrong} samples of the ball were wrong and left out"] if wrong else []
+    lines += [f"{wrong} of the ball's samples {'is' if wrong == 1 else 'are'} wrong and left out"] if wrong else []
     lines += [] if heights else ["no heights of the ball: solved from how it slows, good to a metre or two at best"]
     return tuple(lines)
 

@@ -110,6 +110,36 @@ def test_too_few_samples_are_refused():
         solve(np.arange(9.0), np.full((9, 3), np.nan), np.zeros((1, 9, 2)), ["home_1"])
 
 
+def test_samples_too_far_apart_are_refused():
+    times = np.arange(20) * 2.0
+    ball = np.column_stack([times, 0.0 * times, 0.0 * times])
+    with pytest.raises(InputError, match="1.5 s apart"):
+        solve(times, ball, np.zeros((1, 20, 2)), ["home_1"])
+
+
+def test_over_a_long_gap_the_path_goes_straight():
+    times, ball, positions, _ = planted(noise=0.02)
+    start, end = 1.6, 9.0  # the ball flies when the feed loses it
+    ball = np.where(((times > start) & (times < end))[:, None], np.nan, ball)
+    path = solve(times, ball, positions, NAMES).ball
+    inside = np.linspace(start + 0.1, end - 0.1, 40)
+    places = path.at(inside)
+    assert np.linalg.norm(path.velocity(np.array([start - 0.1]))) > 8.0
+    assert np.abs(places - np.linspace(places[0], places[-1], 40)).max() < 1e-6
+    assert np.allclose(path.velocity(inside), (places[-1] - places[0]) / (inside[-1] - inside[0]))
+
+
+def test_samples_told_twice_leave_the_players_where_they_are():
+    times, ball, positions, touches = planted(noise=0.02, rounds=1)
+    away = times[:, None] * [2.0, 0.0]  # everybody walks, and the ball with them
+    ball, positions = ball + np.pad(away, ((0, 0), (0, 1))), positions + away
+    twice = np.sort(np.concatenate([np.arange(len(times)), np.arange(50)]))
+    plain = solve(times, ball, positions, NAMES)
+    again = solve(times[twice], ball[twice], positions[:, twice], NAMES)
+    assert share_found(touches, plain, 0.1)[0] >= 0.8
+    assert [(t.time, t.player) for t in again.touches] == [(t.time, t.player) for t in plain.touches]
+
+
 @pytest.mark.parametrize("fps, heights", [(25.0, True), (10.0, False)])
 def test_a_made_match_is_solved(fps, heights):
     match = planted_match(45.0, 4)
