@@ -13,7 +13,7 @@ import numpy as np
 
 from .ball.contact import Tool
 from .ball.hit_library import MatchWeights
-from .ball.hits import HitMotion, analyse
+from .ball.hits import HitMotion, strongest
 from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.pass_court import Site
@@ -259,12 +259,10 @@ class _Reach:
         if first > len(motion) - 3:
             found = f"{example.clip} from {example.start:g} s"
             raise InputError("example", found, f"seconds up to {motion.duration:.2f}")
-        sides = [side] if side else (["left", "right"] if part in _SIDED else [""])
-        stretch = motion.frames(first, min(last, len(motion)))
-        found = [hit for one in sides if (hit := analyse(stretch, part, one, tool=tool).strongest)]
-        if not found:
+        found = strongest(motion.frames(first, min(last, len(motion))), part, side, tool)
+        if found is None:
             raise InputError("example", f"no strike by {part} in {example.clip} there", "a stretch with a whole strike")
-        return max(found, key=lambda hit: hit.max_speed)
+        return found
 
 
 def _needs(library: Library, sizes: dict[str, float]):

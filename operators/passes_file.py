@@ -10,7 +10,7 @@ from ..beyond_mocap.ball.sample_scenes import SAMPLES as SCENES
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files import scene_json
 from ..beyond_mocap.files.whole import atomic_write
-from ..scene.passes import order
+from ..scene.passes import examples, order
 from ..scene.passes.settings import SAMPLES
 from .verb import ImportVerb, Verb
 
@@ -60,4 +60,5 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
         """Work it out, then write."""
         text = scene_json.scene_text(order.scene_of(context.scene))
         atomic_write(bpy.path.abspath(self.filepath), text)
-        self.report({"INFO"}, f"written to {self.filepath}")
+        missing = examples.left_out(context.scene.beyond_mocap_passes)
+        self.report({"WARNING" if missing else "INFO"}, ", ".join(filter(None, (f"written to {self.filepath}", missing))))

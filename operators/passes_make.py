@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..beyond_mocap.errors import InputError
-from ..scene.passes import make
+from ..scene.passes import examples, make
 from .verb import BackgroundVerb, Verb
 
 
@@ -31,6 +31,8 @@ leaves one body at its strike and arrives at the next one at his"""
 
     def order(self, context):
         """What is to be made."""
+        if not self.live:
+            examples.forget()
         return make.order_of(context.scene)
 
     @staticmethod

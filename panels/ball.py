@@ -155,11 +155,17 @@ def of_pass(layout, settings, one) -> None:
     column.prop_search(one, "who", settings, "players")
     column.prop_search(one, "to", settings, "players")
     column.row().prop(one, "kind", expand=True)
-    for name in ("bounces", "seconds", "at", "part", "side", "error", "clip"):
+    for name in ("bounces", "seconds", "at", "part", "side", "error", "actor"):
         column.prop(one, name)
-    if one.clip:
-        column.prop(one, "first")
-        column.prop(one, "last")
+    if one.actor is not None:
+        for name in ("actor_cut", *(("actor_first", "actor_last") if one.actor_cut else ())):
+            column.prop(one, name)
+        return
+    if one.actor_known:
+        column.prop(one, "actor_known", icon="ERROR")
+        return
+    for name in ("clip", *(("first", "last") if one.clip else ())):
+        column.prop(one, name)
 
 
 def choices(layout, settings) -> None:

@@ -28,6 +28,7 @@ from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 from .contact import PARTS, Tool, striking_surface
 
+_SIDED = ("foot", "hand", "tool")
 _SMOOTHING = 0.1
 _APART = 0.25
 _SLOW = 0.4
@@ -122,7 +123,7 @@ def analyse(
     _check(motion, threshold)
     positions, rotations = forward_kinematics(motion)
     place = strike_place(motion.skeleton, positions, rotations, joint or part, side, tool)
-    side = side if part in ("foot", "hand", "tool") else ""
+    side = side if part in _SIDED else ""
     body = _Body.of(motion, positions)
     way = _Way.of(place, body, part, motion.fps)
     peaks = _peaks(way.height)
@@ -140,6 +141,13 @@ def analyse(
     )
 
 
+def strongest(motion: Motion, part: str, side: str = "", tool: Tool | None = None) -> HitMotion | None:
+    """The hit motion in which `part` is fastest; side "": of either side. None without any. InputError as `analyse`."""
+    sides = (side,) if side else (("left", "right") if part in _SIDED else ("",))
+    found = [hit for one in sides if (hit := analyse(motion, part, one, tool=tool).strongest)]
+    return max(found, key=lambda hit: hit.max_speed, default=None)
+
+
 def hit_at(
     motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right", tool: Tool | None = None
 ) -> HitMotion:
@@ -152,7 +160,7 @@ def hit_at(
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
-    side = side if part in ("foot", "hand", "tool") else ""
+    side = side if part in _SIDED else ""
     return _hit_motion(part, side, (first, last), _Way.of(place, body, part, motion.fps), body, key)
 
 

@@ -96,7 +96,8 @@ def _pass_out(one: Pass) -> dict:
         value = getattr(one, name)
         if value != getattr(Pass, name):
             out[name] = list(value) if name == "at" else value
-    if one.example is not None:
+    out.pop("example", None)
+    if one.example is not None and one.example.hit is None:  # a hit motion of elsewhere has no file
         told = {"clip": one.example.clip, "from": one.example.start, "to": one.example.end}
         out["example"] = {name: value for name, value in told.items() if value is not None}
     return out

@@ -4,6 +4,7 @@
 - `hits_shown` hit analysis of an armature: figures for the panel, markers on its action
 - `graph`      its curves as a small picture
 - `order`      the lists as a passing scene of the core, and back
+- `examples`   strikes of armatures that passes are to be like
 - `make`       it is made: bodies, ball, net; `live` again after each edit; `rally` what is drawn of it; `held_tool` a racquet
               in the hand
 - `tracked`    the ball of imported tracking, solved

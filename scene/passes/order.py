@@ -12,7 +12,8 @@ from ...beyond_mocap.ball.pass_scene import GROUND, LIMITS, BallChoice, Example,
 from ...beyond_mocap.errors import InputError
 from .. import bake
 from ..measure import frames_per_second, units_per_metre
-from .settings import KEPT, BeyondMocapPasser, BeyondMocapPasses
+from . import examples
+from .settings import KEPT, BeyondMocapPass, BeyondMocapPasser, BeyondMocapPasses
 
 SIZE = 0.5  # metres
 SHIRTS = ((0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55), (0.02, 0.45, 0.60))
@@ -25,7 +26,7 @@ def scene_of(scene: bpy.types.Scene) -> PassScene:
     settings = scene.beyond_mocap_passes
     return PassScene(
         tuple(_player(scene, one) for one in settings.players),
-        tuple(_pass(scene, one) for one in settings.passes),
+        tuple(_pass(scene, one, number) for number, one in enumerate(settings.passes, start=1)),
         settings.repeat, _rate(scene), settings.seed,
         BallChoice(settings.ball, {name: _exact(getattr(settings, name)) for name in NUMBERS} if settings.own else {}),
         Net(_place(settings.net_from), _place(settings.net_to), _exact(settings.net_height)) if settings.net else None,
@@ -99,18 +100,32 @@ def _player(scene, row: BeyondMocapPasser) -> Player:
     if row.place is None or row.place.name not in scene.objects:
         raise InputError(f"player {row.name}", "nothing that says where he stands", "an object", "choose one as his Place")
     place, facing = stands(scene, row.place)
-    tool = Tool("tool", *(_exact(getattr(row, f"tool_{name}")) for name in ("length", "radius", "reach"))) if row.part == "tool" else None
+    tool = _tool(row) if row.part == "tool" else None
     side = "" if row.side == "either" else row.side
     return Player(row.name, place, facing, row.bone or row.part, side, tool, _exact(row.height))
 
 
-def _pass(scene, row) -> Pass:
-    example = Example(row.clip.replace("\\", "/"), _exact(row.first), _exact(row.last) or None) if row.clip else None
+def _tool(row: BeyondMocapPasser) -> Tool:
+    return Tool("tool", *(_exact(getattr(row, f"tool_{name}")) for name in ("length", "radius", "reach")))
+
+
+def _example(scene, row: BeyondMocapPass, number: int) -> Example | None:
+    """What the strike is to be like: an armature's, or that of a recording of the library."""
+    giver = next((one for one in scene.beyond_mocap_passes.players if one.name == row.who), None)
+    if examples.is_wanted(row) and giver is not None:
+        own = (giver.bone or giver.part, giver.side)
+        part, side = (mine if mine != "own" else usual for mine, usual in zip((row.part, row.side), own))
+        tool = _tool(giver) if part == "tool" else None
+        return Example("", hit=examples.hit_of(scene, row, number, part, "" if side == "either" else side, tool))
+    return Example(row.clip.replace("\\", "/"), _exact(row.first), _exact(row.last) or None) if row.clip else None
+
+
+def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
     at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
     side = {"own": None, "either": ""}.get(row.side, row.side)
     return Pass(
         row.who, row.to, row.kind, row.bounces, None if row.part == "own" else row.part, side, _exact(row.seconds) or None, at,
-        example, "" if row.error == "none" else row.error,
+        _example(scene, row, number), "" if row.error == "none" else row.error,
     )  # fmt: skip
 
 
@@ -147,7 +162,7 @@ def _fill_pass(context, row, one: Pass) -> None:
     row.who, row.to, row.kind, row.bounces, row.error = one.giver, one.receiver, one.kind, one.bounces, one.error or "none"
     row.part, row.seconds = one.part or "own", one.seconds or 0.0
     row.side = "own" if one.side is None else one.side or "either"
-    if one.example is not None:
+    if one.example is not None and one.example.hit is None:
         row.clip, row.first, row.last = one.example.clip, one.example.start, one.example.end or 0.0
     if one.at is not None:
         row.at = _empty(context, f"{one.receiver} meets", one.at, 0.0, (1.0, 1.0, 1.0, 1.0))

@@ -80,6 +80,11 @@ def renamed(player, context) -> None:
     touch_live(player, context)
 
 
+def chosen(one, context) -> None:
+    """Which armature shows a strike is known by name also when it has been deleted."""
+    one.actor_known = one.actor.name if one.actor is not None else ""
+
+
 class BeyondMocapPasser(bpy.types.PropertyGroup):
     """One player of a passing scene."""
 
@@ -155,6 +160,19 @@ class BeyondMocapPass(bpy.types.PropertyGroup):
         name="To Second", min=0.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,
         description="Of the stretch of that recording; 0: to its end",
     )
+    actor: PointerProperty(
+        name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=chosen,
+        description="An armature whose own motion shows the strike: the one most like it is played, in place of Like Clip's",
+    )
+    actor_known: StringProperty(
+        name="Missing", update=touch_live,
+        description="The armature that showed the strike, which is not there any more; empty it to do without",
+    )
+    actor_cut: BoolProperty(
+        name="Stretch", update=touch_live, description="Look at some frames of its motion only, not at all of it"
+    )
+    actor_first: IntProperty(name="From Frame", default=1, description="Scene frame", update=touch_live)
+    actor_last: IntProperty(name="To Frame", default=60, description="Scene frame, the last one", update=touch_live)
     error: EnumProperty(name="Then", items=ERRORS, default="none", description="How it ends", update=touch_live)
 
 
