@@ -36,7 +36,7 @@ MOST_HITS = 24
 
 BALL_LIMITS = {
     "radius": (0.01, 0.5), "mass": (0.001, 20.0), "gravity": (0.5, 30.0), "linear_drag": (0.0, 2.0), "drag": (0.0, 0.5),
-    "lift": (0.0, 10.0), "restitution": (0.0, 0.95), "friction": (0.0, 5.0), "rolling": (0.01, 20.0),
+    "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "restitution": (0.0, 0.95), "friction": (0.0, 5.0), "rolling": (0.01, 20.0),
     "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
 }  # fmt: skip
 """Least and most of a ball's numbers."""
@@ -134,10 +134,8 @@ def ball_of(scene: PassScene) -> Ball:
             raise InputError("ball", f"{name!r}", f"one of {', '.join(sorted(known))}", "check the spelling")
     for name, value in choice.changes.items():
         low, high = BALL_LIMITS[name]
-        values = value if isinstance(value, tuple) else (value,)
-        count = len(np.atleast_1d(getattr(BALLS[choice.kind], name)))
-        if len(values) != count or not all(low <= one <= high for one in values):
-            raise InputError(f"ball: {name}", f"{value}", "three numbers" if name == "lift" else f"{low:g} to {high:g}")
+        if np.shape(value) != np.shape(low) or not np.all((np.array(low) <= value) & (value <= np.array(high))):
+            raise InputError(f"ball: {name}", f"{value}", f"{low} to {high}")
     return replace(BALLS[choice.kind], **choice.changes)
 
 
@@ -215,10 +213,11 @@ class _Reach:
         tool = (player.tool or Tool()) if part == "tool" else None
         kind = "receive" if one is None else one.kind
         try:
-            moments = self._reached(part, side, tool, self.sizes[name], kind, one.example if one else None)
+            size, example = self.sizes[name], one.example if one else None
+            moments = self._reached(part, side, tool and tool.for_body(size), size, kind, example)
         except InputError as error:
             raise InputError(f"pass {number}, {name}", str(error)) from None
-        return Site(name, place, self.scene.facing(name), kind, part, tool, self.sizes[name], moments, one)
+        return Site(name, place, self.scene.facing(name), kind, part, tool, size, moments, one)
 
     def _reached(self, part, side, tool, size: float, kind: str, example) -> StrikeMoments:
         key = (part, side, tool, size, kind, example)
@@ -302,8 +301,7 @@ def _sized(order: HitOrder | Stance, size: float) -> HitOrder | Stance:
     if isinstance(order, Stance):
         return replace(order, place=tuple(np.array(order.place) / size))
     place, ball = (tuple(np.array(values) / size) for values in (order.place, order.ball))
-    tool = order.tool and replace(order.tool, length=order.tool.length / size, reach=order.tool.reach / size)
-    return replace(order, place=place, ball=ball, tool=tool)
+    return replace(order, place=place, ball=ball, tool=order.tool and order.tool.for_body(size))
 
 
 def _grown_plan(plan, size: float, height: float):

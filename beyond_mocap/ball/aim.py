@@ -129,6 +129,7 @@ def out_of_reach(
     return InputError(what, f"{found}: that takes {speed:.0f} m/s", expected, "give it more time or a nearer target")
 
 
+@np.errstate(over="ignore", invalid="ignore")  # launches that are tried and lead nowhere
 def _solved(problem: _Problem, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Launch velocities (B, 3) and misses (B,): from the launches nearby, then from first guesses, then from a search,
     each only for those that still miss."""
@@ -291,7 +292,9 @@ def _slopes(problem: _Problem, velocity: np.ndarray, place: np.ndarray) -> np.nd
 def _step(slope: np.ndarray, short: np.ndarray) -> np.ndarray:
     """(B, 3) m/s that slopes (B, 3, 3) ask for to make up for `short` (B, 3), damped a little."""
     turned = np.swapaxes(slope, 1, 2)
-    return np.linalg.solve(turned @ slope + 1e-9 * np.eye(3), turned @ short[:, :, None])[:, :, 0]
+    square = turned @ slope + 1e-9 * np.eye(3)
+    can = np.isfinite(square).all(axis=(1, 2)) & (np.linalg.det(square) != 0.0)  # else launches that lead nowhere
+    return np.linalg.solve(np.where(can[:, None, None], square, np.eye(3)), turned @ short[:, :, None])[:, :, 0]
 
 
 def _learnt(slope: np.ndarray, step: np.ndarray, moved: np.ndarray) -> np.ndarray:

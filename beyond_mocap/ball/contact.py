@@ -6,7 +6,7 @@ height. Whoever puts the body at a place with a facing turns and moves it; heigh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,9 +39,15 @@ class Tool:
     reach: float = 0.26
 
     def __post_init__(self):
-        if not (0.0 < self.length <= 2.0 and 0.0 <= self.reach <= self.length and 0.0 < self.radius <= 0.5):
-            found = f"{self.name}: {self.length:g} m long, strikes with {self.reach:g} m, {self.radius:g} m thick"
-            raise InputError("tool", found, "a length up to 2 m, a reach up to its length, a radius up to 0.5 m")
+        if not (0.0 < self.length < np.inf and 0.0 <= self.reach <= self.length and 0.0 < self.radius < np.inf):
+            raise InputError("tool", str(self), "a length, a reach up to its length, a radius")
+
+    def __str__(self):
+        return f"{self.name}: {self.length:g} m long, strikes with {self.reach:g} m, {self.radius:g} m thick"
+
+    def for_body(self, size: float) -> Tool:
+        """The tool for work in the size of the library, which the body is `size` times as large as: it keeps its own."""
+        return replace(self, length=self.length / size, radius=self.radius / size, reach=self.reach / size)
 
 
 def striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: Tool | None = None) -> Surface:

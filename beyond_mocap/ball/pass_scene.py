@@ -32,6 +32,9 @@ BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
 RESERVED = ("ball", "strikes", "scene")
 """Names that other files of a scene have."""
 
+LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
+"""Metres that a tool in the hand has at most."""
+
 FAR = 100.0
 """Metres between two players, above which nobody passes."""
 
@@ -198,6 +201,9 @@ def _check_players(players: tuple[Player, ...]) -> None:
         _check_part(one.part, one.side, where)
         if one.facing is not None and not math.isfinite(one.facing):
             raise InputError(where, f"facing {one.facing}", "an angle")
+        if one.tool is not None and (one.tool.length > LONGEST_TOOL or one.tool.radius > THICKEST_TOOL):
+            most = f"a length up to {LONGEST_TOOL:g} m, a radius up to {THICKEST_TOOL:g} m"
+            raise InputError(f"{where}: tool", str(one.tool), most)
         if one.height:
             number_within(one.height, "height", f"{where}: height")
         for other in players[:number]:

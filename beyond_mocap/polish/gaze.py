@@ -95,8 +95,10 @@ def _eased_in(known: np.ndarray, fps: float) -> np.ndarray:
     """(T,) 1 where there is something to see, fading within SECONDS beside what is not known."""
     if known.all():
         return np.ones(len(known))
-    seen = np.arange(len(known))[:, None] - np.flatnonzero(~known)[None]
-    return _smooth(np.abs(seen).min(axis=1) / (SECONDS * fps))
+    frames, without = np.arange(len(known)), np.flatnonzero(~known)
+    after = np.searchsorted(without, frames)
+    beside = (without[np.clip(after - back, 0, len(without) - 1)] for back in (0, 1))
+    return _smooth(np.minimum(*(np.abs(frames - other) for other in beside)) / (SECONDS * fps))
 
 
 def _turned(motion: Motion, world: np.ndarray, head: int, turn: np.ndarray, chest: np.ndarray) -> Motion:

@@ -68,6 +68,14 @@ def test_everybody_is_there_for_the_whole_scene(played):
         assert np.linalg.norm(way[0]) < 0.1 and np.linalg.norm(way, axis=1).max() < 1.0
 
 
+def test_a_small_players_tool_keeps_its_size(strikes_library):
+    """The hand hardly has to move: the racquet of the plan is the one in his hand."""
+    said = json.loads(json.dumps(SAMPLES["racquet"]))
+    said.update(repeat=1, players=[{**one, "height": 1.2} for one in said["players"]])
+    whole = passes(strikes_library, parse_scene(said))
+    assert max(float(np.nanmax(player.moved)) for player in whole.players) < 0.03
+
+
 def test_players_of_their_own_height(played):
     whole = played("tall")
     sizes = [stature(player.take.motion.skeleton) for player in whole.players]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.ball.aim import aim, along_ground, out_of_reach
+from beyond_mocap.ball.aim import _step, aim, along_ground, out_of_reach
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.physics import BALLS, FASTEST, FOOTBALL, PAPER, TENNIS, length
 from beyond_mocap.errors import InputError
@@ -155,6 +155,11 @@ def test_a_target_below_where_a_ball_can_lie_is_on_the_ground():
     low = aim((0.0, 0.0, 0.3), (9.0, 0.0, -0.5), FOOTBALL, bounces=1)
     lies = aim((0.0, 0.0, 0.3), (9.0, 0.0, FOOTBALL.radius), FOOTBALL, bounces=1)
     assert low.possible.all() and np.array_equal(low.velocity, lies.velocity)
+
+
+def test_one_launch_that_leads_nowhere_does_not_spoil_the_others():
+    slopes = np.stack([np.eye(3), np.full((3, 3), 1e12), np.full((3, 3), np.inf)])
+    assert _step(slopes, np.ones((3, 3)))[0] == pytest.approx(np.ones(3))
 
 
 def test_same_input_same_launch():

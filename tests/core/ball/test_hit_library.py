@@ -95,8 +95,19 @@ def test_it_is_kept_beside_the_cache(library, kicks, monkeypatch):
 
 def test_a_damaged_file_is_worked_out_anew(folder, kicks, tmp_path):
     fresh = build(folder, cache_dir=tmp_path)
-    (tmp_path / "hits_foot.npz").write_bytes(b"no array")
     assert len(HitLibrary.of(fresh, "foot")) == len(kicks)
+    (kept,) = tmp_path.glob("hits_*.npz")
+    kept.write_bytes(b"no array")
+    assert len(HitLibrary.of(fresh, "foot")) == len(kicks)
+
+
+def test_what_is_asked_of_is_kept_apart(folder, tmp_path):
+    """Also where the file system does not tell large letters from small ones: a joint may be called Head."""
+    fresh = build(folder, cache_dir=tmp_path)
+    joint = next(name for name in fresh.skeleton.names if name.casefold() == "head")
+    for part in ("head", joint if joint != "head" else "Neck"):
+        HitLibrary.of(fresh, part)
+    assert len({path.name.casefold() for path in tmp_path.glob("hits_*.npz")}) == 2
 
 
 def test_an_example_finds_itself_and_then_its_like(library, kicks):

@@ -195,7 +195,9 @@ def test_what_the_library_lacks(strikes_library, clips_folder, library):
 
 
 @pytest.mark.parametrize("ball, word", [("cannon", "the kind"), ({"weight": 3}, "check the spelling"),
-                                        ({"radius": -1}, "radius"), ({"restitution": 3}, "restitution")])
+                                        ({"radius": -1}, "radius"), ({"restitution": 3}, "restitution"),
+                                        ({"lift": [5, 0, 0]}, "lift"), ({"lift": 0.1}, "lift"),
+                                        ({"drag": [0.1, 0.1, 0.1]}, "drag")])
 def test_balls_that_are_none(strikes_library, ball, word):
     with pytest.raises(InputError, match=word):
         planned(strikes_library, replace(two(), ball=parse_scene({**SAMPLES["three"], "ball": ball}).ball))
