@@ -16,7 +16,8 @@ from .verb import ImportVerb, Verb
 
 
 class BEYOND_MOCAP_OT_passes_sample(Verb, bpy.types.Operator):
-    """Fill the lists with a scene to begin with. What they hold now is replaced; bodies that were made stay"""
+    """Fill the lists with a scene to begin with. What they hold now is replaced; players of the same name keep
+their bodies"""
 
     bl_idname = "beyond_mocap.passes_sample"
     bl_label = "Sample Scene"

@@ -9,7 +9,7 @@ from bpy.props import EnumProperty
 
 from ..beyond_mocap.errors import InputError
 from ..scene.measure import units_per_metre
-from ..scene.passes import hits_shown, order
+from ..scene.passes import hits_shown, order, shown
 from .verb import Verb
 
 ROWS = (("players", "Players", "Who keeps the ball going"), ("passes", "Passes", "One after the other"))
@@ -56,8 +56,10 @@ which becomes his body"""
             self.move(settings, rows, number, number + (1 if self.what == "DOWN" else -1))
 
     def remove(self, settings, rows, number):
-        """Take the row out; with a player his passes and his Empty."""
+        """Take the row out; with a player his passes, his Empty and what the scene has made of him."""
         if self.rows == "players":
+            shown.check(rows[number])
+            shown.let_go(rows[number])
             name = rows[number].name
             for other in reversed(range(len(settings.passes))):
                 if name in (settings.passes[other].who, settings.passes[other].to):

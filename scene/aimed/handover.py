@@ -25,6 +25,8 @@ OURS = "beyond_mocap_physics"
 ROLLS_OUT = 0.4  # angular damping, for Blender's balls would roll for ever
 CHOSEN = ("selected_objects", "selected_editable_objects")
 WORLD = ("substeps_per_frame", "solver_iterations")
+SPAN = ("frame_start", "frame_end")
+STRONGEST = 200.0  # of gravity's weight; Blender takes its number for units a second squared, whatever a unit is
 FINE = {"substeps_per_frame": 20, "solver_iterations": 20}
 
 
@@ -40,7 +42,8 @@ def hand_over(
     fps = frames_per_second(scene)
     velocity = _velocity(curves, frame, fps)
     shifted = _shift(curves, frame, velocity, fps)
-    kept = {"world": scene.rigidbody_world is not None, "solid": [], "keys": shifted}
+    others = any(thing.beyond_mocap_aim.handed for thing in scene.objects)
+    kept = {"world": scene.rigidbody_world is not None, "others": others, "solid": [], "keys": shifted}
     _world(scene, frame, kept)
     _solids(scene, solid, kept)
     _ball(scene, ball, frame, BALLS[kind], np.linalg.norm(velocity) / units_per_metre(scene))
@@ -66,7 +69,13 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
             channels.remove_curve(action, slot, kinematic)
     for name in ("handed", "handed_before"):
         aim.property_unset(name)
-    if any(thing.beyond_mocap_aim.handed for thing in scene.objects):
+    heir = next((thing for thing in scene.objects if thing.beyond_mocap_aim.handed), None)
+    if heir is not None:  # what came before the first handover is brought back after the last
+        theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
+        if not kept.get("others"):
+            theirs.update({name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False)
+        theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
+        heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
         return
     for name in kept.get("solid", ()):
         thing = scene.objects.get(name)
@@ -84,6 +93,9 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     elif world is not None:
         for name in WORLD:
             setattr(world, name, kept.get(name, getattr(world, name)))
+        world.effector_weights.gravity = kept.get("gravity", world.effector_weights.gravity)
+        for name in SPAN if not world.point_cache.is_baked else ():
+            setattr(world.point_cache, name, kept.get(name, getattr(world.point_cache, name)))
 
 
 def _check(ball: bpy.types.Object, frame: int) -> None:
@@ -104,6 +116,8 @@ def _check(ball: bpy.types.Object, frame: int) -> None:
         found = "no keys" if ends is None else f"keys on frames {ends[0]} to {ends[1]}"
         expected = f"keys from two frames before the handover on frame {frame} up to it"
         raise InputError(f"ball {ball.name}", found, expected, "choose another frame")
+    if any(("location", axis) not in channels.curves(action, slot) for axis in range(3)):
+        raise InputError(f"ball {ball.name}", "no keys of all three of its coordinates", "them", "key its location")
     linked.refuse(action)
 
 
@@ -155,7 +169,11 @@ def _world(scene, frame: int, kept: dict) -> None:
     for name, value in FINE.items():
         kept[name] = getattr(world, name)
         setattr(world, name, max(value, getattr(world, name)))
+    kept["gravity"] = world.effector_weights.gravity
+    if not kept["others"]:
+        world.effector_weights.gravity = min(kept["gravity"] * units_per_metre(scene), STRONGEST)
     cache = world.point_cache
+    kept.update({name: getattr(cache, name) for name in SPAN})
     if not cache.is_baked:
         cache.frame_start = min(cache.frame_start, frame - 2) if kept["world"] else frame - 2
         cache.frame_end = max(cache.frame_end, scene.frame_end, frame + int(5 * frames_per_second(scene)))

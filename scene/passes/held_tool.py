@@ -13,6 +13,7 @@ from ..material import colour
 from .settings import KEPT
 
 HANDLE = 0.6  # of the thickness of what strikes
+TOOL = "tool"  # tells it from balls that the user has tied to a hand
 _SIDES = 12
 
 
@@ -35,7 +36,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, collec
     shape.free()
     mesh.materials.append(colour("Tool", (0.05, 0.05, 0.06)))
     made = bpy.data.objects.new(name, mesh)
-    made[KEPT] = True
+    made[KEPT] = TOOL
     collection.objects.link(made)
     made.parent, made.parent_type, made.parent_bone = body, "BONE", bone.name
     made.matrix_parent_inverse = (bone.matrix_local @ Matrix.Translation((0.0, bone.length, 0.0))).inverted()
@@ -44,7 +45,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, collec
 
 def remove(body: bpy.types.Object) -> None:
     """Take the tool out of a body's hand."""
-    for child in [child for child in body.children if child.get(KEPT) and child.parent_type == "BONE"]:
+    for child in [child for child in body.children if child.get(KEPT) == TOOL]:
         mesh = child.data
         bpy.data.objects.remove(child)
         if not mesh.users:

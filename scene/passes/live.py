@@ -8,6 +8,7 @@ made waits for the next edit.
 
 from __future__ import annotations
 
+import traceback
 from time import perf_counter
 
 import bpy
@@ -56,6 +57,16 @@ def _after_change(scene, depsgraph):
 
 
 def _tick():
+    try:
+        return _look()
+    except Exception:  # a timer that raises is never called again
+        traceback.print_exc()
+        _seen["dirty"] = False
+        return IDLE
+
+
+def _look() -> float:
+    """Do what is due; seconds until the next look."""
     if not _seen["dirty"]:
         return IDLE
     window = next(iter(bpy.context.window_manager.windows), None)

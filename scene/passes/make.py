@@ -19,7 +19,7 @@ from ..ride import riders
 from ..set_aside import bring_back, drop, put_aside
 from ..settings import absolute
 from . import order as asked
-from . import held_tool, possession, rally
+from . import held_tool, possession, rally, shown
 from .settings import KEPT, BeyondMocapPasser
 
 if TYPE_CHECKING:
@@ -66,7 +66,11 @@ def order_of(scene: bpy.types.Scene) -> Order:
                          "choose one under Choices, or in step 1")
     for row in settings.players:
         _check(row)
+    shown.check(*settings.players)
     linked.refuse(settings.rally)
+    if settings.rally is not None:
+        channels.check_free(settings.rally)
+        possession.check_unaimed(settings.rally)
     unit = (common.library_unit or None) if not settings.library_folder else None
     parts = repr((wanted, chosen, unit, settings.start_frame)).encode()  # a file may be moved with its library
     digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
@@ -117,24 +121,19 @@ def clear(scene: bpy.types.Scene) -> None:
     """Take away what was made for the scene: bodies, ball, net; bodies of the user's play their own motion again. The lists
     stay."""
     settings = scene.beyond_mocap_passes
+    shown.check(*settings.players)
+    if settings.rally is not None:
+        possession.check_unaimed(settings.rally)
+        possession.free(scene, settings.rally)
     for row in settings.players:
-        if row.body is not None:
-            _check(row)
-    for row in settings.players:
-        if row.body is not None:
-            held_tool.remove(row.body)
-        if row.body is not None and row.body.get(KEPT):
-            remove(row.body)
-        elif row.body is not None and row.before.kept:
-            bring_back(row.before, row.body, KEPT)
-        drop(row.before, KEPT)
+        shown.let_go(row)
     if settings.rally is not None and settings.rally.get(KEPT):
-        remove(settings.rally)
+        shown.remove(settings.rally)
     elif settings.rally is not None and settings.ball_before.kept:
         bring_back(settings.ball_before, settings.rally, KEPT)
     drop(settings.ball_before, KEPT)
     if (net := _own_net(scene)) is not None:
-        remove(net)
+        shown.remove(net)
     for name in ("made_of", "strikes", "figures", "told"):
         settings.property_unset(name)
 
@@ -162,19 +161,6 @@ def figures(made: "Passes") -> list[str]:
     ]
 
 
-def remove(thing: bpy.types.Object) -> None:
-    """Take an object of ours out of the file, with what hangs on it that is ours, its data and its action."""
-    for child in [child for child in thing.children if child.get(KEPT)]:
-        remove(child)
-    if thing.children or thing.library is not None:  # the user has tied things to it
-        return
-    channels.discard(thing, KEPT)
-    data = thing.data
-    bpy.data.objects.remove(thing)
-    if data is not None and not data.users:
-        bpy.data.batch_remove([data])
-
-
 def _check(row: BeyondMocapPasser) -> None:
     """InputError where a player's body cannot be animated."""
     target = row.body
@@ -191,13 +177,13 @@ def _check(row: BeyondMocapPasser) -> None:
 def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float) -> None:
     """One player's motion on his body, which is made, dressed or made anew where it does not fit. take: whatever has a
     `motion` and a `start_time` (s); start: the scene frame of second 0."""
-    target, room = row.body, bake.collection(scene)
-    if target is not None and not bake.fits(target, take, scene):
-        if target.get(KEPT):
-            remove(target)
-        elif row.before.kept:
-            bring_back(row.before, target, KEPT)
-        target = None
+    room = bake.collection(scene)
+    if row.shown is not None and row.shown != row.body:
+        shown.let_go(row)
+    if row.body is not None and not bake.fits(row.body, take, scene):
+        shown.let_go(row)
+        row.body = None
+    target = row.body
     if target is None:
         target = armature.create(bpy.context, take.motion.skeleton, row.name, room)
         target[KEPT] = True
@@ -206,6 +192,7 @@ def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float)
         row.body = target
     elif not target.get(KEPT) and not row.before.kept:
         put_aside(row.before, target)
+    row.shown = target
     channels.discard(target, KEPT)
     first = start + take.start_time * frames_per_second(scene)
     action.write(target, take.motion, scene, first, f"{row.name} passes", generated=True)[KEPT] = True
@@ -245,7 +232,7 @@ def _net(scene, net: Net | None) -> None:
     found = _own_net(scene)
     if net is None:
         if found is not None:
-            remove(found)
+            shown.remove(found)
         return
     mesh = bpy.data.meshes.new(NET)
     start, way = np.array(net.start), np.subtract(net.end, net.start)
@@ -262,7 +249,7 @@ def _net(scene, net: Net | None) -> None:
     shape.free()
     if found is None:
         found = bpy.data.objects.new(NET, mesh)
-        found[KEPT] = True
+        found[KEPT] = NET
         bake.collection(scene).objects.link(found)
     else:
         before, found.data = found.data, mesh
@@ -270,5 +257,4 @@ def _net(scene, net: Net | None) -> None:
 
 
 def _own_net(scene) -> bpy.types.Object | None:
-    found = bake.collection(scene).objects.get(NET)
-    return found if found is not None and found.get(KEPT) else None
+    return next((thing for thing in bake.collection(scene).objects if thing.get(KEPT) == NET), None)  # under any name

@@ -12,7 +12,7 @@ from ...beyond_mocap.ball.pass_scene import GROUND, LIMITS, BallChoice, Example,
 from ...beyond_mocap.errors import InputError
 from .. import bake
 from ..measure import frames_per_second, units_per_metre
-from . import examples
+from . import examples, shown
 from .settings import KEPT, BeyondMocapPass, BeyondMocapPasser, BeyondMocapPasses
 
 SIZE = 0.5  # metres
@@ -39,22 +39,35 @@ def fill(context: bpy.types.Context, wanted: PassScene) -> None:
     """Let the settings say what a passing scene asks for; places become Empties, those of before go."""
     scene, settings = context.scene, context.scene.beyond_mocap_passes
     live, settings.live = settings.live, False
-    for row in settings.players:
-        remove_place(row)
+    shown.check(*settings.players)
     for row in settings.passes:
         remove_mark(row.at)
-    bodies = {row.name: row.body for row in settings.players}
-    settings.players.clear()
     settings.passes.clear()
-    for player in wanted.players:
-        row = add_player(context, player.name, player.place, wanted.facing(player.name))
-        row.body = bodies.get(player.name)
-        _fill_player(row, player)
+    _fill_players(context, wanted)
     for one in wanted.passes:
         _fill_pass(context, settings.passes.add(), one)
     _fill_scene(settings, wanted)
     settings.active_player = settings.active_pass = 0
     settings.live = live
+
+
+def _fill_players(context: bpy.types.Context, wanted: PassScene) -> None:
+    """Rows for the wanted players, in their order; who is in the list already keeps his body."""
+    rows, names = context.scene.beyond_mocap_passes.players, {player.name for player in wanted.players}
+    for number in reversed(range(len(rows))):
+        remove_place(rows[number])
+        if rows[number].name not in names:
+            shown.let_go(rows[number])
+            rows.remove(number)
+    for number, player in enumerate(wanted.players):
+        facing, there = wanted.facing(player.name), rows.find(player.name)
+        if there < 0:
+            add_player(context, player.name, player.place, facing)
+            there = len(rows) - 1
+        else:
+            rows[there].place = _empty(context, f"{player.name} place", player.place, facing, (*rows[there].shirt, 1.0))
+        rows.move(there, number)
+        _fill_player(rows[number], player)
 
 
 def add_player(

@@ -74,21 +74,23 @@ def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = No
     """Take back one stretch in which the ball is carried, or all; after the last one it plays its own action again."""
     linked.refuse(ball)
     channels.check_free(ball)
+    check_unaimed(ball)
     own = ball.beyond_mocap_ball
     for index in reversed(range(len(own.holds)) if number is None else [number]):
         constraint = ball.constraints.get(own.holds[index].name)
         if constraint is not None:
             ball.constraints.remove(constraint)
         own.holds.remove(index)
-    if len(own.holds):
+    if any(_holds(ball, hold) for hold in own.holds):
         rebuild(scene, ball)
     elif own.before.kept:
         bring_back(own.before, ball, KEPT)
 
 
 def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
-    """Make the ball's action anew, of its own way and of who carries it."""
-    holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if hold.body is not None), key=lambda hold: hold.first)
+    """Make the ball's action anew, of its own way and of who carries it. Stretches whose armature, bone or constraint is
+    gone count no more; one at least is left."""
+    holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if _holds(ball, hold)), key=lambda hold: hold.first)
     frames, way, ends = own_way(scene, ball, holds)
     own, lets_go = list(way), []
     for hold in holds:
@@ -107,7 +109,7 @@ def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
 def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
     """Let `write()` give the ball another action of its own; who carries it carries it on its new way."""
     own, name = ball.beyond_mocap_ball, ball.name
-    carried = len(own.holds) > 0
+    carried = any(_holds(ball, hold) for hold in own.holds)
     if own.before.kept:
         bring_back(own.before, ball, KEPT)
     write()
@@ -139,9 +141,19 @@ def own_way(scene: bpy.types.Scene, ball: bpy.types.Object, holds) -> tuple[np.n
     return frames, way, ends
 
 
+def check_unaimed(ball: bpy.types.Object) -> None:
+    """InputError for a ball that is aimed or that rigid bodies move: who carries it would not be seen, or its aim be lost."""
+    aim = ball.beyond_mocap_aim
+    if aim.handed:
+        raise InputError(f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed", "press Take Ball Back first")
+    if aim.on:
+        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not", "press Leave Aim first")
+
+
 def _check(ball, body, bone: str, first: int, last: int) -> None:
     linked.refuse(ball)
     channels.check_free(ball)
+    check_unaimed(ball)
     if bone not in body.data.bones:
         raise InputError(f"armature {body.name}", f"no bone {bone!r}", "one of its bones", "look at their names in pose mode")
     if last <= first:
@@ -154,6 +166,10 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
         raise InputError(f"ball {ball.name}", "it plays NLA strips", "an action of its own", "bake them: NLA editor, Edit, Bake Action")
     if ball == body or ball.type == "ARMATURE":
         raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball beside the armature")
+
+
+def _holds(ball, hold) -> bool:
+    return hold.body is not None and hold.bone in hold.body.pose.bones and hold.name in ball.constraints
 
 
 def _bones(scene, hold) -> list[Matrix]:

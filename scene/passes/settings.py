@@ -121,6 +121,9 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
     shirt: FloatVectorProperty(
         name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06), description="Colour of the shirt"
     )
+    shown: PointerProperty(
+        name="Shown On", type=bpy.types.Object, options={"HIDDEN"}, description="The armature that shows the scene now; before: what it played"
+    )
     before: PointerProperty(type=BeyondMocapBefore, description="What the body played before the scene was made")
 
 
@@ -243,8 +246,8 @@ class BeyondMocapHits(bpy.types.PropertyGroup):
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
     threshold: FloatProperty(
-        name="Threshold", default=0.0, min=0.0, max=5.0, precision=2, subtype="DISTANCE", unit="LENGTH",
-        description="Height above which a strike may be; 0: found by itself",
+        name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
+        description="Metres of height above which a strike may be; 0: found by itself",
     )
     found: StringProperty(name="Found", options={"HIDDEN"}, description="What was found, as JSON")
     lines: StringProperty(name="Lines", options={"HIDDEN"}, description="A line for each hit motion: frame, text")

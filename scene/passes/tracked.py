@@ -14,6 +14,7 @@ from ..clock import of_scene
 from ..measure import frames_per_second
 from ..settings import BeyondMocapPlayer, active_player, absolute
 from ..strip_lines import said
+from . import possession
 from .settings import KEPT
 
 if TYPE_CHECKING:
@@ -90,14 +91,19 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     from ...beyond_mocap.take import BallPath
 
     settings, room = scene.beyond_mocap_passes, bake.collection(scene)
-    target = room.objects.get(BALL) or ball.create(bpy.context, BALL, room)
+    target = next((thing for thing in room.objects if thing.get(KEPT) == BALL), None) or ball.create(bpy.context, BALL, room)
     linked.refuse(target)
     channels.check_free(target)
+    possession.check_unaimed(target)
     times = _frames_between(scene, float(solved.times[0]), float(solved.times[-1]))
     path = BallPath(times, solved.ball.at(times), np.ones(len(times), bool))
-    channels.discard(target, KEPT)
-    action = ball.write(target, path, scene, bake.frame_at(scene, float(times[0])))
-    action[KEPT] = target[KEPT] = True
+    target[KEPT] = BALL  # under any name
+
+    def lay() -> None:
+        channels.discard(target, KEPT)
+        ball.write(target, path, scene, bake.frame_at(scene, float(times[0])))[KEPT] = True
+
+    possession.anew(scene, target, lay)
     _list(scene, solved)
     settings.solved = "\n".join(lines(solved))
     return target

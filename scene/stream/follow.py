@@ -72,6 +72,8 @@ def _receive(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
         _state["seen"] = latest.number
         if _show(scene, listener, latest) == "posed":
             _shown.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
+        if receiver.listener() is None:  # given up
+            return None
     found = None
     if now - _state["looked"] >= LOOKED_EVERY:
         _state["looked"] = now
@@ -88,7 +90,7 @@ def _show(scene, listener: Listener, latest) -> str:
     made = "posed"
     if not streamed.fits(settings.body, scene, skeleton):
         if _state["bodies"] >= MOST_BODIES:
-            receiver.stop()
+            _give_up(f"The skeleton has changed {MOST_BODIES} times, so the stream is left: look at the sender")
             return ""
         _state["bodies"] += 1
         settings.body = streamed.create(bpy.context, Motion(skeleton, root, rotations, 60.0))
@@ -132,6 +134,14 @@ def tell() -> None:
     told.on, told.state, told.line, told.figures = True, status.state, status.line, "\n".join(lines)
 
 
+def _give_up(why: str) -> None:
+    """The stream ends by itself; what is told stays."""
+    receiver.stop()
+    tell()
+    told = bpy.context.window_manager.beyond_mocap_streaming
+    told.state, told.line = "failed", why
+
+
 def _tick():
     if receiver.listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
@@ -146,11 +156,10 @@ def _tick():
             try:
                 look(window.scene)
             except BeyondMocapError as error:
-                receiver.stop()
-                bpy.context.window_manager.beyond_mocap_streaming.line = str(error)
+                _give_up(str(error))
             except Exception:  # a timer that raises is never called again
                 traceback.print_exc()
-                receiver.stop()
+                _give_up("The stream has ended by an error; see the system console")
     told = bpy.context.window_manager.beyond_mocap_streaming
     if (told.figures, told.played) != before:
         _redraw()

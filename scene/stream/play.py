@@ -86,6 +86,8 @@ def target(scene: bpy.types.Scene) -> str:
     chosen, holder = scene.beyond_mocap_stream.target, rally().holder
     if chosen in names and chosen != holder:
         return chosen
+    if not names:
+        raise InputError("players", "nobody is in the list", "two or more", "take a sample, and press Play Live again")
     return names[(names.index(holder) + 1) % len(names)] if holder in names else names[0]
 
 
@@ -122,7 +124,10 @@ def look(scene: bpy.types.Scene) -> None:
             _held.pop("job")
             _ended(scene, job)
     elif _held.get("pending") is not None and seconds(scene) >= rally().free:
-        order = _order(scene, _held.pop("pending"))
+        try:
+            order = _order(scene, _held.pop("pending"))
+        except InputError as error:
+            return _over(str(error))
         _held["job"] = background.Job("live", lambda progress, cancelled, _hurry: _answer(*order, progress, cancelled))
 
 

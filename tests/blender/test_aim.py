@@ -176,6 +176,50 @@ def test_physics_goes_on_as_fast_and_gives_back(aimed, room):
     assert scene.rigidbody_world is None and "Ball Ground" not in bpy.data.objects and aimed.rigid_body is None
 
 
+def test_physics_falls_as_fast_in_centimetres(body, room):
+    scene = bpy.context.scene
+    scene.unit_settings.scale_length = 0.01
+    assert press(bpy.ops.beyond_mocap.aim_ball) == {"FINISHED"}
+    ball = next(thing for thing in bpy.data.objects if thing.beyond_mocap_aim.on)
+    bpy.ops.object.select_all(action="DESELECT")
+    ball.select_set(True)
+    bpy.context.view_layer.objects.active = ball
+    frame = ball.beyond_mocap_aim.strike + 6
+    wanted = room("aimed.shots").solved_of(ball).flight.at([14 / (24 / 1.001)])[0]
+    bpy.ops.rigidbody.world_add()
+    world = scene.rigidbody_world
+    before = world.effector_weights.gravity, world.point_cache.frame_start, world.point_cache.frame_end, world.substeps_per_frame
+    assert press(bpy.ops.beyond_mocap.ball_to_physics, frame=frame) == {"FINISHED"}
+    for at in range(1, frame + 9):
+        scene.frame_set(at)
+    shown = np.array(ball.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation)
+    assert shown / 100.0 == pytest.approx(wanted, abs=0.05)
+    assert press(bpy.ops.beyond_mocap.ball_from_physics) == {"FINISHED"}
+    world = scene.rigidbody_world
+    assert before == (world.effector_weights.gravity, world.point_cache.frame_start, world.point_cache.frame_end, world.substeps_per_frame)
+
+
+def test_two_balls_are_taken_back_in_any_order(aimed, room):
+    scene, handover = bpy.context.scene, room("aimed.handover")
+    other = aimed.copy()
+    other.animation_data.action = aimed.animation_data.action.copy()
+    scene.collection.objects.link(other)
+    bpy.context.view_layer.update()
+    for ball in (aimed, other):
+        handover.hand_over(scene, ball, aimed.beyond_mocap_aim.strike + 6, "football", [])
+    for ball in (aimed, other):
+        handover.take_back(scene, ball)
+    assert scene.rigidbody_world is None and "Ball Ground" not in bpy.data.objects and other.rigid_body is None
+
+
+def test_physics_wants_a_ball_that_is_keyed_in_place(aimed):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.11)
+    for frame in (1, 40):
+        bpy.context.object.keyframe_insert("rotation_euler", frame=frame)
+    with pytest.raises(RuntimeError, match="no keys of all three"):
+        bpy.ops.beyond_mocap.ball_to_physics(frame=20)
+
+
 @pytest.mark.parametrize("frame", [1, 5000])
 def test_physics_wants_keys_around_the_frame(aimed, frame):
     bpy.ops.object.select_all(action="DESELECT")

@@ -145,6 +145,58 @@ def test_a_body_of_the_user_s_plays_its_own_motion_again(two, room, core, clips)
     assert own.animation_data.action == action and "Mine" in bpy.data.objects
 
 
+def own_body(two, room, core, clips):
+    """A body of the user's that shows the first player's motion, and the action it had."""
+    clip = core("files.bvh").read(clips / "ready_1.bvh", 0.01)
+    press(bpy.ops.beyond_mocap.passes_make)
+    own = room("armature").create(bpy.context, room("armature").skeleton_of(settings().players[0].body, two), "Mine")
+    action = room("action").write(own, clip.motion.frames(0, 20), two)
+    settings().players[0].body = own
+    press(bpy.ops.beyond_mocap.passes_make)
+    return own, action
+
+
+def another_body(_own):
+    settings().players[0].body = None
+    press(bpy.ops.beyond_mocap.passes_make)
+
+
+def taken_out(_own):
+    settings().active_player = 0
+    press(bpy.ops.beyond_mocap.passes_list, rows="players", what="REMOVE")
+
+
+def replaced(own):
+    settings().players[0].name = "Somebody"
+    press(bpy.ops.beyond_mocap.passes_sample, sample="three")
+
+
+@pytest.mark.parametrize("change", [another_body, taken_out, replaced])
+def test_who_is_out_of_the_scene_plays_his_own_motion_again(two, room, core, clips, change):
+    own, action = own_body(two, room, core, clips)
+    assert own.animation_data.action != action
+    change(own)
+    assert own.animation_data.action == action
+
+
+def test_a_sample_of_the_same_names_keeps_what_bodies_did_before(two, room, core, clips):
+    own, action = own_body(two, room, core, clips)
+    press(bpy.ops.beyond_mocap.passes_sample, sample="three")
+    assert settings().players[0].body == own and [row.name for row in settings().players] == ["Ann", "Ben", "Cho"]
+    press(bpy.ops.beyond_mocap.passes_clear)
+    assert own.animation_data.action == action
+
+
+def test_an_aimed_ball_is_left_alone(two):
+    press(bpy.ops.beyond_mocap.passes_make)
+    settings().rally.beyond_mocap_aim.on = True
+    before = state()
+    for verb in (bpy.ops.beyond_mocap.passes_make, bpy.ops.beyond_mocap.passes_clear):
+        with pytest.raises(RuntimeError, match="it is aimed"):
+            press(verb)
+    assert state() == before
+
+
 def test_who_carries_the_ball_carries_it_on_its_new_way(two):
     press(bpy.ops.beyond_mocap.passes_make)
     last = int(settings().strikes.splitlines()[-1].partition("\t")[0])
@@ -188,6 +240,12 @@ def test_a_net_comes_and_goes(two):
     settings().net_from, settings().net_to = (-9.0, 3.0), (-9.0, 4.0)
     press(bpy.ops.beyond_mocap.passes_make)
     net = bpy.data.objects["Net"]
+    net.name = "Mesh of Ropes"
+    settings().net_height = 1.0
+    press(bpy.ops.beyond_mocap.passes_make)
+    assert "Net" not in bpy.data.objects, "a renamed net is found again"
+    settings().net_height, net.name = 1.2, "Net"
+    press(bpy.ops.beyond_mocap.passes_make)
     assert max(corner[2] for corner in net.bound_box) == pytest.approx(120.0, rel=1e-3)
     settings().net = False
     press(bpy.ops.beyond_mocap.passes_make)

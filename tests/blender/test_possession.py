@@ -122,6 +122,26 @@ def test_what_is_freed_plays_its_own_action_again(ball, body):
     assert len(bpy.data.actions) == 2
 
 
+def test_what_is_gone_of_who_carries_it_does_not_stop_the_others(ball, body, room):
+    choose(ball, body)
+    for first in (10, 40):
+        press(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=first, last=first + 10)
+    own = ball.beyond_mocap_ball.before.action
+    ball.constraints.remove(ball.constraints[0])
+    press(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=60, last=70)
+    ball.constraints.remove(ball.constraints[0])
+    press(bpy.ops.beyond_mocap.free_ball, number=2)
+    assert ball.animation_data.action == own
+
+
+def test_an_aimed_ball_is_not_carried(ball, body):
+    ball.beyond_mocap_aim.on = True
+    choose(ball, body)
+    with pytest.raises(RuntimeError, match="it is aimed"):
+        press(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=10, last=20)
+    assert not len(ball.constraints)
+
+
 def test_each_is_one_step_of_undo(body):
     ball = bpy.data.objects.new("Ball", bpy.data.meshes.new("Ball"))
     bpy.context.scene.collection.objects.link(ball)
