@@ -56,6 +56,7 @@ def launched(
     return balls
 
 
+@np.errstate(over="ignore", invalid="ignore")  # launches that are tried may be faster than numbers go
 def after(balls: Balls, ball: Ball, seconds: np.ndarray, ground: float = 0.0, most_bounces: int | None = None) -> Balls:
     """The balls `seconds` (B,) or one number later. most_bounces: then they fly on through the ground (what a solver
     wants, whose targets must move smoothly with the launch)."""

@@ -160,6 +160,7 @@ def test_what_is_written(run, tmp_path):
     ({"passes": [{"from": "Ann", "to": "Ben", "seconds": 0.2, "bounces": 0}],
       "players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [60, 0]}]}, "up to 38 m/s"),
     ({"ball": "cannon"}, "one of paper"),
+    ({"ball": {"kind": "football", "drag": 0.5, "linear_drag": 2}}, "no way"),
     ({"passes": [{"from": "Ann", "to": "Ben", "example": {"clip": "none.bvh"}}]}, "no recording"),
 ])
 def test_fouls_are_one_line_and_nothing_is_written(run, tmp_path, change, word):
