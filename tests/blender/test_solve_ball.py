@@ -88,6 +88,23 @@ def test_each_is_one_step_of_undo(match):
     assert_one_step(bpy.ops.beyond_mocap.accept_touches)
 
 
+def test_solved_again_it_is_the_same_ball_and_still_carried(match):
+    press(bpy.ops.beyond_mocap.solve_ball)
+    ball, data = bpy.data.objects["Solved Ball"], bpy.data.armatures.new("Stick")
+    ball.name, stick = "My Ball", bpy.data.objects.new("Stick", data)
+    match.collection.objects.link(stick)
+    bpy.context.view_layer.objects.active = stick
+    bpy.ops.object.mode_set(mode="EDIT")
+    data.edit_bones.new("Bone").tail = 0.0, 0.0, 1.0
+    bpy.ops.object.mode_set(mode="OBJECT")
+    ball.select_set(True)
+    press(bpy.ops.beyond_mocap.take_ball, bone="Bone", first=20, last=40)
+    press(bpy.ops.beyond_mocap.solve_ball)
+    assert "Solved Ball" not in bpy.data.objects and ball.animation_data.action.name.endswith("carried")
+    press(bpy.ops.beyond_mocap.free_ball)
+    assert ball.animation_data.action.name.endswith("path") and not len(ball.constraints)
+
+
 def test_without_a_ball_it_says_so(tmp_path):
     lines = ["time_s,x_m,y_m", *(f"{0.1 * n:.1f},{0.2 * n:.2f},0" for n in range(40))]
     (tmp_path / "alone.csv").write_text("\n".join(lines))

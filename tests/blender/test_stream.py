@@ -198,6 +198,15 @@ def test_a_body_that_was_removed_is_made_anew(room, core, port):
     assert bpy.context.scene.beyond_mocap_stream.body is not None
 
 
+def test_a_stream_that_is_given_up_says_why(room, core, port, monkeypatch):
+    monkeypatch.setattr(room("stream.follow"), "MOST_BODIES", 0)
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    told = bpy.context.window_manager.beyond_mocap_streaming
+    assert not told.on and told.state == "failed" and "skeleton has changed" in told.line
+    assert room("stream.receiver").listener() is None and bpy.context.scene.beyond_mocap_stream.body is None
+
+
 def test_a_chosen_armature_is_used(room, core, port):
     bpy.ops.beyond_mocap.import_clips(filepath=str(CLIP))
     mine = bpy.context.object
