@@ -38,8 +38,8 @@ _SENT, _TAKEN = {"kick", "header", "throw-in", "dribble"}, {"receive", "chest", 
 
 
 def in_force(plan: Plan, known: SolvedCourse | None = None) -> Plan:
-    """The plan with the ball's course solved and its key moments at the touches that they mean; without a course where it
-    is not to be solved or has no ball. known: the course, where an earlier take of the same track has it."""
+    """The plan with the ball's course solved and its key moments at the touches that they mean; without a course where
+    it is not to be solved or has no ball. known: the course, where an earlier take of the same track has it."""
     if not plan.solve_touches:
         return plan if plan.solved is None else replace(plan, solved=None)
     course = plan.solved or known or course_of_track(plan)
@@ -64,7 +64,8 @@ def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
     even = np.linspace(first, last, int(np.ceil((last - first) / _STEP)) + 1)
     times = np.union1d(even, [touch.time for touch in inside])
     begins, ends = solved.pieces[0].start, solved.pieces[-1].end
-    gone = np.array([[before.end, after.start] for before, after in zip(solved.pieces, solved.pieces[1:])]).reshape(-1, 2)
+    pairs = zip(solved.pieces, solved.pieces[1:])
+    gone = np.array([[before.end, after.start] for before, after in pairs]).reshape(-1, 2)
     unknown = (times < begins) | (times > ends)
     for end, start in gone[gone[:, 1] - gone[:, 0] > _STEP]:
         unknown |= (times > end) & (times < start)
@@ -95,8 +96,8 @@ def _touched(touch: SolvedTouch, player: str, plan: Plan) -> Touched:
 def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
     """The timeline with key moments at the touches that suit them best, each touch for one, in the order of both.
 
-    Key moments and touches are brought together as two lines of text are: a key moment without a touch costs FURTHEST, one
-    with a touch the seconds in between and what of the touch does not fit its words.
+    Key moments and touches are brought together as two lines of text are: a key moment without a touch costs FURTHEST,
+    one with a touch the seconds in between and what of the touch does not fit its words.
     """
     keys = [replace(key, solved=None) for key in timeline.keys]
     mine = [touch for touch in touches if touch.mine is not False]
@@ -140,22 +141,31 @@ def _in_order(keys: list[KeyMoment]) -> list[KeyMoment]:
             keys[number] = replace(keys[number], solved=None)
 
 
-def untouched(plan: Plan) -> list[str]:
-    """A line for every key moment that asks for a touch where the ball's course has none."""
+def untouched(take: Take, plan: Plan) -> list[str]:
+    """A line for every key moment that asks for a touch where the ball's course has none, and for every dribble in
+    which no foot touches the ball. take: `with_course`; plan: in force."""
     if plan.solved is None:
         told = "the touches of the ball are not solved: the track has no ball, or too few samples of it"
         return [told] if plan.solve_touches else []
-    return [
+    missing = [
         TimedLine(
             f"{key.time:g} s: the ball's course tells of no touch for '{' '.join(key.words)}' within {FURTHEST:g} s, "
             "it stays where it is asked for", (key.time, key.time),
         ) for key in plan.timeline.keys if striking_part(key.words) and key.solved is None
     ]  # fmt: skip
+    touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribbled])
+    return missing + [
+        TimedLine(
+            f"{span.start:g}-{span.end:g} s: no foot touches the ball in this '{DRIBBLE}': it is too short, or no foot "
+            "comes near", (span.start, span.end),
+        ) for span in plan.timeline.spans
+        if DRIBBLE in span.words and not ((touched >= span.start) & (touched <= span.end)).any()
+    ]  # fmt: skip
 
 
 def with_course(take: Take, plan: Plan) -> Take:
-    """The take with the ball as solved, through the places where it was met, and touched step by step in dribbles; as it
-    is, where nothing is solved. plan: in force."""
+    """The take with the ball as solved, through the places where it was met, and touched step by step in dribbles; as
+    it is, where nothing is solved. plan: in force."""
     if plan.solved is None or take.ball is None:
         return replace(take, solved=plan.solved)
     fps, met, times = take.motion.fps, take.ball.positions, take.ball.times

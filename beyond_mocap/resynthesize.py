@@ -151,8 +151,8 @@ def _same_ball(plan: Plan, old: Plan) -> bool:
 def _updated(
     library: Library, plan: Plan, then: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
 ):
-    """The take without pins, made by `plan` where `before` was made by `then`, both in force; its order and the frame from
-    which on it was searched in a hurry; None where it has to be made as a whole."""
+    """The take without pins, made by `plan` where `before` was made by `then`, both in force; its order and the frame
+    from which on it was searched in a hurry; None where it has to be made as a whole."""
     clock = [time.perf_counter()]
     library = _library_of_both(library, plan, before, report)
     old, new = wanted(library, then), wanted(library, plan)

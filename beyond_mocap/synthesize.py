@@ -233,7 +233,7 @@ def finished(
     take = with_course(take, plan)
     if plan.solved is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - begun})
-    return with_warnings(take, recordings, order, hurried, untouched(plan))
+    return with_warnings(take, recordings, order, hurried, untouched(take, plan))
 
 
 def with_pins(take: Take, recordings: Library) -> Take:

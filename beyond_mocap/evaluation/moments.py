@@ -22,8 +22,8 @@ class Moment:
     """How one key moment was served.
 
     asked: the timeline's line. frame: output frame nearest to the time in force (the asked or the solved one). clip,
-    clip_frame (the clip's key frame, in its own rate), None where no key of a clip is played there. played_at: seconds on
-    the track's clock at which that key frame is played, NaN where it is not. words: those that the source carries at
+    clip_frame (the clip's key frame, in its own rate), None where no key of a clip is played there. played_at: seconds
+    on the track's clock at which that key frame is played, NaN where it is not. words: those that the source carries at
     `frame`. entry, exit: first and last output frame, without a seam between, that the clip's annotated row covers.
     used_instead: words in place of the asked ones, None where the asked ones were had.
     """
@@ -150,8 +150,8 @@ def written_ball(played: Played, frame: int) -> np.ndarray:
 
 
 def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Track | None) -> list[dict]:
-    """Every touch of a dribble: its second, the foot, the largest gap of the foot's surface and the ball's while it lasts,
-    and how far the ball lies from its samples where it begins, m."""
+    """Every touch of a dribble: its second, the foot, the largest gap of the foot's surface and the ball's while it
+    lasts, and how far the ball lies from its samples where it begins, m."""
     return [
         {
             "time_s": float(played.times[touch.first]),

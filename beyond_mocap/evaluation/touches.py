@@ -1,8 +1,8 @@
 """How well touches were found: against touches that a person read, against events, against planted ones.
 
-A found touch is right within a tolerance in time of a read one of the same player; each serves once. What the reader could
-not tell counts neither way. Event files have a clock of their own: one offset for the whole file is taken out first, the one
-that makes most of them right.
+A found touch is right within a tolerance in time of a read one of the same player; each serves once. What the reader
+could not tell counts neither way. Event files have a clock of their own: one offset for the whole file is taken out
+first, the one that makes most of them right.
 """
 
 from __future__ import annotations
@@ -165,7 +165,8 @@ def _pairs(times, players, inside, touches, tolerance: float) -> list[tuple[int,
 def _roughly(times, players, reading: Reading, tolerance: float, offset: float) -> float:
     """Right ones at this offset, without each serving once."""
     times = np.asarray(times, float) - offset
+    near = [np.flatnonzero(np.abs(times - touch.time) <= tolerance) for touch in reading.touches]
     return sum(
-        any(not touch.players or players[i] in touch.players for i in np.flatnonzero(np.abs(times - touch.time) <= tolerance))
-        for touch in reading.touches
+        any(not touch.players or players[i] in touch.players for i in found)
+        for touch, found in zip(reading.touches, near)
     )

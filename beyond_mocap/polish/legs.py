@@ -24,7 +24,8 @@ class Legs:
     """A body over W frames, from its root (W, 3) m and local rotations (W, J, 4).
 
     feet: their striking surfaces, left and right; lines: both ends (W, 3) m of each. pelvis (W, 2) m; velocity (W, 2)
-    m/s and speed (W,) of it without the sway of steps; ahead (W, 2): unit, where it goes, or faces where it hardly goes.
+    m/s and speed (W,) of it without the sway of steps; ahead (W, 2): unit, where it goes, or faces where it hardly
+    goes.
     """
 
     def __init__(self, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float):
@@ -72,7 +73,7 @@ class Legs:
         return path + np.pad(aside, ((0, 0), (0, 1)))
 
     def way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(N, 2) m along the ground by which balls (N, 3) m come out of that part of the body that they are deepest in."""
+        """(N, 2) m along the ground by which balls (N, 3) m come out of the part of the body that they are deepest in."""
         away, gaps = self._away(balls, frames)
         rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
         way, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)

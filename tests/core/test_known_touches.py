@@ -134,6 +134,13 @@ def test_in_a_dribble_the_ball_is_touched_step_by_step(library, planted, timelin
     assert 2.0 <= told[0]["time_s"] < 3.0 and 7.0 < told[-1]["time_s"] <= 8.0
     ahead = take.ball.positions[:, 0] - sample(plan.track, 30.0).raw[:, 0]
     assert ahead[75:220].min() > 0.1
+    assert not any("no foot touches" in line for line in take.warnings)
+
+
+def test_a_dribble_without_a_touch_is_told(library, planted, timeline_of):
+    take = synthesize(library, planted(timeline_of((5.0, 5.15, "dribble"))))
+    assert not take.dribbled
+    assert any(line.startswith("5-5.15 s: no foot touches the ball") for line in take.warnings)
 
 
 def test_players_of_another_height_meet_it_too(library, planted, timeline_of):

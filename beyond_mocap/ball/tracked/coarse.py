@@ -31,7 +31,8 @@ def coarse_courses(
             place[flies], velocity[flies], spin[flies], lies[flies] = _in_air(
                 place[flies], velocity[flies], spin[flies], ball, step, low)  # fmt: skip
         if len(stays):
-            place[stays], velocity[stays], spin[stays] = _on_ground(place[stays], velocity[stays], spin[stays], ball, step)
+            rolling = _on_ground(place[stays], velocity[stays], spin[stays], ball, step)
+            place[stays], velocity[stays], spin[stays] = rolling
         places[index], velocities[index] = place, velocity
     return places.transpose(1, 0, 2), velocities.transpose(1, 0, 2)
 

@@ -1,7 +1,8 @@
 """Launches that explain the samples between two touches: flight with bounces, slide and roll by the physics of `ball`.
 
-All stretches are fitted at once by damped least squares: the unknowns are where the ball leaves (a little), its velocity and
-its spin; heights come out of it where the feed has none, for a ball in the air slows otherwise than one on the ground.
+All stretches are fitted at once by damped least squares: the unknowns are where the ball leaves (a little), its
+velocity and its spin; heights come out of it where the feed has none, for a ball in the air slows otherwise than one on
+the ground.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from .coarse import coarse_courses
 
 GRID = 0.04  # s between the moments in which flights are looked at
 LONGEST = 5.0  # s of a stretch
-_ROUGH_ROUNDS, _ROUNDS, _FINE_ROUNDS = 3, 5, 1  # of descending: for each of _UPWARD, by coarse steps and then by the physics as it is
+_ROUGH_ROUNDS, _ROUNDS = 3, 5  # of descending by coarse steps: for each of _UPWARD; from the best of them
+_FINE_ROUNDS = 1  # by the physics as it is
 _UPWARD = (0.0, 2.0, 4.5, 7.0, 10.0, 14.0)  # m/s, tried where heights are not known
 _LOW_ONES = 2  # of them hardly leave the ground
 _CLEARLY, _MARGIN = 0.7, 3.0  # share of the lower one's cost, and nats twice, by which a loft must be better
@@ -38,8 +40,8 @@ _MOST = 40  # samples of a stretch that are looked at
 class Stretches:
     """S stretches between touches, each with up to K samples (rows padded with weight zero).
 
-    seconds: (S,) s from start to end. start, end: (S, 3) m, z NaN where unknown. velocity: (S, 3) m/s at the start, z NaN
-    where unknown. since: (S, K) s after the start. points: (S, K, 3) m. weight: (S, K) 1/m; weight_z (S, K).
+    seconds: (S,) s from start to end. start, end: (S, 3) m, and velocity: (S, 3) m/s at the start, z NaN where unknown.
+    since: (S, K) s after the start. points: (S, K, 3) m. weight, weight_z: (S, K) 1/m, over the ground and in height.
     """
 
     seconds: np.ndarray
@@ -224,14 +226,16 @@ def _descend(stretches: Stretches, unknown, ball: Ball, rounds: int, follow) -> 
         normal = np.einsum("isr,jsr->sij", slope, slope)
         right = -np.einsum("isr,sr->si", slope, off)
         diagonal = np.einsum("sii->si", normal) + 1e-9
-        step = np.linalg.solve(normal + (damping[:, None] * diagonal)[..., None] * np.eye(count), right[..., None])[..., 0]
+        damped = normal + (damping[:, None] * diagonal)[..., None] * np.eye(count)
+        step = np.linalg.solve(damped, right[..., None])[..., 0]
         tried = unknown + np.clip(step, -6.0 * _SPUN, 6.0 * _SPUN)
         off_tried = _misses(stretches, tried, *_ways(stretches, tried, ball, follow))
         cost_tried = (off_tried**2).sum(axis=1)
         good = cost_tried < cost
         better = np.where(good, cost - cost_tried, 0.0) > _ENOUGH * cost
         unknown, off = np.where(good[:, None], tried, unknown), np.where(good[:, None], off_tried, off)
-        cost, damping = np.where(good, cost_tried, cost), np.clip(np.where(good, damping / 5.0, damping * 8.0), 1e-6, 1e4)
+        cost = np.where(good, cost_tried, cost)
+        damping = np.clip(np.where(good, damping / 5.0, damping * 8.0), 1e-6, 1e4)
         if not better.any():
             break
     return unknown, cost

@@ -25,9 +25,11 @@ _HIGH = 0.6  # m, where a foot hardly takes a ball
 _AIR = 0.35  # m of the centre above the ground, from which it flies
 
 
-def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool, cancelled=None) -> list[BallPiece]:
-    """The pieces (in order, without gaps in a window), those between neighbouring `moments` (K,) s of touches replaced by
-    flights where these fit. heights: whether those of the samples are meant."""
+def flown(
+    samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool, cancelled=None
+) -> list[BallPiece]:
+    """The pieces (in order, without gaps in a window), those between neighbouring `moments` (K,) s of touches replaced
+    by flights where these fit. heights: whether those of the samples are meant."""
     groups = _between(pieces, moments)
     groups = [group for group in groups if _worth(group)]
     if not groups:
@@ -75,7 +77,8 @@ def _exchanged(pieces, groups, stretches, flights, offs) -> list[BallPiece]:
             numbers = [index[id(piece)] for piece in group]
             replaced[numbers[0]] = _brought(flight, stretches, number, _ends(group))
             gone.update(numbers)
-    return [replaced.get(number, piece) for number, piece in enumerate(pieces) if number not in gone or number in replaced]
+    kept = [number for number in range(len(pieces)) if number not in gone or number in replaced]
+    return [replaced.get(number, pieces[number]) for number in kept]
 
 
 def _between(pieces: list[BallPiece], moments: np.ndarray) -> list[list[BallPiece]]:
@@ -191,7 +194,8 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     shift = np.stack([ends[0] - piece.positions[0], ends[1] - piece.positions[-1]])[:, :2]
     measured = stretches.weight[number] > _TRUSTED
     since = stretches.since[number][measured]
-    there = np.stack([np.interp(since, piece.times - piece.start, piece.positions[:, axis]) for axis in range(2)], axis=1)
+    after = piece.times - piece.start
+    there = np.stack([np.interp(since, after, piece.positions[:, axis]) for axis in range(2)], axis=1)
     sound = _sound(np.linalg.norm(there - stretches.points[number][measured, :2], axis=1), np.ones(len(since), bool))
     measured = np.flatnonzero(measured)[sound]
     since, there = since[sound], there[sound]

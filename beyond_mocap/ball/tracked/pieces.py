@@ -1,8 +1,8 @@
 """Pieces of the ball's path: smooth curves of third degree through runs of samples, many at once.
 
-A piece is x(t) = p + v t + a t^2 / 2 + j t^3 / 6 from its first moment on. Nothing but friction and drag, and gravity in
-the air, bends it: a and j are held near zero by their usual size at the piece's speed. So a short piece is nearly a line,
-and a slow ball that gains speed was touched.
+A piece is x(t) = p + v t + a t^2 / 2 + j t^3 / 6 from its first moment on. Nothing but friction and drag, and gravity
+in the air, bends it: a and j are held near zero by their usual size at the piece's speed. So a short piece is nearly a
+line, and a slow ball that gains speed was touched.
 """
 
 from __future__ import annotations
@@ -106,7 +106,8 @@ def _solve(times, points, weights, cuts, begin, upto) -> Fits:
     speed = np.linalg.norm(value[row, column] - value[row, 0], axis=1) / seconds
     bend = REST_ACCELERATION + BY_SPEED * speed
     if points.shape[1] == 3:
-        bend = np.where(np.maximum.accumulate(value[..., 2], axis=1)[row, column] > IN_AIR, np.maximum(bend, FALLING), bend)
+        highest = np.maximum.accumulate(value[..., 2], axis=1)[row, column]
+        bend = np.where(highest > IN_AIR, np.maximum(bend, FALLING), bend)
     rigid = np.zeros((len(row), 4))
     rigid[:, 0], rigid[:, 1], rigid[:, 2] = 1e-6, USUAL_SPEED**-2, 4.0 / bend**2
     rigid[:, 3] = 36.0 / (REST_JERK + BY_SPEED * speed) ** 2

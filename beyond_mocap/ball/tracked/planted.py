@@ -1,8 +1,8 @@
 """A made match of which every touch is known: for tests, for figures, and to see what a solver makes of a feed.
 
-Twenty-two players wander about their places in two formations. Somebody has the ball, drives it on or not, and plays it to
-another of his team, along the ground or through the air; the ball obeys `ball.flight`. Whoever takes it comes to where the
-ball is, with an opponent near him; opponents take some balls; some go out and are thrown in.
+Twenty-two players wander about their places in two formations. Somebody has the ball, drives it on or not, and plays
+it to another of his team, along the ground or through the air; the ball obeys `ball.flight`. Whoever takes it comes to
+where the ball is, with an opponent near him; opponents take some balls; some go out and are thrown in.
 `planted_feed.sampled` makes of it what a feed would deliver.
 """
 

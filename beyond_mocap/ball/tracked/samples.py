@@ -17,6 +17,7 @@ _SCATTER_WINDOW = 1.2  # seconds over which the scatter is taken
 _LEAST_SCATTER, _MOST_SCATTER = 0.03, 0.35  # m
 _WRONG = 6.0  # times the scatter
 _FARTHEST = 1e4  # m from the middle; beyond is no place
+_MEDIAN_LENGTH = 1.177  # of vectors of two normal values
 _LOW = 0.3  # m, of a ball on the ground
 
 
@@ -24,10 +25,10 @@ _LOW = 0.3  # m, of a ball on the ground
 class Samples:
     """N samples of the ball.
 
-    times: (N,) s, growing. positions: (N, 3) m of its centre, z NaN where the feed has no height; known (N,) bool, whether x and y
-    are numbers. filled: (N,) bool, made by the feed at constant velocity. outlier: (N,) bool, single samples far from
-    both neighbours. scatter, scatter_z: (N,) m, standard deviation of one coordinate around it. interval: s, the usual
-    step.
+    times: (N,) s, growing. positions: (N, 3) m of its centre, z NaN where the feed has no height; known (N,) bool,
+    whether x and y are numbers. filled: (N,) bool, made by the feed at constant velocity. outlier: (N,) bool, single
+    samples far from both neighbours. scatter: (N,) m, standard deviation of x and of y around it. interval: s, the
+    usual step.
     """
 
     times: np.ndarray
@@ -36,7 +37,6 @@ class Samples:
     filled: np.ndarray
     outlier: np.ndarray
     scatter: np.ndarray
-    scatter_z: np.ndarray
     interval: float
 
     @property
@@ -67,12 +67,10 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
         raise InputError(where, f"{np.count_nonzero(known)} samples of the ball", "at least five", "a feed with a ball")
     interval = float(np.median(np.diff(times)))
     filled = _filled(ball[:, :2], known, interval)
-    scatter = _scatter(ball[:, :2], known, interval)
+    scatter = _scatter(ball[:, :2], interval)
     outlier = _outliers(times, ball[:, :2], known, scatter)
-    ball, has_height = _centred(ball), np.isfinite(ball[:, 2])
-    scatter_z = _scatter(ball[:, 2:], has_height, interval)
     flags = (frozen_array(flag, bool) for flag in (known, filled & known, outlier))
-    return Samples(frozen_array(times), frozen_array(ball), *flags, frozen_array(scatter), frozen_array(scatter_z), interval)
+    return Samples(frozen_array(times), frozen_array(_centred(ball)), *flags, frozen_array(scatter), interval)
 
 
 def _centred(ball: np.ndarray) -> np.ndarray:
@@ -107,21 +105,19 @@ def _filled(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarra
     return np.cumsum(inside[:-1]) > 0
 
 
-def _scatter(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
-    """(N,) standard deviation of a coordinate, from second differences: the middle one over a window around each."""
+def _scatter(points: np.ndarray, interval: float) -> np.ndarray:
+    """(N,) standard deviation of x and of y of points (N, 2), from second differences: the middle one over a window
+    around each."""
     from scipy.ndimage import median_filter
 
-    count, axes = points.shape
-    if np.count_nonzero(known) < 5:
-        return np.full(count, _LEAST_SCATTER)
+    count = len(points)
     bends = np.full(count, np.nan)
     bends[1:-1] = np.linalg.norm(np.diff(points, 2, axis=0), axis=1)
     there = np.flatnonzero(np.isfinite(bends))
     if len(there) < 3:
         return np.full(count, _LEAST_SCATTER)
     middle = median_filter(bends[there], max(7, 2 * round(_SCATTER_WINDOW / interval / 2) + 1), mode="nearest")
-    per_axis = {1: 0.674, 2: 1.177}[axes]  # median of a normal value, of the length of two
-    found = np.interp(np.arange(count), there, middle) / (per_axis * np.sqrt(6.0))
+    found = np.interp(np.arange(count), there, middle) / (_MEDIAN_LENGTH * np.sqrt(6.0))
     return np.clip(found, _LEAST_SCATTER, _MOST_SCATTER)
 
 

@@ -25,7 +25,7 @@ from .samples import Samples, read_samples
 
 PITCH = (105.0, 68.0)
 _GAP = 1.5  # s without a sample, over which nothing is solved
-_SHORTEST, _FEWEST = 0.3, 5  # s and samples that can be solved
+_SHORTEST, _FEWEST = 0.3, 5  # s that are solved where there are longer stretches; samples that can be
 _TOGETHER = 0.06  # s in which samples err together: they count as one
 _STEP = 0.04  # s between the knots of a path
 _BLEND = 0.2  # s over which a path is brought to the place of a touch
@@ -139,17 +139,17 @@ def solve(
 
 
 def _windows(samples: Samples, where: str) -> list[slice]:
-    """The stretches in which the ball is known, gaps of up to _GAP bridged; the longest at least."""
+    """The stretches in which the ball is known, gaps of up to _GAP bridged; one at least."""
     there = np.flatnonzero(samples.used)
     breaks = np.flatnonzero(np.diff(samples.times[there]) > _GAP)
     firsts, lasts = [there[0], *there[breaks + 1]], [*there[breaks], there[-1]]
     spans = [slice(int(first), int(last) + 1) for first, last in zip(firsts, lasts)]
-    kept = [s for s in spans if samples.times[s.stop - 1] - samples.times[s.start] >= _SHORTEST and s.stop - s.start >= _FEWEST]
-    longest = max(spans, key=lambda span: span.stop - span.start)
-    if longest.stop - longest.start < _FEWEST:
+    spans = [span for span in spans if span.stop - span.start >= _FEWEST]
+    if not spans:
         found = f"the ball's samples are mostly more than {_GAP:g} s apart"
         raise InputError(where, found, "at least five closer together", "a feed that sees the ball more often")
-    return kept or [longest]
+    kept = [span for span in spans if samples.times[span.stop - 1] - samples.times[span.start] >= _SHORTEST]
+    return kept or spans[:1]
 
 
 def _bridged(samples: Samples, window: slice) -> np.ndarray:

@@ -1,9 +1,9 @@
 """Which cuts of the ball's path are touches, and by whom: one search over all of them at once.
 
 Between two cuts lies a smooth piece. A cut is one of three things, each with a probability of what is seen there:
-**touch**: a player is near enough, and the velocity changes by any amount; **free**: a bounce, the beginning of rolling,
-a corner that the feed made: the ball slows a little and keeps its way; **nothing**: the cut is left out, and one piece
-goes through. The dearest explanation loses. Costs are negative logarithms of probabilities (nats).
+**touch**: a player is near enough, and the velocity changes by any amount; **free**: a bounce, the beginning of
+rolling, a corner that the feed made: the ball slows a little and keeps its way; **nothing**: the cut is left out, and
+one piece goes through. The dearest explanation loses. Costs are negative logarithms of probabilities (nats).
 """
 
 from __future__ import annotations
