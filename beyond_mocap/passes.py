@@ -232,7 +232,10 @@ class _Reach:
                 hits = tuple(own.hits[index] for index in order[:1])
             if not hits:
                 with_what = f"the {side} {part}" if wanted else part
-                raise NotInLibrary(f"no clip of the library strikes with {with_what}", self._others())
+                others = self._others()
+                other = f"ask for another part ({', '.join(others)}) or " if others else ""
+                message = f"no clip of the library strikes with {with_what}; {other}add clips that do"
+                raise NotInLibrary(message, others)
             self._moments[key] = strike_moments(self.library, hits, tool, size)
         return self._moments[key]
 

@@ -214,7 +214,8 @@ def _check_name(name: str, where: str) -> None:
     """A player's name is also his files'."""
     odd = not name.isprintable() or name != name.strip() or name.startswith(".") or set(name) & set('/\\:*?"<>|')
     if not name or odd or len(name) > 60 or name.casefold() in RESERVED:
-        raise InputError(where, "a name that his files cannot have", "letters, digits, blanks between", "rename him")
+        expected = "up to 60 letters, digits, blanks between"
+        raise InputError(where, "a name that his files cannot have", expected, "rename him")
 
 
 def _check_pair(one: Player, other: Player) -> None:
@@ -227,7 +228,7 @@ def _check_pair(one: Player, other: Player) -> None:
 
 def _check_place(place: Place, where: str) -> None:
     if len(place) != 2 or not all(math.isfinite(value) and abs(value) <= LIMITS["metres"][1] for value in place):
-        raise InputError(where, f"the place {place}", "[x, y] in metres")
+        raise InputError(where, f"the place {place}", f"[x, y] in metres, each up to {LIMITS['metres'][1]:g}")
 
 
 def _check_part(part: str, side: str, where: str) -> None:

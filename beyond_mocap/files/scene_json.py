@@ -234,7 +234,7 @@ def _check_names(value, where: str, known, needed) -> None:
             raise InputError(where, f"no {name!r}", f"{', '.join(needed)}")
     for name in value:
         if name not in known:
-            raise InputError(where, _shown(name), f"one of {', '.join(known)}", "check the spelling")
+            raise InputError(where, _shown(name), f"one of {', '.join(sorted(known))}", "check the spelling")
 
 
 def _number(value, where: str) -> float:

@@ -151,7 +151,8 @@ def read_match(
 
 def _existing(path: str | os.PathLike) -> Path:
     if not Path(path).is_file():
-        raise InputError(path, "no such file", "a tracking file", "check the path")
+        found = "is a folder" if Path(path).is_dir() else "no such file"
+        raise InputError(path, found, "a tracking file", "check the path")
     return Path(path)
 
 
