@@ -59,7 +59,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     names = {player.name for player in played.players}
     others = sorted(path.stem for path in options.out.glob("*.bvh") if path.stem not in names)
     if others:
-        told.note(f"{options.out}: {', '.join(others)} not of this scene, left there")
+        told.note(f"{options.out}: of another scene, left there: {', '.join(others)}")
     gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
     print(f"{options.out}: {len(played.players)} players, {len(table)} strikes in {played.plan.seconds:.1f} s, "
           f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip

@@ -161,6 +161,8 @@ def test_what_is_written(run, tmp_path):
       "players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [60, 0]}]}, "up to 38 m/s"),
     ({"ball": "cannon"}, "one of paper"),
     ({"ball": {"kind": "football", "drag": 0.5, "linear_drag": 2}}, "no way"),
+    ({"pases": []}, "one of ball, defaults, directions"),
+    ({"players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [0, 1e6]}]}, "up to 1000"),
     ({"passes": [{"from": "Ann", "to": "Ben", "example": {"clip": "none.bvh"}}]}, "no recording"),
 ])
 def test_fouls_are_one_line_and_nothing_is_written(run, tmp_path, change, word):
@@ -169,13 +171,27 @@ def test_fouls_are_one_line_and_nothing_is_written(run, tmp_path, change, word):
     assert not (tmp_path / "out").exists()
 
 
+def test_players_of_another_scene_are_named_and_stay(run, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "Zoe.bvh").write_text("hers")
+    status, _, error = run({**SAMPLES["dropped"], "passes": SAMPLES["dropped"]["passes"][3:]})
+    assert status == 0 and [line for line in error if "left there: Zoe" in line]
+    assert (tmp_path / "out" / "Zoe.bvh").read_text() == "hers"
+
+
+def test_a_folder_without_a_name_is_none(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["passes", "scene.json", "--library", ".", "--out", ""]) == 2
+    assert "no folder is named" in capfd.readouterr().err and not list(tmp_path.iterdir())
+
+
 def test_other_fouls(run, tmp_path, clips_folder, monkeypatch):
     assert run("{")[0] == 2
     assert run(SAMPLES["three"], library=tmp_path / "none")[0] == 2
     assert run(SAMPLES["three"], out="scene.json")[0] == 2
     assert run(SAMPLES["three"], out="no/such/place")[0] == 2
     status, _, error = run({**SAMPLES["three"], "defaults": {"part": "chest"}}, library=clips_folder)
-    assert status == 3 and len(error) == 1 and "chest" in error[0]
+    assert status == 3 and len(error) == 1 and "chest" in error[0] and "add clips" in error[0]
     monkeypatch.setattr(Told, "cancelled", lambda self: True)
     assert run(SAMPLES["three"])[0] == 130
     assert not (tmp_path / "out").exists()
