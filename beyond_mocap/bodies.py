@@ -1,4 +1,5 @@
-"""The recipe of one player of a passing scene: his hit motions where and when they were ordered, and what he does between.
+"""The recipe of one player of a passing scene: his hit motions where and when they were ordered, and what he does
+between.
 
 The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
 `ball.way` says where he goes and faces; feet are held or step (`lay_out.footed`); his head follows the ball
@@ -69,8 +70,8 @@ class BodySettings:
 @dataclass(frozen=True, eq=False)
 class PlayerMotion:
     """One player of a passing scene. take: his motion with contacts, provenance and all, as `synthesize` gives it. gaps
-    (K,) m between part and ball at each order's strike, NaN where he misses; moved (K,) m that the part was moved for it.
-    warnings: what could not be as ordered."""
+    (K,) m between part and ball at each order's strike, NaN where he misses; moved (K,) m that the part was moved for
+    it. warnings: what could not be as ordered."""
 
     take: Take
     gaps: np.ndarray
@@ -92,8 +93,8 @@ def player_motion(
 ) -> PlayerMotion:
     """The motion of a player who begins at `stance` and strikes as `orders` say.
 
-    ball: its path at `fps` over the whole scene, whose first time is the motion's; frames: how many (all of the ball's).
-    The same input gives the same bits. InputError for orders outside the scene or two at once; Cancelled.
+    ball: its path at `fps` over the whole scene, whose first time is the motion's; frames: how many (all of the
+    ball's). The same input gives the same bits. InputError for orders outside the scene or two at once; Cancelled.
     """
     from threadpoolctl import threadpool_limits
 

@@ -1,8 +1,10 @@
-"""How alike every two frames of a library are (Ball handling §4 eq. 1), in the form in which the path search asks for it.
+"""How alike every two frames of a library are (Ball handling §4 eq. 1), in the form in which the path search asks for
+it.
 
-`links` finds the best transition between two given stretches; a player of a passing scene may leave any clip for any other
-between his strikes, and weighs how alike the poses are against where he has to go. So the search gets eq. 1's poses of all
-frames: positions and velocities of the main bones, the root over the origin and facing X, times their weights.
+`links` finds the best transition between two given stretches; a player of a passing scene may leave any clip for any
+other between his strikes, and weighs how alike the poses are against where he has to go. So the search gets eq. 1's
+poses of all frames: positions and velocities of the main bones, the root over the origin and facing X, times their
+weights.
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ _known: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictiona
 
 
 def alike(library: Library, weights: BoneWeights = BoneWeights()) -> np.ndarray:
-    """(N, 12, 3) float32 of the library's N frames: the sum of the distances of two frames' rows is eq. 1, over the sum of
-    the usual weights of positions, so that it is about the distance in m of one bone. Kept beside the library's cache."""
+    """(N, 12, 3) float32 of the library's N frames: the sum of the distances of two frames' rows is eq. 1, over the sum
+    of the usual weights of positions, so that it is about the distance in m of one bone. Kept beside the library's
+    cache."""
     scale = sum(BoneWeights().position)
     measure = np.array([*weights.position, *weights.velocity]) / scale
     return bones(library) * measure.astype(np.float32)[:, None]

@@ -30,8 +30,8 @@ _SECONDS = 1.0 / 120.0
 
 @dataclass(frozen=True)
 class Tool:
-    """A straight thing in the hand, `length` m beyond the hand's joint along the line of the forearm; it strikes with its
-    last `reach` m, all within `radius` m of that line. The defaults are a tennis racquet's."""
+    """A straight thing in the hand, `length` m beyond the hand's joint along the line of the forearm; it strikes with
+    its last `reach` m, all within `radius` m of that line. The defaults are a tennis racquet's."""
 
     name: str = "racquet"
     length: float = 0.66
@@ -46,7 +46,8 @@ class Tool:
         return f"{self.name}: {self.length:g} m long, strikes with {self.reach:g} m, {self.radius:g} m thick"
 
     def for_body(self, size: float) -> Tool:
-        """The tool for work in the size of the library, which the body is `size` times as large as: it keeps its own."""
+        """The tool for work in the size of the library, which the body is `size` times as large as: it keeps its
+        own."""
         return replace(self, length=self.length / size, radius=self.radius / size, reach=self.reach / size)
 
 

@@ -41,8 +41,8 @@ class MatchWeights:
 
 @dataclass(frozen=True, eq=False)
 class LibraryHit:
-    """A hit motion of a library: the clip's index, the hit motion in the clip's own frames, and whether the clip's words
-    name the moment; then that is its key."""
+    """A hit motion of a library: the clip's index, the hit motion in the clip's own frames, and whether the clip's
+    words name the moment; then that is its key."""
 
     clip: int
     hit: HitMotion
@@ -58,8 +58,8 @@ class HitLibrary:
 
     @staticmethod
     def of(library: Library, part: str = "foot", tool: Tool | None = None) -> "HitLibrary":
-        """The hit motions of all clips of a library; kept beside its cache. Where words say what a clip shows, only what
-        they call a touch of this part counts. InputError for a part that the skeleton lacks."""
+        """The hit motions of all clips of a library; kept beside its cache. Where words say what a clip shows, only
+        what they call a touch of this part counts. InputError for a part that the skeleton lacks."""
         name = f"hits_{sha256(repr((part, tool)).encode()).hexdigest()[:16]}"  # joints may be called Head, or a/b
         arrays = kept.load(library, name)
         if arrays is not None:
@@ -190,8 +190,8 @@ def _names(words, part: str, side: str) -> bool:
 
 
 def _told(clip: Clip, hit: HitMotion) -> bool:
-    """Whether the clip's words call this a touch of the part, or say nothing here but elsewhere in the clip; words do not
-    know tools and joints."""
+    """Whether the clip's words call this a touch of the part, or say nothing here but elsewhere in the clip; words do
+    not know tools and joints."""
     if hit.part not in ("foot", "head", "chest", "hand"):
         return True
     here = [row.words for row in clip.annotations if row.start <= hit.key <= row.end]

@@ -1,17 +1,17 @@
 """Hit analysis: when a part of the body can strike a ball, read from its movement alone (Ball handling §3, Fig. 2, 3).
 
-A **high frame** is one in which the part is higher than around it and above a threshold; a **fast frame** one in which it
-is faster than around it. Between a high frame and the fast frame beside it lies the **ball stretch**, in which a ball can
-be struck. The **hit motion** goes from the lowest place before the high frame to the lowest one after it; what lies
-between hit motions are **link stretches**, in which one clip can be left for another.
+A **high frame** is one in which the part is higher than around it and above a threshold; a **fast frame** one in which
+it is faster than around it. Between a high frame and the fast frame beside it lies the **ball stretch**, in which a
+ball can be struck. The **hit motion** goes from the lowest place before the high frame to the lowest one after it; what
+lies between hit motions are **link stretches**, in which one clip can be left for another.
 
 Nobody observed a ball: the strike's frame is the likeliest one, where the part is fastest. On recorded kicks that is
 within 3 frames (at 120 per second) of where the foot's peak was labelled, which may lead the contact by as much.
 
 What the paper leaves open, and what is done here: positions are smoothed by 0.1 s before they are compared, because
-optical markers and suits shake at an impact; a kick's swing passes the ground at its fastest, so a lowest place ends the
-hit motion only where the part is slow too; steps of walking and running lift the foot as well and are told from hits by
-the body's own speed.
+optical markers and suits shake at an impact; a kick's swing passes the ground at its fastest, so a lowest place ends
+the hit motion only where the part is slow too; steps of walking and running lift the foot as well and are told from
+hits by the body's own speed.
 """
 
 from __future__ import annotations
@@ -80,9 +80,9 @@ class HitMotion:
 class Hits:
     """What the hit analysis found in one motion.
 
-    height (T,): of the part above the ground, m; speed (T,): its speed, m/s. highs, fasts: frames. threshold: the height
-    in m above which high frames were looked for. motions: in order of time, without overlap. ball_stretches, links:
-    (first, last) frames, both included. place (T, 3): the part, m, world.
+    height (T,): of the part above the ground, m; speed (T,): its speed, m/s. highs, fasts: frames. threshold: the
+    height in m above which high frames were looked for. motions: in order of time, without overlap. ball_stretches,
+    links: (first, last) frames, both included. place (T, 3): the part, m, world.
     """
 
     part: str
@@ -114,11 +114,11 @@ def analyse(
 ) -> Hits:
     """Where `part` of one side can strike a ball.
 
-    part: "foot", "head", "chest", "hand", "tool" (held in that side's hand), or a joint's name. side: "left" or "right",
-    no matter for head and chest. threshold: m above the ground over which the part has to rise; None: found from the
-    heights it reaches, and steps of walking and running are left out. joint: a joint's name to look at instead of the
-    part's own place. tool: what is in the hand (default: a racquet). InputError: a side that is neither, a part or
-    joint that the skeleton lacks, fewer than three frames, a threshold or poses that are no numbers.
+    part: "foot", "head", "chest", "hand", "tool" (held in that side's hand), or a joint's name. side: "left" or
+    "right", no matter for head and chest. threshold: m above the ground over which the part has to rise; None: found
+    from the heights it reaches, and steps of walking and running are left out. joint: a joint's name to look at instead
+    of the part's own place. tool: what is in the hand (default: a racquet). InputError: a side that is neither, a part
+    or joint that the skeleton lacks, fewer than three frames, a threshold or poses that are no numbers.
     """
     _check(motion, threshold)
     positions, rotations = forward_kinematics(motion)
@@ -290,8 +290,8 @@ def _lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
 
 def _is_hit(span: tuple[int, int], part: str, way: _Way, body: _Body, other: np.ndarray | None) -> bool:
     """Whether the part is faster than a step or the swing of an arm at this speed of the body. Feet that walk reach 2.7
-    times the body's speed and half a metre per second more, in a run 2.1 times; recorded kicks more than 4 times. A foot
-    that strikes is also faster than the one that stands (`other`, (T,) m/s): in a jump both go alike."""
+    times the body's speed and half a metre per second more, in a run 2.1 times; recorded kicks more than 4 times. A
+    foot that strikes is also faster than the one that stands (`other`, (T,) m/s): in a jump both go alike."""
     key = span[0] + int(np.argmax(way.speed[span[0] : span[1] + 1]))
     if key in span or way.speed[key] < _LEAST_SPEED.get(part, 1.0):
         return False

@@ -161,8 +161,8 @@ class Transitions:
         return float(frames[0][i]), float(frames[1][j]), float(total[i, j])
 
     def _around(self, number: int, frame: float) -> tuple[np.ndarray, np.ndarray]:
-        """Fine frames (K,) from a grid step before `frame` to one after the transition's end, within the link, and their
-        weighted poses (K, 12, 3)."""
+        """Fine frames (K,) from a grid step before `frame` to one after the transition's end, within the link, and
+        their weighted poses (K, 12, 3)."""
         link = self.links[number]
         motion = self.library.clips[link.clip].recording
         step = motion.fps / _FINE
@@ -204,8 +204,8 @@ def _best(library: Library, links: tuple[Link, ...], seconds: float, weights: Bo
 
 
 def _nearest(rows: np.ndarray, every: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of S windows (r, S, D) and which of S windows (n, S, D) are nearest to each other, for all pairs: two (r, n)
-    arrays of indices into S."""
+    """Which of S windows (r, S, D) and which of S windows (n, S, D) are nearest to each other, for all pairs: two (r,
+    n) arrays of indices into S."""
     count, longest, width = every.shape
     mine, others = rows.reshape(-1, width), every.reshape(-1, width)
     square = mine @ others.T

@@ -26,8 +26,8 @@ class HitOrder:
     time: s. clip: index into the library's clips; hit: the hit motion, frames in the clip's own rate; strike_frame: the
     one that strikes, in that rate. place (2,) m and facing rad: of the root on the ground and of the heading at the
     strike. ball (3,) m: the ball's centre then; normal (3,): unit, the way from the part to the ball. part, side: of
-    `contact.PARTS` or a joint's name. tool: what is in the hand. kind: toss, pass, attack or receive. touches: whether he
-    meets the ball; who misses it plays on as recorded.
+    `contact.PARTS` or a joint's name. tool: what is in the hand. kind: toss, pass, attack or receive. touches: whether
+    he meets the ball; who misses it plays on as recorded.
     """
 
     time: float

@@ -1,8 +1,9 @@
-"""Where a player of a passing scene goes: as recorded around each of his hit motions, and between them quietly to where the
-next one begins.
+"""Where a player of a passing scene goes: as recorded around each of his hit motions, and between them quietly to where
+the next one begins.
 
-A hit motion is laid so that its strike is at the ordered place and facing; its recorded run-up and run-out belong to it as
-far as there is time. What is left between two of them is walked as soon as the first one is over, and then he stands.
+A hit motion is laid so that its strike is at the ordered place and facing; its recorded run-up and run-out belong to it
+as far as there is time. What is left between two of them is walked as soon as the first one is over, and then he
+stands.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ _SHARE = 0.7  # of the time between two hits that run-out and run-up may take
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A hit motion laid on the pitch: its clip turned by `turn` rad about the vertical, so that at the strike its root is
-    at the ordered place; one second of the scene is one of the clip. first, last: frames of the clip, in its own rate,
-    between which it is played: the hit motion, and as much of its run-up and run-out as there is time for."""
+    """A hit motion laid on the pitch: its clip turned by `turn` rad about the vertical, so that at the strike its root
+    is at the ordered place; one second of the scene is one of the clip. first, last: frames of the clip, in its own
+    rate, between which it is played: the hit motion, and as much of its run-up and run-out as there is time for."""
 
     library: Library
     order: HitOrder
@@ -127,8 +128,8 @@ class Placed:
 
 
 def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[Placed]:
-    """The hit motions of one player as ordered, in the order of time, with run-up and run-out; start: second in which he
-    begins. None is in the other's way: of the time between two they take _SHARE at most."""
+    """The hit motions of one player as ordered, in the order of time, with run-up and run-out; start: second in which
+    he begins. None is in the other's way: of the time between two they take _SHARE at most."""
     hits = [Placed.of(library, order) for order in orders]
     leads = [[hit.lead(-1), hit.lead(1)] for hit in hits]
     ends, starts = [start, *(hit.end for hit in hits)], [*(hit.start for hit in hits), np.inf]
@@ -145,8 +146,8 @@ def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[P
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """positions (T, 2) m of the path without sway; facing (T,) rad within the hit motions, unwrapped the short way round
-    from each to the next, NaN between them; first, last: facing before and after all of them."""
+    """positions (T, 2) m of the path without sway; facing (T,) rad within the hit motions, unwrapped the short way
+    round from each to the next, NaN between them; first, last: facing before and after all of them."""
 
     positions: np.ndarray
     facing: np.ndarray

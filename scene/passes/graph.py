@@ -1,7 +1,7 @@
 """The curves of a hit analysis as a small picture for the panel (Ball handling Fig. 2).
 
-Above the height of the part, below its speed. Thin red lines stand where it is highest, magenta ones where it is fastest,
-as in the paper; at the foot red bars are the stretches in which a ball can be hit, blue ones the hit motions.
+Above the height of the part, below its speed. Thin red lines stand where it is highest, magenta ones where it is
+fastest, as in the paper; at the foot red bars are the stretches in which a ball can be hit, blue ones the hit motions.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""What a player strikes with, such as a racquet, as an object that goes with his hand: where the core's contact is, there it is."""
+"""What a player strikes with, such as a racquet, as an object that goes with his hand: where the core's contact is,
+there it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Hit analysis of an armature: what the core finds in its motion, kept for the panel and set as markers on its action."""
+"""Hit analysis of an armature: what the core finds in its motion, kept for the panel and set as markers on its
+action."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ _COLUMNS = 480
 
 
 def motion_of(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
-    """What an armature does, at the scene's rate, and the scene frame of its first pose. InputError where it does not move."""
+    """What an armature does, at the scene's rate, and the scene frame of its first pose. InputError where it does not
+    move."""
     if body.beyond_mocap_ride.on or (channels.playing(body)[0] is not None and not rides_as_rig(body)):
         return action.read(body, scene), action.first_frame(body)
     read = carrier_of(body).read(scene)
@@ -75,7 +77,8 @@ def summary(found: "Hits", first: int) -> dict:
 
 
 def lines(found: "Hits", first: int) -> list[str]:
-    """A line for each hit motion: the scene frame of its strike, a tab, its speed, and the frames between which a ball can be hit."""
+    """A line for each hit motion: the scene frame of its strike, a tab, its speed, and the frames between which a ball
+    can be hit."""
     told = []
     for one in found.motions:
         low, high = (first + frame for frame in one.ball_stretch)

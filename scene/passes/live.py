@@ -1,9 +1,9 @@
-"""Sees that a passing scene has been edited, waits until the hand has come to rest, and has it made again. While a place is
-being dragged, its flights alone are worked out, again and again, and drawn.
+"""Sees that a passing scene has been edited, waits until the hand has come to rest, and has it made again. While a
+place is being dragged, its flights alone are worked out, again and again, and drawn.
 
-Only where the scene is shown already. What is asked is compared with what the scene shown was made of, so that neither its
-own making nor a walk along the timeline starts anything. The same wish is begun once: what was cancelled, undone or cannot be
-made waits for the next edit.
+Only where the scene is shown already. What is asked is compared with what the scene shown was made of, so that neither
+its own making nor a walk along the timeline starts anything. The same wish is begun once: what was cancelled, undone or
+cannot be made waits for the next edit.
 """
 
 from __future__ import annotations

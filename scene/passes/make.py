@@ -33,8 +33,8 @@ MOST_LINES = 12
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What is to be made. scene, and the scene frame of its second 0; the library, or where it is and how it is built; digest
-    of all that."""
+    """What is to be made. scene, and the scene frame of its second 0; the library, or where it is and how it is built;
+    digest of all that."""
 
     scene: PassScene
     start: float
@@ -118,8 +118,8 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Take away what was made for the scene: bodies, ball, net; bodies of the user's play their own motion again. The lists
-    stay."""
+    """Take away what was made for the scene: bodies, ball, net; bodies of the user's play their own motion again. The
+    lists stay."""
     settings = scene.beyond_mocap_passes
     shown.check(*settings.players)
     if settings.rally is not None:

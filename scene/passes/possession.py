@@ -1,9 +1,9 @@
 """Possession: a bone carries the ball for a while, by a Child Of constraint whose influence is keyed.
 
 The ball's own action is put aside; it plays one that is made of it and of all stretches in which it is carried, so that
-any of them can be changed or taken back. Where a stretch begins, the ball is where it was. Where it ends, the ball is on
-its own way again, if that goes on, else it stays where it was let go. In between it is rigid with the bone, but for the
-frames at either end in which it comes to where it is carried and back.
+any of them can be changed or taken back. Where a stretch begins, the ball is where it was. Where it ends, the ball is
+on its own way again, if that goes on, else it stays where it was let go. In between it is rigid with the bone, but for
+the frames at either end in which it comes to where it is carried and back.
 
 With T the bone's matrix in the world, W the ball's own way and L = T^-1 W the ball as the bone sees it, the constraint
 shows T inv own. Its inverse is that of T on the first frame, so own = T(first) L there, which is W: no jump.

@@ -1,5 +1,5 @@
-"""The flights of passing scenes of this session, for the overlays: that which is shown, and while a place is dragged, those
-of where it is just now."""
+"""The flights of passing scenes of this session, for the overlays: that which is shown, and while a place is dragged,
+those of where it is just now."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _dragged: list["Rally"] = []
 @dataclass(frozen=True, eq=False)
 class Rally:
     """Plain numbers, metres in the world. start: scene frame of second 0; starts (K,) s and ways, (n, 3) m each, of the
-    flights; strikes (S, 3) m and strike_times (S,) s; bounces (B, 3) m; candidates: (M, T, 3) m for each strike, from which
-    its way was chosen, empty for the last one."""
+    flights; strikes (S, 3) m and strike_times (S,) s; bounces (B, 3) m; candidates: (M, T, 3) m for each strike, from
+    which its way was chosen, empty for the last one."""
 
     start: float
     starts: np.ndarray

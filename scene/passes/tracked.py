@@ -30,8 +30,8 @@ NEAR = 0.4  # seconds between a touch and a key moment that is there already
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What is to be solved. tracks: (name, track) of players with files of their own; or path, metadata and provider of a
-    whole match. start, end: seconds; end None: to its end."""
+    """What is to be solved. tracks: (name, track) of players with files of their own; or path, metadata and provider of
+    a whole match. start, end: seconds; end None: to its end."""
 
     tracks: tuple = ()
     path: str = ""
@@ -42,8 +42,8 @@ class Order:
 
 
 def order_of(scene: bpy.types.Scene) -> Order:
-    """What the settings ask for: the match of the active player, or the tracks of all ticked players with files of their
-    own. InputError where nobody has a file."""
+    """What the settings ask for: the match of the active player, or the tracks of all ticked players with files of
+    their own. InputError where nobody has a file."""
     settings = scene.beyond_mocap
     player = active_player(settings)
     if player is None or not player.tracking_file:
@@ -69,7 +69,8 @@ def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
 
 
 def together(named: tuple):
-    """The tracks of several players, (name, track) each, as one match at the times of the first; one alone stays a track."""
+    """The tracks of several players, (name, track) each, as one match at the times of the first; one alone stays a
+    track."""
     from ...beyond_mocap.ball.tracked.solve import PITCH
     from ...beyond_mocap.files.tracking import Match, MatchPlayer
 
@@ -110,8 +111,8 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
 
 
 def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
-    """Make key moments of the ticked touches (of one player, or of all in the list of players); how many came of it, and a
-    line for each that did not."""
+    """Make key moments of the ticked touches (of one player, or of all in the list of players); how many came of it,
+    and a line for each that did not."""
     settings, told, count = context.scene.beyond_mocap, [], 0
     found = {player.name: player for player in settings.players}
     for touch in context.scene.beyond_mocap_passes.touches:
