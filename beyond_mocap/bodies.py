@@ -156,7 +156,8 @@ class _Body:
         half = int(round(0.5 * self.settings.transition * self.library.fps))
         measure = Alike(alike(self.library, self.settings.weights), tuple(sorted({-half, half})))
         edit = PathSearch(
-            self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled, alike=measure
+            self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled,
+            alike=measure,
         ).run()
         index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
         raw = fetch(self.library, edit, index, self.fps)
@@ -176,12 +177,15 @@ class _Body:
         take = Take(
             motion=struck.motion, start_time=self.start, clips=(), clip=raw.clip, clip_frame=raw.clip_frame,
             mirrored=np.array([self.library.clips[clip].mirrored for clip in raw.clip]),
-            words=words_shown(self.library, raw), contacts=taken.contacts, seams=raw.seams, timeline=Timeline(), keys=(),
-            ball=BallPath(self.times, self.ball, np.ones(len(self.times), bool)), method="path", seed=self.settings.seed,
-            correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=plan, edit=edit,
+            words=words_shown(self.library, raw), contacts=taken.contacts, seams=raw.seams, timeline=Timeline(),
+            keys=(), ball=BallPath(self.times, self.ball, np.ones(len(self.times), bool)), method="path",
+            seed=self.settings.seed, correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped,
+            plan=plan, edit=edit,
         )
         report(1.0, "Done")
-        return PlayerMotion(_with_sources(take, self.library, raw), struck.gap, struck.moved, self._warnings(struck, track))
+        return PlayerMotion(
+            _with_sources(take, self.library, raw), struck.gap, struck.moved, self._warnings(struck, track)
+        )
 
     def _wanted(self, times: np.ndarray) -> Wanted:
         """What the search is asked for, at the library's rate."""
@@ -285,8 +289,8 @@ class _Body:
         if track.speed[fastest] > FASTER * self.library.fastest:
             asks, has = track.speed[fastest], self.library.fastest
             told.append(
-                f"{self.times[fastest]:.2f} s: he would have to run {asks:.1f} m/s to be there in time; the library has "
-                f"{has:.1f} m/s: give him more time, or a place nearer by"
+                f"{self.times[fastest]:.2f} s: he would have to run {asks:.1f} m/s to be there in time; "
+                f"the library has {has:.1f} m/s: give him more time, or a place nearer by"
             )
         for order, gap in zip(self.orders, struck.gap):
             if gap > 0.005:

@@ -36,7 +36,8 @@ MOST_HITS = 24
 
 BALL_LIMITS = {
     "radius": (0.01, 0.5), "mass": (0.001, 20.0), "gravity": (0.5, 30.0), "linear_drag": (0.0, 2.0), "drag": (0.0, 0.5),
-    "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "restitution": (0.0, 0.95), "friction": (0.0, 5.0), "rolling": (0.01, 20.0),
+    "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "restitution": (0.0, 0.95), "friction": (0.0, 5.0),
+    "rolling": (0.01, 20.0),
     "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
 }  # fmt: skip
 """Least and most of a ball's numbers."""

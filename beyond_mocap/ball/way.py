@@ -121,7 +121,8 @@ class Placed:
     def _at(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values (L, K) of the library's frames at seconds (N,): linear, held at the clip's ends."""
         frames, clip = self.library.frames, self.order.clip
-        own = (self.order.strike_frame + (np.asarray(times) - self.order.time) * self._fps) * self.library.fps / self._fps
+        own = self.order.strike_frame + (np.asarray(times) - self.order.time) * self._fps
+        own = own * self.library.fps / self._fps
         own = np.clip(own, 0.0, frames.count[clip] - 1.0)
         inside = values[frames.first[clip] : frames.first[clip] + frames.count[clip]]
         return np.stack([np.interp(own, np.arange(len(inside)), column) for column in inside.T], axis=1)
@@ -222,4 +223,5 @@ def hermite(times: np.ndarray, before: State, after: State) -> np.ndarray:
     x = ((np.asarray(times) - start) / length)[:, None]
     h = goal - place
     a, b = length * leaves, length * comes
-    return place + a * x + (10 * h - 6 * a - 4 * b) * x**3 + (-15 * h + 8 * a + 7 * b) * x**4 + (6 * h - 3 * a - 3 * b) * x**5
+    third, fourth, fifth = 10 * h - 6 * a - 4 * b, -15 * h + 8 * a + 7 * b, 6 * h - 3 * a - 3 * b
+    return place + a * x + third * x**3 + fourth * x**4 + fifth * x**5

@@ -34,10 +34,14 @@ def hit_of(
     """
     body, where = row.actor, f"pass {number}: Like Armature"
     if body is None or body.name not in scene.objects:
-        raise InputError(where, f"{row.actor_known or body.name} is not in the scene any more", "an armature that strikes",
-                         "choose another one, or empty the field")
+        raise InputError(
+            where, f"{row.actor_known or body.name} is not in the scene any more", "an armature that strikes",
+            "choose another one, or empty the field",
+        )
     if any(player.body == body for player in scene.beyond_mocap_passes.players):
-        raise InputError(where, f"{body.name}, which plays this scene itself", "another armature", "duplicate it before")
+        raise InputError(
+            where, f"{body.name}, which plays this scene itself", "another armature", "duplicate it before"
+        )
     if row.actor_cut and row.actor_last <= row.actor_first:
         raise InputError(where, f"frames {row.actor_first} to {row.actor_last}", "the later frame last")
     carrier, action = carrier_of(body), body.animation_data and body.animation_data.action

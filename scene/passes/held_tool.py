@@ -28,7 +28,8 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, collec
     along = Vector(skeleton.offsets[hand] / max(np.linalg.norm(skeleton.offsets[hand]), 1e-9))
     name = f"{body.name} tool"
     mesh, shape = bpy.data.meshes.new(name), bmesh.new()
-    for start, end, radius in ((0.0, tool.length - tool.reach, HANDLE * tool.radius), (tool.length - tool.reach, tool.length, tool.radius)):
+    near = tool.length - tool.reach
+    for start, end, radius in ((0.0, near, HANDLE * tool.radius), (near, tool.length, tool.radius)):
         if end > start:
             _rod(shape, start, end, radius)
     turn = Vector((0.0, 0.0, 1.0)).rotation_difference(along).to_matrix().to_4x4()
@@ -55,5 +56,7 @@ def remove(body: bpy.types.Object) -> None:
 
 def _rod(shape: bmesh.types.BMesh, start: float, end: float, radius: float) -> None:
     """A rod along Z, metres."""
-    made = bmesh.ops.create_cone(shape, cap_ends=True, segments=_SIDES, radius1=radius, radius2=radius, depth=end - start)
+    made = bmesh.ops.create_cone(
+        shape, cap_ends=True, segments=_SIDES, radius1=radius, radius2=radius, depth=end - start
+    )
     bmesh.ops.translate(shape, verts=made["verts"], vec=(0.0, 0.0, 0.5 * (start + end)))

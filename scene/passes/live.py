@@ -52,7 +52,9 @@ def edited(scene: bpy.types.Scene) -> str:
 @persistent
 def _after_change(scene, depsgraph):
     settings = scene.beyond_mocap_passes
-    if settings.live and settings.made_of and any(isinstance(update.id, bpy.types.Object) for update in depsgraph.updates):
+    if not settings.live or not settings.made_of:
+        return
+    if any(isinstance(update.id, bpy.types.Object) for update in depsgraph.updates):
         mark()
 
 

@@ -62,8 +62,10 @@ def order_of(scene: bpy.types.Scene) -> Order:
     chosen = settings.library_folder or common.library_folder
     folder = absolute(chosen)
     if not folder:
-        raise InputError("library", "no folder chosen", "a folder of clips with strikes, such as sample_blend/passes/library",
-                         "choose one under Choices, or in step 1")
+        raise InputError(
+            "library", "no folder chosen", "a folder of clips with strikes, such as sample_blend/passes/library",
+            "choose one under Choices, or in step 1",
+        )
     for row in settings.players:
         _check(row)
     shown.check(*settings.players)
@@ -74,7 +76,10 @@ def order_of(scene: bpy.types.Scene) -> Order:
     unit = (common.library_unit or None) if not settings.library_folder else None
     parts = repr((wanted, chosen, unit, settings.start_frame)).encode()  # a file may be moved with its library
     digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
-    return Order(wanted, float(settings.start_frame), folder, unit, session.library(folder, unit), digest, preferences.for_build(folder))
+    return Order(
+        wanted, float(settings.start_frame), folder, unit, session.library(folder, unit), digest,
+        preferences.for_build(folder),
+    )
 
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:

@@ -16,7 +16,10 @@ from . import examples, shown
 from .settings import KEPT, BeyondMocapPass, BeyondMocapPasser, BeyondMocapPasses
 
 SIZE = 0.5  # metres
-SHIRTS = ((0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55), (0.02, 0.45, 0.60))
+SHIRTS = (
+    (0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55),
+    (0.02, 0.45, 0.60),
+)
 NUMBERS = ("radius", "restitution", "linear_drag", "drag", "gravity")
 _DIGITS = 6  # of numbers of single precision
 
@@ -30,7 +33,8 @@ def scene_of(scene: bpy.types.Scene) -> PassScene:
         settings.repeat, _rate(scene), settings.seed,
         BallChoice(settings.ball, {name: _exact(getattr(settings, name)) for name in NUMBERS} if settings.own else {}),
         Net(_place(settings.net_from), _place(settings.net_to), _exact(settings.net_height)) if settings.net else None,
-        _serve(settings), *(_exact(getattr(settings, name)) for name in ("missed", "dropped", "transition", "lead_in", "lead_out")),
+        _serve(settings),
+        *(_exact(getattr(settings, name)) for name in ("missed", "dropped", "transition", "lead_in", "lead_out")),
         8 if settings.turns else 0, settings.watch, _weights(settings.weights),
     )  # fmt: skip
 
@@ -106,12 +110,15 @@ def stands(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[tuple[float
     """Where an object is on the ground, m, and which way its X looks, radians."""
     matrix = np.array(thing.matrix_world, float)
     place = matrix[:2, 3] / units_per_metre(scene)
-    return tuple(round(float(value), _DIGITS) for value in place), round(math.atan2(matrix[1, 0], matrix[0, 0]), _DIGITS)
+    facing = math.atan2(matrix[1, 0], matrix[0, 0])
+    return tuple(round(float(value), _DIGITS) for value in place), round(facing, _DIGITS)
 
 
 def _player(scene, row: BeyondMocapPasser) -> Player:
     if row.place is None or row.place.name not in scene.objects:
-        raise InputError(f"player {row.name}", "nothing that says where he stands", "an object", "choose one as his Place")
+        raise InputError(
+            f"player {row.name}", "nothing that says where he stands", "an object", "choose one as his Place"
+        )
     place, facing = stands(scene, row.place)
     tool = _tool(row) if row.part == "tool" else None
     side = "" if row.side == "either" else row.side
@@ -137,14 +144,16 @@ def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
     at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
     side = {"own": None, "either": ""}.get(row.side, row.side)
     return Pass(
-        row.who, row.to, row.kind, row.bounces, None if row.part == "own" else row.part, side, _exact(row.seconds) or None, at,
+        row.who, row.to, row.kind, row.bounces, None if row.part == "own" else row.part, side,
+        _exact(row.seconds) or None, at,
         _example(scene, row, number), "" if row.error == "none" else row.error,
     )  # fmt: skip
 
 
 def _rate(scene) -> float:
     """Frames per second: as set, or the scene's own, so that strikes fall on its frames."""
-    return _exact(scene.beyond_mocap_passes.rate) or min(max(frames_per_second(scene), LIMITS["fps"][0]), LIMITS["fps"][1])
+    low, high = LIMITS["fps"]
+    return _exact(scene.beyond_mocap_passes.rate) or min(max(frames_per_second(scene), low), high)
 
 
 def _serve(settings):
@@ -159,8 +168,12 @@ def _weights(row) -> Weights:
         try:
             bones[name.strip()] = float(number)
         except ValueError:
-            raise InputError("weights of bones", item.strip(), "bones with a number each, such as left foot 2, head 0.5") from None
-    return Weights(*(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")), bones)
+            raise InputError(
+                "weights of bones", item.strip(), "bones with a number each, such as left foot 2, head 0.5"
+            ) from None
+    return Weights(
+        *(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")), bones
+    )
 
 
 def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
@@ -172,7 +185,8 @@ def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
 
 
 def _fill_pass(context, row, one: Pass) -> None:
-    row.who, row.to, row.kind, row.bounces, row.error = one.giver, one.receiver, one.kind, one.bounces, one.error or "none"
+    row.who, row.to, row.kind = one.giver, one.receiver, one.kind
+    row.bounces, row.error = one.bounces, one.error or "none"
     row.part, row.seconds = one.part or "own", one.seconds or 0.0
     row.side = "own" if one.side is None else one.side or "either"
     if one.example is not None and one.example.hit is None:

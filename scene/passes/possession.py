@@ -37,9 +37,13 @@ def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str
     skeleton = armature.skeleton_of(body, scene)
     found = identify(skeleton)
     limb = getattr(found, side)
-    joint = {"foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": found.head, "chest": found.chest}[part]
+    joint = {
+        "foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": found.head, "chest": found.chest,
+    }[part]  # fmt: skip
     if joint is None:
-        raise InputError(f"armature {body.name}", f"no bone for {part}", "a humanoid", "choose another part, or name the bone")
+        raise InputError(
+            f"armature {body.name}", f"no bone for {part}", "a humanoid", "choose another part, or name the bone"
+        )
     return skeleton.names[joint]
 
 
@@ -53,8 +57,10 @@ def take(
     _check(ball, body, bone, first, last)
     for other in ball.beyond_mocap_ball.holds:
         if first < other.last and other.first < last:
-            raise InputError(f"ball {ball.name}", f"carried by {_name(other)} on frames {other.first} to {other.last} already",
-                             "other frames", "free the ball there first")
+            raise InputError(
+                f"ball {ball.name}", f"carried by {_name(other)} on frames {other.first} to {other.last} already",
+                "other frames", "free the ball there first",
+            )
     if not ball.beyond_mocap_ball.before.kept:
         put_aside(ball.beyond_mocap_ball.before, ball)
     hold = ball.beyond_mocap_ball.holds.add()
@@ -118,18 +124,22 @@ def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
         rebuild(scene, ball)
 
 
-def own_way(scene: bpy.types.Scene, ball: bpy.types.Object, holds) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
+def own_way(
+    scene: bpy.types.Scene, ball: bpy.types.Object, holds
+) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
     """Frames (F,), the ball's own place on each, and the first and last frame on which its own action has a key; None
     where it has none."""
     before = ball.beyond_mocap_ball.before
-    slot = None if before.action is None else next((s for s in before.action.slots if s.identifier == before.slot), None)
+    slots = before.action.slots if before.action is not None else ()
+    slot = next((one for one in slots if one.identifier == before.slot), None)
     curves = channels.curves(before.action, slot) if slot is not None else {}
     ends = channels.keyed_range(curves)
     first, last = min(hold.first for hold in holds) - 1, max(hold.last for hold in holds) + 1
     if ends is not None:
         first, last = min(first, ends[0]), max(last, ends[1])
     frames, stance = np.arange(first, last + 1), json.loads(before.stance)[""]
-    mode, still = stance[0], dict(zip(("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle"), stance[1:]))
+    mode, paths = stance[0], ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
+    still = dict(zip(paths, stance[1:]))
 
     def values(path: str) -> np.ndarray:
         columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
@@ -155,15 +165,26 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
     channels.check_free(ball)
     check_unaimed(ball)
     if bone not in body.data.bones:
-        raise InputError(f"armature {body.name}", f"no bone {bone!r}", "one of its bones", "look at their names in pose mode")
+        raise InputError(
+            f"armature {body.name}", f"no bone {bone!r}", "one of its bones", "look at their names in pose mode"
+        )
     if last <= first:
-        raise InputError("possession", f"from frame {first} to {last}", "a last frame behind the first", "set From and To")
+        raise InputError(
+            "possession", f"from frame {first} to {last}", "a last frame behind the first", "set From and To"
+        )
     if ball.parent is not None:
         raise InputError(f"ball {ball.name}", f"a child of {ball.parent.name}", "an object without a parent",
                          "clear its parent with Alt-P, Clear and Keep Transformation")
     playing = ball.animation_data
-    if playing is not None and playing.use_nla and any(not track.mute and len(track.strips) for track in playing.nla_tracks):
-        raise InputError(f"ball {ball.name}", "it plays NLA strips", "an action of its own", "bake them: NLA editor, Edit, Bake Action")
+    if (
+        playing is not None
+        and playing.use_nla
+        and any(not track.mute and len(track.strips) for track in playing.nla_tracks)
+    ):
+        raise InputError(
+            f"ball {ball.name}", "it plays NLA strips", "an action of its own",
+            "bake them: NLA editor, Edit, Bake Action",
+        )
     if ball == body or ball.type == "ARMATURE":
         raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball beside the armature")
 
@@ -190,9 +211,12 @@ def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None
     begins = bones[0].inverted() @ start
     held = begins if hold.how == "KEEP" else _touching(scene, hold, begins, ball)
     ends = held if end is None else bones[-1].inverted() @ end
-    count, way = len(bones) - 1, max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
+    count = len(bones) - 1
+    way = max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
     least = way / units_per_metre(scene) / FASTEST * frames_per_second(scene)
-    settle = max(1, min(max(hold.settle, int(np.ceil(least))), count // 2)) if hold.how != "KEEP" or end is not None else 0
+    settle = (
+        max(1, min(max(hold.settle, int(np.ceil(least))), count // 2)) if hold.how != "KEEP" or end is not None else 0
+    )
     found = []
     for row in range(count + 1):
         place = held

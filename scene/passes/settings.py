@@ -92,14 +92,19 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
     known: StringProperty(name="Known As", options={"HIDDEN"}, description="The name by which the passes know him")
     place: PointerProperty(
         name="Place", type=bpy.types.Object, update=touch_live,
-        description="The object that says where the player stands, and by its local X which way he looks; drag it with G, turn it with R",
+        description="The object that says where the player stands, and by its local X which way he looks; drag it with G, "
+        "turn it with R",
     )
     body: PointerProperty(
         name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
         description="The armature that the player's motion is shown on; made where it is missing",
     )
-    part: EnumProperty(name="Part", items=PARTS, default="foot", description="What the player meets the ball with", update=touch_live)
-    side: EnumProperty(name="Side", items=EITHER, default="either", description="Of what there are two", update=touch_live)
+    part: EnumProperty(
+        name="Part", items=PARTS, default="foot", description="What the player meets the ball with", update=touch_live
+    )
+    side: EnumProperty(
+        name="Side", items=EITHER, default="either", description="Of what there are two", update=touch_live
+    )
     bone: StringProperty(
         name="Joint", description="A joint of the library's skeleton by name, in place of the part", update=touch_live
     )
@@ -108,7 +113,8 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
         description="Metres that the tool goes on beyond the wrist, along the forearm",
     )
     tool_radius: FloatProperty(
-        name="Tool Radius", default=0.015, min=0.001, max=0.5, precision=3, description="Half as thick as it is, metres", update=touch_live
+        name="Tool Radius", default=0.015, min=0.001, max=0.5, precision=3,
+        description="Half as thick as it is, metres", update=touch_live,
     )
     tool_reach: FloatProperty(
         name="Tool Reach", default=0.26, min=0.0, max=2.0, precision=2, update=touch_live,
@@ -119,7 +125,8 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
         description="Metres that the player is tall; 0: as tall as the library's skeleton",
     )
     shirt: FloatVectorProperty(
-        name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06), description="Colour of the shirt"
+        name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
+        description="Colour of the shirt",
     )
     shown: PointerProperty(
         name="Shown On", type=bpy.types.Object, options={"HIDDEN"}, description="The armature that shows the scene now; before: what it played"
@@ -134,10 +141,12 @@ class BeyondMocapPass(bpy.types.PropertyGroup):
     to: StringProperty(name="To", description="Who gets it", update=touch_live)
     kind: EnumProperty(name="Kind", items=KINDS, default="pass", description="How hard it is sent", update=touch_live)
     bounces: IntProperty(
-        name="Bounces", default=1, min=0, max=5, description="How often the ball touches the ground on its way", update=touch_live
+        name="Bounces", default=1, min=0, max=5, description="How often the ball touches the ground on its way",
+        update=touch_live,
     )
     part: EnumProperty(
-        name="Part", items=(("own", "Own", "The part that the player is set to", "BLANK1", 9), *PARTS), default="own", update=touch_live,
+        name="Part", items=(("own", "Own", "The part that the player is set to", "BLANK1", 9), *PARTS), default="own",
+        update=touch_live,
         description="What the sender meets the ball with",
     )
     side: EnumProperty(
@@ -157,7 +166,8 @@ class BeyondMocapPass(bpy.types.PropertyGroup):
         description="Path below the library of a recording; the strike most like its own is played. Empty: by kind",
     )
     first: FloatProperty(
-        name="From Second", min=0.0, precision=2, unit="TIME_ABSOLUTE", description="Of the stretch of that recording", update=touch_live
+        name="From Second", min=0.0, precision=2, unit="TIME_ABSOLUTE", description="Of the stretch of that recording",
+        update=touch_live,
     )
     last: FloatProperty(
         name="To Second", min=0.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,
@@ -165,7 +175,8 @@ class BeyondMocapPass(bpy.types.PropertyGroup):
     )
     actor: PointerProperty(
         name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=chosen,
-        description="An armature whose own motion shows the strike: the one most like it is played, in place of Like Clip's",
+        description="An armature whose own motion shows the strike: the one most like it is played, in place "
+        "of Like Clip's",
     )
     actor_known: StringProperty(
         name="Missing", update=touch_live,
@@ -204,7 +215,8 @@ class BeyondMocapWeights(bpy.types.PropertyGroup):
     )
     bones: StringProperty(
         name="Bones", update=touch_live,
-        description="Weights of single bones where two poses are compared, such as: left foot 2, head 0.5; all others count 1",
+        description="Weights of single bones where two poses are compared, such as: left foot 2, head 0.5; all others "
+        "count 1",
     )
 
 
@@ -228,7 +240,9 @@ class BeyondMocapHold(bpy.types.PropertyGroup):
     first: IntProperty(name="First Frame", description="From this frame on")
     last: IntProperty(name="Last Frame", description="The frame on which the ball is let go")
     how: EnumProperty(name="Hold", items=HOLDS, default="KEEP", description="Where the ball is while it is carried")
-    settle: IntProperty(name="Settle", default=4, min=0, description="Frames within which the ball comes to where it is carried")
+    settle: IntProperty(
+        name="Settle", default=4, min=0, description="Frames within which the ball comes to where it is carried"
+    )
     skin: FloatProperty(name="Skin", default=0.03, min=0.0, description="Metres from the bone to what touches the ball")
 
 
@@ -260,9 +274,15 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
     passes: CollectionProperty(type=BeyondMocapPass, description="The passes, one after the other")
     active_pass: IntProperty(name="Pass", min=0, description="The pass that is shown below the list")
-    ball: EnumProperty(name="Ball", items=BALLS, default="paper", description="What kind of ball it is", update=touch_live)
-    own: BoolProperty(name="Own Numbers", description="Use the numbers below in place of the chosen ball's", update=touch_live)
-    radius: FloatProperty(name="Radius", default=0.11, min=0.01, max=0.5, precision=3, description="Metres", update=touch_live)
+    ball: EnumProperty(
+        name="Ball", items=BALLS, default="paper", description="What kind of ball it is", update=touch_live
+    )
+    own: BoolProperty(
+        name="Own Numbers", description="Use the numbers below in place of the chosen ball's", update=touch_live
+    )
+    radius: FloatProperty(
+        name="Radius", default=0.11, min=0.01, max=0.5, precision=3, description="Metres", update=touch_live
+    )
     restitution: FloatProperty(
         name="Elasticity", default=0.7, min=0.0, max=0.98, precision=2, update=touch_live,
         description="Share of its downward speed with which a bounce sends it up",
@@ -276,29 +296,38 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
         description="Deceleration over the square of the speed, per metre, as air really does",
     )
     gravity: FloatProperty(
-        name="Gravity", default=9.8, min=0.1, max=30.0, precision=2, description="Metres per second squared", update=touch_live
+        name="Gravity", default=9.8, min=0.1, max=30.0, precision=2, description="Metres per second squared",
+        update=touch_live,
     )
     net: BoolProperty(name="Net", description="Every pass across the net goes over it", update=touch_live)
-    net_from: FloatVectorProperty(name="Net From", size=2, default=(0.0, -5.0), description="One end, metres", update=touch_live)
-    net_to: FloatVectorProperty(name="Net To", size=2, default=(0.0, 5.0), description="The other end, metres", update=touch_live)
+    net_from: FloatVectorProperty(
+        name="Net From", size=2, default=(0.0, -5.0), description="One end, metres", update=touch_live
+    )
+    net_to: FloatVectorProperty(
+        name="Net To", size=2, default=(0.0, 5.0), description="The other end, metres", update=touch_live
+    )
     net_height: FloatProperty(
         name="Net Height", default=1.5, min=0.1, max=5.0, precision=2, description="Metres", update=touch_live
     )
     repeat: IntProperty(
-        name="Rounds", default=1, min=1, max=100, description="How many times the passes are played in a row", update=touch_live
+        name="Rounds", default=1, min=1, max=100, description="How many times the passes are played in a row",
+        update=touch_live,
     )
     serve_from: EnumProperty(
         name="Serve", items=SERVES, default="USUAL", update=touch_live, description="Where the ball comes from first"
     )
     serve: StringProperty(name="Serve By", description="Who serves", update=touch_live)
     serve_at: FloatVectorProperty(
-        name="Serve At", size=3, default=(5.0, 0.0, 1.0), description="Where the ball comes from, metres", update=touch_live
+        name="Serve At", size=3, default=(5.0, 0.0, 1.0), description="Where the ball comes from, metres",
+        update=touch_live,
     )
     missed: FloatProperty(
-        name="Missed", default=0.0, min=0.0, max=1.0, precision=2, description="How likely each ball is missed", update=touch_live
+        name="Missed", default=0.0, min=0.0, max=1.0, precision=2, description="How likely each ball is missed",
+        update=touch_live,
     )
     dropped: FloatProperty(
-        name="Dropped", default=0.0, min=0.0, max=1.0, precision=2, description="How likely each ball is dropped", update=touch_live
+        name="Dropped", default=0.0, min=0.0, max=1.0, precision=2, description="How likely each ball is dropped",
+        update=touch_live,
     )
     lead_in: FloatProperty(
         name="Lead In", default=1.0, min=0.0, max=60.0, precision=2, unit="TIME_ABSOLUTE", update=touch_live,
@@ -317,7 +346,8 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
         description="Seconds over which one motion goes over into the next",
     )
     turns: BoolProperty(
-        name="Eight Directions", description="Strikes are turned in steps of 45 degrees, as in the paper; off: as the pass needs",
+        name="Eight Directions",
+        description="Strikes are turned in steps of 45 degrees, as in the paper; off: as the pass needs",
         update=touch_live,
     )
     watch: BoolProperty(name="Watch the Ball", default=True, description="Heads follow the ball", update=touch_live)
@@ -327,15 +357,20 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
         description="Folder of clips with strikes from a stand; empty: the library of step 1",
     )
     seed: IntProperty(name="Seed", default=0, min=0, description="Another one is another solution", update=touch_live)
-    start_frame: IntProperty(name="Start Frame", default=1, description="Scene frame on which the scene begins", update=touch_live)
+    start_frame: IntProperty(
+        name="Start Frame", default=1, description="Scene frame on which the scene begins", update=touch_live
+    )
     live: BoolProperty(
-        name="Live", default=True, description="Solve again when a player's place or a pass has been edited", update=touch_live
+        name="Live", default=True, description="Solve again when a player's place or a pass has been edited",
+        update=touch_live,
     )
     rally: PointerProperty(
         name="Ball Object", type=bpy.types.Object, description="The ball of the scene; made where it is missing"
     )
     ball_before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before the scene was made")
-    made_of: StringProperty(name="Made Of", options={"HIDDEN"}, description="Digest of what the scene shown was made of")
+    made_of: StringProperty(
+        name="Made Of", options={"HIDDEN"}, description="Digest of what the scene shown was made of"
+    )
     told: StringProperty(name="Told", options={"HIDDEN"}, description="Lines about what to look at")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about the scene that is shown")
     strikes: StringProperty(name="Strikes", options={"HIDDEN"}, description="A line for each strike: frame, text")
@@ -343,14 +378,19 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     active_touch: IntProperty(name="Touch", min=0, description="The touch that is picked in the list")
     solved: StringProperty(name="Solved", options={"HIDDEN"}, description="Lines about the ball that was solved")
     hold_part: EnumProperty(name="Part", items=PARTS, default="hand", description="What carries the ball")
-    hold_side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
-    hold_how: EnumProperty(name="Hold", items=HOLDS, default="TOUCH", description="Where the ball is while it is carried")
+    hold_side: EnumProperty(
+        name="Side", items=SIDES, default="right", description="Left or right, of what there are two"
+    )
+    hold_how: EnumProperty(
+        name="Hold", items=HOLDS, default="TOUCH", description="Where the ball is while it is carried"
+    )
     hold_first: IntProperty(name="From", default=1, description="Frame from which on the ball is carried")
     hold_last: IntProperty(name="To", default=30, description="Frame on which the ball is let go")
 
 
 CLASSES = (
-    BeyondMocapPasser, BeyondMocapPass, BeyondMocapWeights, BeyondMocapTouch, BeyondMocapHold, BeyondMocapBall, BeyondMocapHits, BeyondMocapPasses,
+    BeyondMocapPasser, BeyondMocapPass, BeyondMocapWeights, BeyondMocapTouch, BeyondMocapHold, BeyondMocapBall,
+    BeyondMocapHits, BeyondMocapPasses,
 )
 
 

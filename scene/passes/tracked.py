@@ -166,7 +166,8 @@ def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
         return f"{player.name}: the touch at {touch.time:.2f} s is outside his track"
     near = [moment for moment in lanes.moments(target) if abs(moment.key.time - touch.time) < NEAR]
     if near:
-        return f"{player.name}: has a key moment at {near[0].key.time:.2f} s, so none is added for the touch at {touch.time:.2f} s"
+        there = f"{player.name}: has a key moment at {near[0].key.time:.2f} s"
+        return f"{there}, so none is added for the touch at {touch.time:.2f} s"
     return ""
 
 
