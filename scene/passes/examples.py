@@ -38,7 +38,7 @@ def hit_of(
             where, f"{row.actor_known or body.name} is not in the scene any more", "an armature that strikes",
             "choose another one, or empty the field",
         )
-    if any(player.body == body for player in scene.beyond_mocap_passes.players):
+    if any(body in (player.body, player.shown) for player in scene.beyond_mocap_passes.players):
         raise InputError(
             where, f"{body.name}, which plays this scene itself", "another armature", "duplicate it before"
         )

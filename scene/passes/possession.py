@@ -94,8 +94,8 @@ def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = No
 
 
 def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
-    """Make the ball's action anew, of its own way and of who carries it. Stretches whose armature, bone or constraint is
-    gone count no more; one at least is left."""
+    """Make the ball's action anew, of its own way and of who carries it. Stretches whose armature, bone or constraint
+    is gone count no more; one at least is left."""
     holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if _holds(ball, hold)), key=lambda hold: hold.first)
     frames, way, ends = own_way(scene, ball, holds)
     own, lets_go = list(way), []
@@ -152,10 +152,13 @@ def own_way(
 
 
 def check_unaimed(ball: bpy.types.Object) -> None:
-    """InputError for a ball that is aimed or that rigid bodies move: who carries it would not be seen, or its aim be lost."""
+    """InputError for a ball that is aimed or that rigid bodies move: who carries it would not be seen, or its aim be
+    lost."""
     aim = ball.beyond_mocap_aim
     if aim.handed:
-        raise InputError(f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed", "press Take Ball Back first")
+        raise InputError(
+            f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed", "press Take Ball Back first"
+        )
     if aim.on:
         raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not", "press Leave Aim first")
 

@@ -92,8 +92,8 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
     known: StringProperty(name="Known As", options={"HIDDEN"}, description="The name by which the passes know him")
     place: PointerProperty(
         name="Place", type=bpy.types.Object, update=touch_live,
-        description="The object that says where the player stands, and by its local X which way he looks; drag it with G, "
-        "turn it with R",
+        description="The object that says where the player stands, and by its local X which way he looks; drag it "
+        "with G, turn it with R",
     )
     body: PointerProperty(
         name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
@@ -129,7 +129,8 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
         description="Colour of the shirt",
     )
     shown: PointerProperty(
-        name="Shown On", type=bpy.types.Object, options={"HIDDEN"}, description="The armature that shows the scene now; before: what it played"
+        name="Shown On", type=bpy.types.Object, options={"HIDDEN"},
+        description="The armature that shows the scene now; before: what it played",
     )
     before: PointerProperty(type=BeyondMocapBefore, description="What the body played before the scene was made")
 

@@ -1,4 +1,5 @@
-"""The objects that show a passing scene: those that were made for it go, those of the user's play their own motion again."""
+"""The objects that show a passing scene: those that were made for it go, those of the user's play their own motion
+again."""
 
 from __future__ import annotations
 

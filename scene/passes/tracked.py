@@ -92,7 +92,8 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     from ...beyond_mocap.take import BallPath
 
     settings, room = scene.beyond_mocap_passes, bake.collection(scene)
-    target = next((thing for thing in room.objects if thing.get(KEPT) == BALL), None) or ball.create(bpy.context, BALL, room)
+    own = next((thing for thing in room.objects if thing.get(KEPT) == BALL), None)
+    target = own or ball.create(bpy.context, BALL, room)
     linked.refuse(target)
     channels.check_free(target)
     possession.check_unaimed(target)
