@@ -2,8 +2,8 @@
 
 Every clip and its mirrored twin are analysed for either side, so that what one foot can do the other can do too. All
 hit motions go by one distance: of the part's greatest speed, of its way from pose to pose, and of how long each part of
-the way takes. The example may be of another body: its speed and ways are taken in the library's size. Hit motions are
-turned about the vertical by any angle (the paper's are turned in steps of 45 degrees).
+the way takes. The example may be of another body: its speed and ways are taken in the library's size. Which way a hit
+motion is turned about the vertical does not matter here; `pass_choice` does that, by any angle or in steps of 45 degrees.
 """
 
 from __future__ import annotations
@@ -15,15 +15,12 @@ from hashlib import sha256
 import numpy as np
 
 from ..library.library import Clip, Library
-from ..motion import quaternion
 from ..motion.striking import striking_part
 from . import kept
 from .contact import Tool
 from .hits import HitMotion, analyse, hit_at
 
 KINDS = ("toss", "pass", "attack")
-DIRECTIONS = tuple(np.radians(degrees) for degrees in (-135, -90, -45, 0, 45, 90, 135, 180))
-"""Radians from the forward direction into which a player can send the ball in the paper (§3)."""
 # m/s of the part between toss and pass, and between pass and attack (§5: told apart by the greatest speed)
 _BOUNDS = {"foot": (4.5, 7.5), "hand": (4.0, 7.0), "head": (2.0, 3.5), "chest": (1.0, 2.0), "tool": (8.0, 13.0)}
 _MOVES = 0.3  # m/s: the least of a part that is said to touch the ball
@@ -131,15 +128,6 @@ class HitLibrary:
 def kind_of(hit: HitMotion) -> str:
     """Toss, pass or attack, by the greatest speed of the part (§5)."""
     return KINDS[int(np.searchsorted(_bounds(hit.part), hit.max_speed, "right"))]
-
-
-def turn_for(hit: HitMotion, facing: float, bearing: float, step: float | None = None) -> float:
-    """Radians by which a body that faces `facing` turns so that the hit motion sends the ball along `bearing`.
-
-    step: the turn is rounded to whole multiples of it (§3: pi / 4); None: any angle.
-    """
-    turn = float(quaternion.wrapped(np.asarray(bearing - hit.direction - facing)))
-    return turn if step is None else float(quaternion.wrapped(np.asarray(np.round(turn / step) * step)))
 
 
 def _bounds(part: str) -> tuple[float, float]:

@@ -175,6 +175,7 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
     )  # fmt: skip
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is not possible may be faster than numbers go
 def _tried(
     court: Court, number: int, options: _Options, after: Link, option: np.ndarray, seconds: np.ndarray
 ) -> _Tried:

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.hit_library import DIRECTIONS, KINDS, HitLibrary, MatchWeights, turn_for
+from beyond_mocap.ball.hit_library import KINDS, HitLibrary, MatchWeights
 from beyond_mocap.ball.hits import analyse
 from beyond_mocap.ball.links import BoneWeights, Link, Transitions, aligned, links_of, pose_distance
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.library.library import build
-from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.gestures import strike
 from beyond_mocap.motion.motion import place
@@ -146,16 +145,6 @@ def test_kinds_go_by_speed(kicks):
     assert kicks.of_kind("attack")[0] in np.flatnonzero(kicks.speeds == kicks.speeds[fast])
     assert kicks.of_kind("toss")[0] in np.flatnonzero(kicks.speeds == kicks.speeds[slow])  # the nearest to one
     assert set(kicks.kinds) <= set(KINDS) and len(kicks.of_kind("pass", "left")) == 3
-
-
-@pytest.mark.parametrize("bearing", DIRECTIONS)
-def test_the_ball_can_be_sent_anywhere(kicks, bearing):
-    hit = kicks.hits[0].hit
-    exact = turn_for(hit, 0.3, bearing)
-    assert quaternion.wrapped(0.3 + exact + hit.direction - bearing) == pytest.approx(0.0, abs=1e-9)
-    rounded = turn_for(hit, 0.3, bearing, np.pi / 4)
-    assert rounded / (np.pi / 4) == pytest.approx(round(rounded / (np.pi / 4)))
-    assert abs(quaternion.wrapped(rounded - exact)) <= np.pi / 8 + 1e-9
 
 
 def test_links_lie_beside_the_hits(library, kicks):
