@@ -5,8 +5,8 @@
 - `graph`      its curves as a small picture
 - `order`      the lists as a passing scene of the core, and back
 - `examples`   strikes of armatures that passes are to be like
-- `make`       it is made: bodies, ball, net; `live` again after each edit; `shown` on whom, and given back; `rally` what
-               is drawn of it; `held_tool` a racquet in the hand
+- `make`       it is made: bodies, ball, net; `live` again after each edit; `shown` on whom, and given back; `rally`
+               what is drawn of it; `held_tool` a racquet in the hand
 - `tracked`    the ball of imported tracking, solved
 - `possession` a ball carried by a bone for a while, without a jump at either end
 """
