@@ -17,6 +17,7 @@ from ..scene.passes.settings import BALLS, KEPT, PARTS, SIDES
 from .verb import Verb
 
 FAR = 10.0  # metres to a target that is made
+NAME = "Aimed Ball"  # another than that of the takes' ball, which may lie in the same collection
 
 
 class BEYOND_MOCAP_OT_aim_ball(Verb, bpy.types.Operator):
@@ -79,10 +80,10 @@ Empty (a new one, if none is). Drag the Empty: the ball follows. Without an arma
         wish = shots.Wish(body=body, bone="", first=first, last=last, target=(0.0, 0.0, 0.0), place=place, **own)
         there = shots.place_of(scene, target) if target is not None else shots.ahead(shots.strikes_of(scene, wish), FAR)
         wish = replace(wish, target=there)
-        solved = shots.solve(scene, wish, ball.name if ball is not None else "Ball")
+        solved = shots.solve(scene, wish, ball.name if ball is not None else NAME)
         room = (body or ball).users_collection[0]
         if ball is None:
-            ball = balls.create(context, "Ball", room, shots.radius_of(wish))
+            ball = balls.create(context, NAME, room, shots.radius_of(wish))
             ball[KEPT] = True
         if target is None:
             target = bpy.data.objects.new(f"{ball.name} target", None)

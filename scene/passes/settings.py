@@ -69,9 +69,12 @@ def touch_live(_settings, _context) -> None:
 
 
 def renamed(player, context) -> None:
-    """A player's new name is his in all passes, and his place's."""
+    """A player's new name is his in all passes; one that another has is not taken, or their passes would be one's."""
+    if player.known and any(row != player and row.name == player.name for row in player.id_data.beyond_mocap_passes.players):
+        player.name = player.known
+        return
     if player.known and player.known != player.name:
-        settings = context.scene.beyond_mocap_passes
+        settings = player.id_data.beyond_mocap_passes
         for one in settings.passes:
             one.who = player.name if one.who == player.known else one.who
             one.to = player.name if one.to == player.known else one.to

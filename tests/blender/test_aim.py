@@ -123,6 +123,10 @@ def test_a_ball_alone_leaves_from_where_it_lies(room):
     assert place(ball, aim.arrived) == pytest.approx(aim.target.matrix_world.translation, abs=0.02)
 
 
+def test_the_ball_of_takes_is_another_one(aimed, room):
+    assert aimed.name != room("bake").BALL
+
+
 def test_units_are_the_scenes(body):
     bpy.context.scene.unit_settings.scale_length = 0.01
     assert press(bpy.ops.beyond_mocap.aim_ball) == {"FINISHED"}

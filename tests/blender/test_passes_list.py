@@ -92,6 +92,8 @@ def test_rows_are_added_moved_and_removed(room):
     assert [(row.who, row.to) for row in settings().passes] == list(zip(names, [*names[1:], names[0]]))
     assert len(asked(room).players) == 3
     settings().players[0].name = "Zoe"
+    settings().players[0].name = settings().players[1].name
+    assert settings().players[0].name == "Zoe", "another's name"
     assert settings().passes[0].who == "Zoe" == settings().passes[2].to
     press(edit, rows="passes", what="UP")
     assert settings().active_pass == 1 and settings().passes[1].to == "Zoe"
