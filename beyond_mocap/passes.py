@@ -20,7 +20,7 @@ from .ball.pass_court import Site
 from .ball.pass_plan import PassPlan, plan_passes
 from .ball.pass_scene import BONES, Pass, PassScene, Player, Weights
 from .ball.physics import BALLS, Ball
-from .ball.strike_choice import Choice
+from .ball.strike_choice import Choice, unsaid
 from .ball.strike_moments import StrikeMoments, strike_moments
 from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
 from .errors import Cancelled, InputError, NotInLibrary
@@ -100,7 +100,19 @@ def passes(
     told = [f"{player.name}: {line}" for player, motion in zip(scene.players, players) for line in motion.warnings]
     moved = tuple(PlayerPasses(who.name, one.take, one.gaps, one.moved) for who, one in zip(scene.players, players))
     report(1.0, "Done")
-    return Passes(scene, ball_of(scene), plan, path, moved, (*plan.warnings, *told))
+    return Passes(scene, ball_of(scene), plan, path, moved, (*plan.warnings, *_taken(library, plan), *told))
+
+
+def _taken(library: Library, plan: PassPlan) -> list[str]:
+    """A line for each part but the foot that strikes with motions whose words say nothing of it."""
+    clips: dict[str, set[str]] = {}
+    for strike in plan.strikes:
+        if strike.order.part in ("head", "chest", "hand", "tool") and unsaid(library, strike.order):
+            clips.setdefault(strike.order.part, set()).add(library.clips[strike.order.clip].path)
+    return [
+        f"no words of the library tell of strikes with the {part}; what moves it like one is taken from {', '.join(sorted(paths))}"
+        for part, paths in clips.items()
+    ]
 
 
 def _part_of(report, number: int, players: tuple[Player, ...]):

@@ -1,7 +1,7 @@
 """Which hit motions of a library may serve a strike: by what its words say and the part's speed (Ball handling §5).
 
 Words go before measuring: a clip that is called a header serves heads and no hands, though its arms swing as in a
-strike.
+strike; nor does one of somebody who gets up or celebrates.
 """
 
 from __future__ import annotations
@@ -12,9 +12,12 @@ from ..library.library import Library
 from ..motion.striking import striking_part
 from .contact import Tool, striking_surface
 from .hit_library import HitLibrary, LibraryHit
+from .orders import HitOrder
+from .physics import FASTEST
 
 TOOL_WORDS = frozenset({"stroke", "racquet", "racket", "swing", "bat", "serve"})
 RECEIVE_WORDS = frozenset({"receive", "trap", "catch", "catchb"})
+OTHER_ACTS = frozenset({"getting_up", "celebration", "fall", "fly"})
 _SAID, _SILENT, _OTHER = range(3)
 _SIDED = ("foot", "hand", "tool")
 
@@ -32,7 +35,7 @@ class Choice:
         """InputError for a part that the skeleton lacks."""
         striking_surface(library.skeleton, part, "right" if part in _SIDED else "", tool)
         measured = HitLibrary.of(library, part, tool)
-        return cls(part, measured, tuple(_words_at(library, one) for one in measured.hits))
+        return cls(part, measured, tuple(_words_at(library, one.clip, one.hit.key) for one in measured.hits))
 
     @property
     def hits(self) -> tuple[LibraryHit, ...]:
@@ -57,7 +60,8 @@ class Choice:
     def _called(self, among: list[int]) -> list[int]:
         """Those that words call strikes of the part; where there are none, those that words say nothing of."""
         ranks = [_rank(self.part, self.words[i]) for i in among]
-        return [i for i, rank in zip(among, ranks) if rank == min(ranks)]
+        best = min(ranks, default=_OTHER)
+        return [i for i, rank in zip(among, ranks) if rank == best < _OTHER]
 
     def _by_speed(self, kind: str, among: list[int]) -> tuple[LibraryHit, ...]:
         order = [int(i) for i in self.measured.of_kind(kind) if int(i) in set(among)]
@@ -65,9 +69,16 @@ class Choice:
         return tuple(self.hits[i] for i in (same or order))
 
 
+def unsaid(library: Library, order: HitOrder) -> bool:
+    """Whether no words call an ordered motion a strike of its part, so that it is one by its speed alone."""
+    return _rank(order.part, _words_at(library, order.clip, order.strike_frame)) != _SAID
+
+
 def _rank(part: str, words: frozenset[str]) -> int:
     said = _said_part(words)
-    return _SILENT if said is None else _SAID if said == part else _OTHER
+    if words & OTHER_ACTS or (said not in (None, part) and part in FASTEST):
+        return _OTHER
+    return _SAID if said == part else _SILENT
 
 
 def _said_part(words: frozenset[str]) -> str | None:
@@ -77,7 +88,6 @@ def _said_part(words: frozenset[str]) -> str | None:
     return "hand" if "hand" in words and "volley" in words else striking_part(words)
 
 
-def _words_at(library: Library, one: LibraryHit) -> frozenset[str]:
-    clip = library.clips[one.clip]
-    rows = [row for row in clip.annotations if row.start <= one.hit.key <= row.end]
+def _words_at(library: Library, clip: int, frame: float) -> frozenset[str]:
+    rows = [row for row in library.clips[clip].annotations if row.start <= frame <= row.end]
     return frozenset(word for row in rows for word in row.words)

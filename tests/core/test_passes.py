@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from beyond_mocap.ball.links import BONES, BoneWeights
 from beyond_mocap.ball.pass_scene import Weights
 from beyond_mocap.ball.sample_scenes import SAMPLES
 from beyond_mocap.commands.told import Told
-from beyond_mocap.errors import Cancelled
+from beyond_mocap.errors import Cancelled, NotInLibrary
 from beyond_mocap.files import bvh
 from beyond_mocap.files.scene_json import parse_scene
 from beyond_mocap.files.tables import read_ball, read_provenance
@@ -195,3 +196,20 @@ def test_other_fouls(run, tmp_path, clips_folder, monkeypatch):
     monkeypatch.setattr(Told, "cancelled", lambda self: True)
     assert run(SAMPLES["three"])[0] == 130
     assert not (tmp_path / "out").exists()
+
+
+def test_strikes_that_no_words_tell_of_are_told(strikes_library):
+    def quiet(row):
+        return replace(row, words=("standing",), key=None) if "stroke" in row.words else row
+
+    assert not [line for line in passes(strikes_library, parse_scene(SAMPLES["racquet"])).warnings if "no words" in line]
+    silent = tuple(replace(clip, annotations=tuple(quiet(row) for row in clip.annotations)) for clip in strikes_library.clips)
+    told = passes(replace(strikes_library, clips=silent, kept=None), parse_scene(SAMPLES["racquet"])).warnings
+    assert any("no words of the library tell of strikes with the tool" in line for line in told)
+
+
+def test_who_gets_up_strikes_nothing(strikes_library):
+    up = tuple(replace(clip, annotations=tuple(replace(row, words=("getting_up",)) for row in clip.annotations))
+               for clip in strikes_library.clips)
+    with pytest.raises(NotInLibrary, match="strikes with"):
+        passes(replace(strikes_library, clips=up, kept=None), parse_scene(SAMPLES["racquet"]))
