@@ -2,8 +2,9 @@
 
 Everything of one run is measured in one process on one core; seconds are the best of three. Written to
 benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
-`--compare` measures instead what is decided once, `--paths` recordings on other paths, `--ball` the ball and who touches
-it, and writes that section anew. A Blender measures with the numpy that it has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
+`--compare` measures instead what is decided once, `--paths` recordings on other paths, `--ball` the ball and who
+touches it, and writes that section anew. A Blender measures with the numpy that it has:
+`blender -b --python benchmarks/__main__.py -- --out FILE`.
 """
 
 from __future__ import annotations
@@ -117,14 +118,18 @@ def figure_table(reports: dict[str, dict]) -> list[str]:
 
 def key_table(report: dict) -> list[str]:
     """One row per key moment of `path`."""
-    return markdown.head(KEY_COLUMNS) + [markdown.row(cell(key[leaf]) for leaf in KEY_COLUMNS) for key in report["keys"]]
+    return markdown.head(KEY_COLUMNS) + [
+        markdown.row(cell(key[leaf]) for leaf in KEY_COLUMNS) for key in report["keys"]
+    ]
 
 
 def bench(scenarios: list[int], libraries: list[str], command: str) -> list[str]:
     """The lines of the results, but for what is compared once."""
     lines = [
-        "# Results", "", f"`{command}`; Python {platform.python_version()}, numpy {np.__version__}, one core, one thread.",
-        "Seconds are the processor's, the best of three in one process with the library loaded; `--nearest` everywhere.", "",
+        "# Results", "",
+        f"`{command}`; Python {platform.python_version()}, numpy {np.__version__}, one core, one thread.",
+        "Seconds are the processor's, the best of three in one process with the library loaded; `--nearest` "
+        "everywhere.", "",
         f"- {effort.blas_speed()}", f"- {effort.bvh_speed()}", f"- {effort.library_speed()}",
     ]
     with tempfile.TemporaryDirectory() as place:

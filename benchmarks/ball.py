@@ -8,7 +8,8 @@ def section() -> list[str]:
     from benchmarks import ball_contact, ball_flight, ball_hits, ball_touches
 
     parts = (
-        ("Flight and aim", ball_flight), ("Hit analysis and matching", ball_hits), ("Touches from tracking", ball_touches),
+        ("Flight and aim", ball_flight), ("Hit analysis and matching", ball_hits),
+        ("Touches from tracking", ball_touches),
         ("Contact", ball_contact),
     )  # fmt: skip
     return [line for title, part in parts for line in ("", f"### {title}", "", *part.section())][1:]

@@ -27,8 +27,8 @@ MEANT = 0.005  # metres, the target
 
 
 def gaps(made: Passes) -> tuple[np.ndarray, np.ndarray]:
-    """(K,) m between the surfaces of part and ball at each strike that touches, by the pose that is played there and the
-    ball as written out; (K,) m from that ball to where the flight before was to arrive."""
+    """(K,) m between the surfaces of part and ball at each strike that touches, by the pose that is played there and
+    the ball as written out; (K,) m from that ball to where the flight before was to arrive."""
     apart, off = [], []
     for strike in made.plan.strikes:
         order = strike.order
@@ -57,7 +57,8 @@ def scene_row(name: str, library: Library, label: str) -> str:
     return row([
         f"{name}, {label}", str(len(made.plan.strikes)), str(len(apart)),
         f"{1000 * np.median(apart):.1f} / {1000 * apart.max():.1f}", f"{1000 * off.max():.1f}",
-        f"{100 * np.nanmax(moved, initial=0.0):.0f}", f"{made.plan.seconds:.1f}", f"{took:.1f}", str(len(made.warnings)),
+        f"{100 * np.nanmax(moved, initial=0.0):.0f}", f"{made.plan.seconds:.1f}", f"{took:.1f}",
+        str(len(made.warnings)),
     ])  # fmt: skip
 
 
@@ -66,14 +67,17 @@ def take_rows(name: str, library: Library) -> list[str]:
     rows = []
     for number in (1, 2, 3, 4, 5):
         track, timeline = scenario(number)
-        plan = Plan(track=track, timeline=timeline, library=library.folder, nearest=True, method="path", solve_touches=True)
+        plan = Plan(
+            track=track, timeline=timeline, library=library.folder, nearest=True, method="path", solve_touches=True
+        )
         report = evaluate(synthesize(library, plan), track, library)
         for key in report["keys"]:
             gap, moved = key["met_gap_m"], key["solved_time_s"]
             if gap is not None and np.isfinite(gap):
                 rows.append(row([
                     f"{name}, scenario {number}", " ".join(key["labels"]), f"{key['time_s']:.2f}",
-                    "-" if moved is None else f"{moved:.2f}", f"{1000 * gap:.1f}", cell(key["ball_shift_m"]), cell(key["time_error_s"]),
+                    "-" if moved is None else f"{moved:.2f}", f"{1000 * gap:.1f}", cell(key["ball_shift_m"]),
+                    cell(key["time_error_s"]),
                 ]))  # fmt: skip
     return rows
 
@@ -81,12 +85,13 @@ def take_rows(name: str, library: Library) -> list[str]:
 def section() -> list[str]:
     """Lines for results.md."""
     lines = head(("passing scene, library", "strikes", "that touch", "gap mm (median / worst, target 5)",
-                  "ball beside the arrival mm", "part moved cm", "seconds of scene", "seconds to make", "warnings"))  # fmt: skip
+                  "ball beside the arrival mm", "part moved cm", "seconds of scene", "seconds to make",
+                  "warnings"))  # fmt: skip
     with tempfile.TemporaryDirectory() as place:
         own = build(SAMPLES / "passes" / "library", cache_dir=Path(place))
         lines += [scene_row(name, own, "its own") for name in SCENES]
-        lines += ["", *head(("take at solved touches", "words", "asked s", "solved s", "gap mm (target 5)", "ball moved m",
-                             "time off s"))]  # fmt: skip
+        lines += ["", *head(("take at solved touches", "words", "asked s", "solved s", "gap mm (target 5)",
+                             "ball moved m", "time off s"))]  # fmt: skip
         for name in LIBRARIES:
             folder = library_folder(name, Path(place))
             lines += take_rows(name, build(folder, unit=LIBRARIES[name], cache_dir=Path(place) / name))

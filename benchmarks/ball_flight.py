@@ -23,7 +23,9 @@ def launches(count: int, seed: int = 4, spin: float = 60.0) -> tuple[np.ndarray,
     """Places, velocities and spins (count, 3) as players give them to balls."""
     rng = np.random.default_rng(seed)
     place = np.column_stack([rng.uniform(-40, 40, (count, 2)), rng.uniform(0.12, 2.2, count)])
-    speed, rise, way = rng.uniform(4, 34, count), np.radians(rng.uniform(-5, 60, count)), rng.uniform(0, 2 * np.pi, count)
+    speed, rise, way = (
+        rng.uniform(4, 34, count), np.radians(rng.uniform(-5, 60, count)), rng.uniform(0, 2 * np.pi, count)
+    )  # fmt: skip
     velocity = speed[:, None] * np.column_stack([np.cos(rise) * np.cos(way), np.cos(rise) * np.sin(way), np.sin(rise)])
     return place, velocity, rng.normal(0.0, spin, (count, 3))
 
@@ -91,7 +93,8 @@ def judged(place, velocity, spin, ball: Ball, seconds: float) -> Callable[[np.nd
     when, where = np.array(times), np.array(states)[:, :3]
 
     def at(asked: np.ndarray) -> np.ndarray:
-        """(N, 3) m, NaN after the last big hop; the steps are so small that a straight line between them is within 5 um."""
+        """(N, 3) m, NaN after the last big hop;
+        the steps are so small that a straight line between them is within 5 um."""
         out = np.column_stack([np.interp(asked, when, where[:, i]) for i in range(3)])
         out[asked > when[-1]] = np.nan
         return out
@@ -118,7 +121,10 @@ def errors() -> list[list[str]]:
     parabola = max(_off(p, v, still, free, times, without_drag(p, v, free, times)) for p, v in zip(place, velocity))
     drags = replace(PAPER, friction=0.0)
     linear = max(_before_bounce(p, v, drags, times) for p, v in zip(place, velocity))
-    rows = [["no drag, bounces: closed form", f"{parabola:.1e}", "1e-6"], ["drag -0.2 v: closed form", f"{linear:.1e}", "1e-6"]]
+    rows = [
+        ["no drag, bounces: closed form", f"{parabola:.1e}", "1e-6"],
+        ["drag -0.2 v: closed form", f"{linear:.1e}", "1e-6"],
+    ]
     for name, ball in BALLS.items():
         far = max(_off(p, v, w, ball, times, judged(p, v, w, ball, 3.0)(times))
                   for p, v, w in list(zip(place, velocity, spin))[:5])  # fmt: skip
@@ -135,7 +141,9 @@ def _off(place, velocity, spin, ball, times, expected) -> float:
 def _before_bounce(place, velocity, ball, times) -> float:
     flight = fly(Launch(0.0, place, velocity), ball, times[-1])
     before = times[times < (flight.bounces[0] if len(flight.bounces) else times[-1])]
-    return float(np.linalg.norm(flight.at(before) - with_linear_drag(place, velocity, ball, before), axis=1).max(initial=0.0))
+    return float(
+        np.linalg.norm(flight.at(before) - with_linear_drag(place, velocity, ball, before), axis=1).max(initial=0.0)
+    )
 
 
 def energy_gain() -> float:
@@ -183,6 +191,8 @@ def batch_seconds() -> float:
 def section() -> list[str]:
     """Lines for results.md."""
     lines = [*head(("flight, compared with", "greatest distance m", "target")), *(row(one) for one in errors()), ""]
-    lines += head(("aimed at targets, ball", "bounces", "arrival", "targets", "possible", "miss cm (median / worst, target 2)", "ms each"))
+    lines += head(("aimed at targets, ball", "bounces", "arrival", "targets", "possible",
+                   "miss cm (median / worst, target 2)", "ms each"))  # fmt: skip
     return [*lines, *(row(one) for one in aimed()), "",
-            f"- greatest gain of energy anywhere: {energy_gain():.1e} J; {MANY} flights of 2 s at once: {batch_seconds():.2f} s (target 0.3)"]  # fmt: skip
+            f"- greatest gain of energy anywhere: {energy_gain():.1e} J; {MANY} flights of 2 s at once: "
+            f"{batch_seconds():.2f} s (target 0.3)"]  # fmt: skip

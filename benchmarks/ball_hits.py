@@ -88,7 +88,8 @@ def planted() -> np.ndarray:
 
 
 def made_kicks() -> dict[str, float]:
-    """Made kick -> seconds from its touch to the found moment; they are drawn by the touch, not by the greatest speed."""
+    """Made kick -> seconds from its touch to the found moment; they are drawn by the touch,
+    not by the greatest speed."""
     made = {words: strike(words, fps=120.0) for words in sorted(STRIKES) if words.startswith("kick")}
     made |= {f"standing {words}": volley(words, fps=120.0) for words in ("toss", "pass", "attack")}
     found = {}
@@ -131,8 +132,8 @@ def section() -> list[str]:
     off = planted()
     took, count = match_time()
     return [
-        *lines, "", f"- planted swings of foot and hand ({len(off)}, 24 to 120 frames/s): {np.sum(off <= 1.0)} found within 1 "
-        f"frame of where they are fastest, at most {off.max():.1f} off (target 1)",
+        *lines, "", f"- planted swings of foot and hand ({len(off)}, 24 to 120 frames/s): {np.sum(off <= 1.0)} found "
+        f"within 1 frame of where they are fastest, at most {off.max():.1f} off (target 1)",
         "- made kicks, from the touch that was drawn to the found moment: "
         + ", ".join(f"{words} {1000 * late:+.0f} ms" for words, late in made_kicks().items()),
         f"- hit motions found in made standing, walking and running, where there are none: {false_in_gaits()}",

@@ -21,7 +21,8 @@ from benchmarks.places import DATA, ROOT
 from benchmarks.touch_reading import match_of
 
 BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
-LATER = ROOT / "benchmarks" / "touches_by_hand_later.csv"  # read when the solver stood, which nobody tried on them before
+# Read when the solver stood, which nobody tried on them before.
+LATER = ROOT / "benchmarks" / "touches_by_hand_later.csv"
 EVENTS = DATA / "tracking" / "match" / "dutch_6min_events.csv"
 MARGIN = 20.0  # s that are solved before and after what was read
 PLAYED = ("pass", "miss", "clearance")  # events that are a touch for certain
@@ -55,11 +56,14 @@ def of_feed(feed: Feed) -> Match:
     """A made feed as a match that was read."""
     players = tuple(MatchPlayer(name, team, name, i) for i, (name, team) in enumerate(zip(feed.ids, feed.teams)))
     end = float(feed.times[-1])
-    return Match(feed.times, players, feed.positions, feed.ball, feed.length, feed.width, feed.fps, "made", ((0.0, end),))
+    return Match(
+        feed.times, players, feed.positions, feed.ball, feed.length, feed.width, feed.fps, "made", ((0.0, end),)
+    )
 
 
 def by_hand(name: str, match: Match, path: Path = BY_HAND, solved: SolvedBall | None = None) -> Measured:
-    """One recorded match against a reading. solved: what was solved before, else the stretches and a while about them."""
+    """One recorded match against a reading. solved: what was solved before,
+    else the stretches and a while about them."""
     reading = read_touches(path, name.replace(",", " ").split()[0])
     start, end = reading.stretches[0][0] - MARGIN, reading.stretches[-1][1] + MARGIN
     solved = solved or solve_ball(match, start=start, end=end)
@@ -73,7 +77,9 @@ def _score(solved: SolvedBall, reading: Reading) -> Score:
 def planted(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> Measured:
     """A made match as a feed would have it."""
     match = planted_match(seconds, seed)
-    touches = tuple(ReadTouch(t.time, (t.player,), None, t.part, t.word) for t in match.touches if 1.2 < t.time < seconds - 1)
+    touches = tuple(
+        ReadTouch(t.time, (t.player,), None, t.part, t.word) for t in match.touches if 1.2 < t.time < seconds - 1
+    )
     solved = solve_ball(of_feed(sampled(match, **feed)))
     reading = Reading(((1.2, seconds - 1.0),), touches, (ReadTouch(1.0),))
     return Measured(name, _score(solved, reading), solved, reading)
@@ -108,7 +114,8 @@ def against_events(match: Match) -> Measured:
 
 
 def residuals(solved: SolvedBall) -> tuple[float, float, float]:
-    """Median, 95th percentile (m) of the path's distance over the ground to measured samples; share of measured ones."""
+    """Median, 95th percentile (m) of the path's distance over the ground to measured samples;
+    share of measured ones."""
     away = solved.residuals[solved.measured]
     away = away[np.isfinite(away)]
     return float(np.median(away)), float(np.percentile(away, 95)), float(solved.measured.mean())
@@ -127,8 +134,9 @@ def line(measured: Measured) -> list[str]:
     late = np.abs(score.errors)
     median, p95, share = residuals(measured.solved)
     return [
-        measured.name, str(len(measured.reading.touches)), f"{score.precision:.3f}", f"{score.recall:.3f}", f"{score.f1:.3f}",
-        str(len(score.doubtful)), f"{1000 * np.median(late):.0f} / {1000 * np.percentile(late, 95):.0f}" if len(late) else "-",
+        measured.name, str(len(measured.reading.touches)), f"{score.precision:.3f}", f"{score.recall:.3f}",
+        f"{score.f1:.3f}", str(len(score.doubtful)),
+        f"{1000 * np.median(late):.0f} / {1000 * np.percentile(late, 95):.0f}" if len(late) else "-",
         told_apart(measured), f"{score.offset:.2f}", f"{100 * median:.1f} / {100 * p95:.0f}", f"{100 * share:.0f} %",
     ]  # fmt: skip
 

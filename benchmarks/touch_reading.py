@@ -1,7 +1,8 @@
-"""Pictures from which a person reads when who touched the ball: `python -m benchmarks.touch_reading MATCH FROM TO --out FOLDER`.
+"""Pictures from which a person reads when who touched the ball:
+`python -m benchmarks.touch_reading MATCH FROM TO --out FOLDER`.
 
-Nothing here looks for touches. A picture shows some seconds of what the feed says: the ball's speed and the change of its
-velocity from sample to sample, its direction of travel, its height, how far away the nearest players are, and the
+Nothing here looks for touches. A picture shows some seconds of what the feed says: the ball's speed and the change of
+its velocity from sample to sample, its direction of travel, its height, how far away the nearest players are, and the
 trail over the ground with the time written along it. What was read stands in benchmarks/touches_by_hand.csv.
 """
 

@@ -343,7 +343,10 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
     told.end()
     if library is not None and (strangers := _strangers(played.clips, library)):
         first, count = strangers[0], len(strangers)
-        told.note(f"{options.provenance}: {count} clips, such as {first}, are not in {options.library}: nothing to compare with")
+        told.note(
+            f"{options.provenance}: {count} clips, such as {first}, are not in {options.library}: nothing to compare "
+            "with"
+        )
     print(options.report)
 
 

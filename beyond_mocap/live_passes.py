@@ -1,9 +1,9 @@
 """The recipe of a rally that is played live (Ball handling §4): who has the ball does what the user has just done, and
 the ball goes to whom the user has chosen.
 
-Until the user acts, everybody stands and the ball lies at the holder's feet. A pass is planned (`passes.planned`) from where
-all stand then, only the two that it concerns are moved anew, and it is laid into the running scene at the moment in which
-it is ready. The ball is stopped by who receives it; he is the next to act.
+Until the user acts, everybody stands and the ball lies at the holder's feet. A pass is planned (`passes.planned`) from
+where all stand then, only the two that it concerns are moved anew, and it is laid into the running scene at the moment
+in which it is ready. The ball is stopped by who receives it; he is the next to act.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ class Played:
 
 @dataclass(frozen=True, eq=False)
 class Rally:
-    """A rally as it stands. scene: who plays; holder: who has the ball; players: name -> what he has done and does; ball:
-    its way on the scene's clock; start: s at which it began; free: s from which on the holder can act; passes: how many
-    there were."""
+    """A rally as it stands. scene: who plays; holder: who has the ball; players: name -> what he has done and does;
+    ball: its way on the scene's clock; start: s at which it began; free: s from which on the holder can act; passes:
+    how many there were."""
 
     scene: PassScene
     holder: str
@@ -84,8 +84,8 @@ class Rally:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One pass from standing to standing, its own clock from 0. motions: of giver and receiver; ball; strike: s; seconds:
-    until the next can act; clip: which recording of the library the giver shows; warnings."""
+    """One pass from standing to standing, its own clock from 0. motions: of giver and receiver; ball; strike: s;
+    seconds: until the next can act; clip: which recording of the library the giver shows; warnings."""
 
     giver: str
     receiver: str
@@ -167,8 +167,8 @@ def _settings(scene: PassScene) -> BodySettings:
 
 
 def _planned(library: Library, scene: PassScene, stance: Stance, lies: np.ndarray, progress, cancelled) -> PassPlan:
-    """The plan of the pass. The ball stays where it lies: the holder goes to where he strikes it; where his motion is no
-    kick from the ground, it hops up to him."""
+    """The plan of the pass. The ball stays where it lies: the holder goes to where he strikes it; where his motion is
+    no kick from the ground, it hops up to him."""
     giver = scene.passes[0].giver
     try:
         for _ in range(_ROUNDS):

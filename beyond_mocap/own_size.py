@@ -40,7 +40,9 @@ def taken_in_library_size(take: Take, size: float) -> Take:
     """A take of `in_own_size`, without its pins and with the ball as it was met, in the library's size again."""
     motion, contacts = take.unpinned or (take.motion, take.contacts)
     ball = take.met_ball or take.ball
-    take = replace(take, motion=motion, contacts=contacts, ball=ball, pins=(), unpinned=None, met_ball=None, dribbled=())
+    take = replace(
+        take, motion=motion, contacts=contacts, ball=ball, pins=(), unpinned=None, met_ball=None, dribbled=()
+    )
     if size == 1.0:
         return take
     return _scaled(take, 1.0 / size, in_library_size(take.plan, size), lambda ball: ball / size)

@@ -110,7 +110,8 @@ def _taken(library: Library, plan: PassPlan) -> list[str]:
         if strike.order.part in ("head", "chest", "hand", "tool") and unsaid(library, strike.order):
             clips.setdefault(strike.order.part, set()).add(library.clips[strike.order.clip].path)
     return [
-        f"no words of the library tell of strikes with the {part}; what moves it like one is taken from {', '.join(sorted(paths))}"
+        f"no words of the library tell of strikes with the {part}; what moves it like one is taken from "
+        f"{', '.join(sorted(paths))}"
         for part, paths in clips.items()
     ]
 

@@ -1,4 +1,5 @@
-"""What is asked: a plan names the track, the timeline, the ball, pins and the library's folder, and how to go about it."""
+"""What is asked: a plan names the track, the timeline, the ball, pins and the library's folder,
+and how to go about it."""
 
 from __future__ import annotations
 
@@ -36,9 +37,9 @@ HEIGHTS = (0.5, 3.0)
 
 @dataclass(frozen=True)
 class Pin:
-    """A part of the body held at a place. time: s on the track's clock from which on; hold: s for which, 0 for a moment.
-    part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the place.
-    position: (x, y, z) m in the world. InputError for an unknown part and for numbers that are none."""
+    """A part of the body held at a place. time: s on the track's clock from which on; hold: s for which, 0 for a
+    moment. part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the
+    place. position: (x, y, z) m in the world. InputError for an unknown part and for numbers that are none."""
 
     time: float
     part: str
@@ -64,8 +65,9 @@ class Pin:
 
 @dataclass(frozen=True)
 class Touched:
-    """Somebody changed the ball's course. time: s; mine: whether it was this player, None where nobody tracked was near;
-    part: "foot", "head", "chest", "hand", or "" where that cannot be told; kind: a word such as "kick" or "receive"."""
+    """Somebody changed the ball's course. time: s; mine: whether it was this player, None where nobody tracked was
+    near; part: "foot", "head", "chest", "hand", or "" where that cannot be told; kind: a word such as "kick" or
+    "receive"."""
 
     time: float
     mine: bool | None
@@ -75,8 +77,8 @@ class Touched:
 
 @dataclass(frozen=True, eq=False)
 class SolvedCourse:
-    """The ball's course as it was solved from its samples: times (M,) s, ascending; ball (M, 3) m, its centre, NaN where
-    it is not known; filled (M,) bool, where the feed has not measured it. touches: in order, everybody's."""
+    """The ball's course as it was solved from its samples: times (M,) s, ascending; ball (M, 3) m, its centre, NaN
+    where it is not known; filled (M,) bool, where the feed has not measured it. touches: in order, everybody's."""
 
     times: np.ndarray
     ball: np.ndarray
@@ -89,7 +91,8 @@ class SolvedCourse:
         object.__setattr__(self, "filled", frozen_array(self.filled, bool))
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The ball (T, 3) m at `times` (T,) s, NaN where it is not known, and whether the feed has filled it in (T,)."""
+        """The ball (T, 3) m at `times` (T,) s, NaN where it is not known,
+        and whether the feed has filled it in (T,)."""
         ball = np.stack([np.interp(times, self.times, column, np.nan, np.nan) for column in self.ball.T], axis=1)
         near = np.clip(np.searchsorted(self.times, times), 0, len(self.times) - 1)
         return ball, self.filled[near]
@@ -118,8 +121,8 @@ class Plan:
     little. style: words, or names or patterns of folders and clips ("academy", "lmd/*"), whose clips are taken rather
     than others by style_weight (m/s of missed speed that they are worth).
     solve_touches: whether key moments move to the touches that the ball's samples tell, and the ball goes as physics
-    has it, touched step by step in dribbles (`known_touches`). solved: the ball's course where it is known already, such
-    as from a whole match.
+    has it, touched step by step in dribbles (`known_touches`). solved: the ball's course where it is known already,
+    such as from a whole match.
 
     InputError for a number outside LIMITS or HEIGHTS, and for two pins of one part at one time.
     """
@@ -158,14 +161,16 @@ class Plan:
         if 0.0 < self.omega < 1.0:
             raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the usual thresholds")
         if self.height and not HEIGHTS[0] <= self.height <= HEIGHTS[1]:
-            raise InputError("height", f"{self.height:g} m", f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} m, or 0 for the library's")
+            raise InputError(
+                "height", f"{self.height:g} m", f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} m, or 0 for the library's"
+            )
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
         self._check_pins()
 
     def sampled(self, fps: float) -> SampledTrack:
-        """The track at `fps` frames per second. Where its ball is solved, it has the solved height, and the solved place
-        where the feed has not measured it: where it has, the ball is met within the noise of the measurement."""
+        """The track at `fps` frames per second. Where its ball is solved, it has the solved height, and the solved
+        place where the feed has not measured it: where it has, the ball is met within the noise of the measurement."""
         track = sample(self.track, fps, self.track_window)
         if self.solved is None:
             return track

@@ -226,8 +226,8 @@ def finished(
     take: Take, asked: Plan, plan: Plan, recordings: Library, order: Wanted, hurried: int | None,
     before: Take | None = None,
 ) -> Take:
-    """A take out of the library's size in the player's, with its pins, its ball and its warnings. plan: `asked` as it is
-    in force; before: the finished take that it is an edit of."""
+    """A take out of the library's size in the player's, with its pins, its ball and its warnings. plan: `asked` as it
+    is in force; before: the finished take that it is an edit of."""
     take = with_pins(in_own_size(take, size_of(asked, recordings.skeleton), asked, before), recordings)
     begun = time.perf_counter()
     take = with_course(take, plan)
@@ -300,8 +300,8 @@ def _shown_all_the_same(take: Take) -> list[str]:
             shows &= (word not in words) | (np.abs(times - time) > NEAR_KEY)
         told += [
             TimedLine(
-                f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it must not "
-                "be; no way without it was found", (times[first], times[end - 1]),
+                f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it "
+                "must not be; no way without it was found", (times[first], times[end - 1]),
             ) for first, end in runs(shows)
         ]  # fmt: skip
     return told

@@ -43,7 +43,8 @@ class KeyResult:
 
 @dataclass(frozen=True)
 class PinResult:
-    """How one pin was met: miss, m by which a hand or foot falls short of it, or radians that the gaze looks past it."""
+    """How one pin was met: miss, m by which a hand or foot falls short of it,
+    or radians that the gaze looks past it."""
 
     pin: Pin
     miss: float
@@ -69,10 +70,10 @@ class Take:
     correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it.
     ik_miss: (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right,
     extra steps of feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
-    at the library's rate, for `resynthesize`. cut_short: whether part of it was searched in a hurry. pins: how they were
-    met; unpinned: motion and contacts without them, None where there are none. solved: the ball's course where it was
-    solved; met_ball: the ball as it was met, before it was led along that course, None where it was not; dribbled: the
-    touches of dribbles.
+    at the library's rate, for `resynthesize`. cut_short: whether part of it was searched in a hurry. pins: how they
+    were met; unpinned: motion and contacts without them, None where there are none. solved: the ball's course where it
+    was solved; met_ball: the ball as it was met, before it was led along that course, None where it was not; dribbled:
+    the touches of dribbles.
     """
 
     motion: Motion

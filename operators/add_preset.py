@@ -16,6 +16,6 @@ class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
     preset_defines = ["settings = bpy.context.scene.beyond_mocap"]
     preset_values = [
         f"settings.{name}"
-        for name in ("method", "catch_up", "mirror", "nearest", "rate", "alpha", "delta", "omega", "made", "seam_window",
-                     "track_window", "root_window", "seed", "solve_touches")
+        for name in ("method", "catch_up", "mirror", "nearest", "rate", "alpha", "delta", "omega", "made",
+                     "seam_window", "track_window", "root_window", "seed", "solve_touches")
     ]

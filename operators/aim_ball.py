@@ -22,7 +22,8 @@ NAME = "Aimed Ball"  # another than that of the takes' ball, which may lie in th
 
 class BEYOND_MOCAP_OT_aim_ball(Verb, bpy.types.Operator):
     """Let the selected armature strike the selected ball (a new one, if none is) so that it arrives at the selected
-Empty (a new one, if none is). Drag the Empty: the ball follows. Without an armature the ball leaves from where it lies"""
+Empty (a new one, if none is). Drag the Empty: the ball follows. Without an armature the ball leaves
+from where it lies"""
 
     bl_idname = "beyond_mocap.aim_ball"
     bl_label = "Aim Ball"

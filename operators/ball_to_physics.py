@@ -12,8 +12,9 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_ball_to_physics(Verb, bpy.types.Operator):
-    """From the current frame on Blender's rigid bodies move the ball, as fast and with the spin that it has there: keyed
-as Animated up to then, over a ground that is solid; other selected meshes are in its way. Play from the start to see it"""
+    """From the current frame on Blender's rigid bodies move the ball, as fast and with the spin that it has there:
+keyed as Animated up to then, over a ground that is solid; other selected meshes are in its way. Play
+from the start to see it"""
 
     bl_idname = "beyond_mocap.ball_to_physics"
     bl_label = "Ball to Physics"

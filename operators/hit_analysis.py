@@ -23,8 +23,8 @@ class HitVerb(Verb):
 
 
 class BEYOND_MOCAP_OT_hit_analysis(HitVerb, bpy.types.Operator):
-    """Find where the armature's foot, head, chest, hand or any bone can strike a ball: height and speed as a graph in the
-panel, and markers on its action. A ball was never seen: the marked frame is the likeliest one"""
+    """Find where the armature's foot, head, chest, hand or any bone can strike a ball: height and speed as a graph in
+the panel, and markers on its action. A ball was never seen: the marked frame is the likeliest one"""
 
     bl_idname = "beyond_mocap.hit_analysis"
     bl_label = "Hit Analysis"
@@ -32,7 +32,8 @@ panel, and markers on its action. A ball was never seen: the marked frame is the
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="The part whose strikes are looked for")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     threshold: FloatProperty(
-        name="Threshold", default=0.0, min=0.0, max=5.0, precision=2, description="Metres above which a strike may be; 0: automatic"
+        name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
+        description="Metres above which a strike may be; 0: automatic",
     )
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
     markers: BoolProperty(name="Markers", default=True, description="Set markers on the action")

@@ -62,4 +62,6 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
         text = scene_json.scene_text(order.scene_of(context.scene))
         atomic_write(bpy.path.abspath(self.filepath), text)
         missing = examples.left_out(context.scene.beyond_mocap_passes)
-        self.report({"WARNING" if missing else "INFO"}, ", ".join(filter(None, (f"written to {self.filepath}", missing))))
+        self.report(
+            {"WARNING" if missing else "INFO"}, ", ".join(filter(None, (f"written to {self.filepath}", missing)))
+        )

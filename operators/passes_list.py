@@ -14,16 +14,16 @@ from .verb import Verb
 
 ROWS = (("players", "Players", "Who keeps the ball going"), ("passes", "Passes", "One after the other"))
 WHAT = (
-    ("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"), ("UP", "Up", "The picked one earlier"),
-    ("DOWN", "Down", "The picked one later"),
+    ("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"),
+    ("UP", "Up", "The picked one earlier"), ("DOWN", "Down", "The picked one later"),
 )  # fmt: skip
 ACTIVE = {"players": "active_player", "passes": "active_pass"}
 RING = 3.0  # metres from the 3D cursor at which players are added
 
 
 class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
-    """Add, remove or move a player or a pass. A new player stands near the 3D cursor, or where the selected armature stands,
-which becomes his body"""
+    """Add, remove or move a player or a pass. A new player stands near the 3D cursor, or where the selected armature
+stands, which becomes his body"""
 
     bl_idname = "beyond_mocap.passes_list"
     bl_label = "Players and Passes"
@@ -36,7 +36,10 @@ which becomes his body"""
         """What this button does."""
         one = {"players": "player", "passes": "pass"}[properties.rows]
         if properties.what == "ADD" and one == "player":
-            return "Add a player near the 3D cursor; a selected armature that is nobody's yet becomes his body, and he stands where it does"
+            return (
+                "Add a player near the 3D cursor; a selected armature that is nobody's yet becomes his body, and he "
+                "stands where it does"
+            )
         if properties.what == "ADD":
             return "Add a pass, from whoever gets the last one"
         moved = {"UP": "earlier", "DOWN": "later"}.get(properties.what)
@@ -87,13 +90,17 @@ def add_player(context) -> None:
     free = body is not None and body.type == "ARMATURE" and body.library is None and body.select_get()
     if free and not any(row.body == body for row in settings.players):
         place, facing = standing(scene, body)
-        row = order.add_player(context, body.name if not _taken(settings, body.name) else order.free_name(settings), place, facing)
+        row = order.add_player(
+            context, body.name if not _taken(settings, body.name) else order.free_name(settings), place, facing
+        )
         row.body = body
         return
     angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
     ring = RING * (1.0 if count < 3 else 2.0)
     x, y = scene.cursor.location.x / units, scene.cursor.location.y / units
-    order.add_player(context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)), angle + math.pi)
+    order.add_player(
+        context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)), angle + math.pi
+    )
 
 
 def standing(scene, body) -> tuple[tuple[float, float], float]:

@@ -11,15 +11,16 @@ from .verb import BackgroundVerb, Verb
 
 
 class BEYOND_MOCAP_OT_passes_make(BackgroundVerb, bpy.types.Operator):
-    """Let the players of the list pass the ball as the passes say: bodies and ball are made where there are none. Each flight
-leaves one body at its strike and arrives at the next one at his"""
+    """Let the players of the list pass the ball as the passes say: bodies and ball are made where there are none. Each
+flight leaves one body at its strike and arrives at the next one at his"""
 
     bl_idname = "beyond_mocap.passes_make"
     bl_label = "Make Scene"
     kind = "passes"
 
     live: BoolProperty(
-        name="Live", options={"HIDDEN", "SKIP_SAVE"}, description="Whether an edit asked for it: what is wrong is told in the panel"
+        name="Live", options={"HIDDEN", "SKIP_SAVE"},
+        description="Whether an edit asked for it: what is wrong is told in the panel",
     )
 
     @classmethod
@@ -44,7 +45,9 @@ leaves one body at its strike and arrives at the next one at his"""
         """Bodies and ball; what is shown is what was ordered."""
         rows = {row.name for row in scene.beyond_mocap_passes.players}
         if missing := [one.name for one in result.passes.players if one.name not in rows]:
-            raise InputError("players", f"{missing[0]} is gone from the list meanwhile", "the same players", "press Make Scene again")
+            raise InputError(
+                "players", f"{missing[0]} is gone from the list meanwhile", "the same players", "press Make Scene again"
+            )
         make.show(scene, result)
         self.report({"INFO"}, ", ".join(scene.beyond_mocap_passes.figures.splitlines()[:3]))
 
@@ -64,8 +67,8 @@ leaves one body at its strike and arrives at the next one at his"""
 
 
 class BEYOND_MOCAP_OT_passes_clear(Verb, bpy.types.Operator):
-    """Take away what Make Scene has made: bodies, ball and net. Bodies that were yours play their own motion again; the lists
-stay"""
+    """Take away what Make Scene has made: bodies, ball and net. Bodies that were yours play their own motion again; the
+lists stay"""
 
     bl_idname = "beyond_mocap.passes_clear"
     bl_label = "Clear Scene"

@@ -12,8 +12,8 @@ from .verb import BackgroundVerb, Verb
 
 
 class BEYOND_MOCAP_OT_solve_ball(BackgroundVerb, bpy.types.Operator):
-    """Work out of the imported tracking who touches the ball and when, and its way between. The ball becomes an object, its
-touches proposals for key moments"""
+    """Work out of the imported tracking who touches the ball and when, and its way between. The ball becomes an object,
+its touches proposals for key moments"""
 
     bl_idname = "beyond_mocap.solve_ball"
     bl_label = "Solve Ball"
@@ -38,12 +38,14 @@ touches proposals for key moments"""
     def apply(self, scene, solved):
         """The ball, and the list of touches."""
         tracked.write(scene, solved)
-        self.report({"INFO"}, f"{len(solved.touches)} touches solved, with {solved.confidence:.0%} confidence in the mean")
+        self.report(
+            {"INFO"}, f"{len(solved.touches)} touches solved, with {solved.confidence:.0%} confidence in the mean"
+        )
 
 
 class BEYOND_MOCAP_OT_accept_touches(Verb, bpy.types.Operator):
-    """Make key moments of the ticked touches, at their solved times. Where a player has a key moment near by already, none is
-added"""
+    """Make key moments of the ticked touches, at their solved times. Where a player has a key moment near by already,
+none is added"""
 
     bl_idname = "beyond_mocap.accept_touches"
     bl_label = "Accept Touches"
@@ -65,7 +67,9 @@ added"""
             raise InputError("player", "none in the list", "one", "import tracking in step 2")
         count, told = tracked.accept(context, player.name if self.active else "")
         if not count and not told:
-            raise InputError("touches", "none is ticked that has words and a player of the list", "one", "tick some in the list")
+            raise InputError(
+                "touches", "none is ticked that has words and a player of the list", "one", "tick some in the list"
+            )
         for line in told[:5]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{count} key moments added")

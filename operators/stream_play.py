@@ -12,7 +12,8 @@ from .verb import BackgroundVerb
 
 class BEYOND_MOCAP_OT_stream_play(BackgroundVerb, bpy.types.Operator):
     """Let who has the ball do what you do: each strike of the streamed body becomes a pass of the passing scene.
-The library's most alike motion is played, to whom you choose by the keys 1 to 9 or by a click; the scene plays on meanwhile"""
+The library's most alike motion is played, to whom you choose by the keys 1 to 9 or by a click;
+the scene plays on meanwhile"""
 
     bl_idname = "beyond_mocap.stream_play"
     bl_label = "Play Live"

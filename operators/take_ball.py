@@ -12,8 +12,8 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_take_ball(Verb, bpy.types.Operator):
-    """Let a hand or foot of the armature carry the ball from one frame to another, without a jump at either end: a Child Of
-constraint with a keyed influence. The ball's own action is put aside; Free Ball brings it back"""
+    """Let a hand or foot of the armature carry the ball from one frame to another, without a jump at either end: a
+Child Of constraint with a keyed influence. The ball's own action is put aside; Free Ball brings it back"""
 
     bl_idname = "beyond_mocap.take_ball"
     bl_label = "Take Ball"
@@ -25,7 +25,8 @@ constraint with a keyed influence. The ball's own action is put aside; Free Ball
     last: IntProperty(name="To", default=30, description="Frame on which it is let go")
     how: EnumProperty(name="Hold", items=HOLDS, default="KEEP", description="Where the ball is while it is carried")
     settle: IntProperty(
-        name="Settle", default=4, min=1, max=1000, description="Frames within which the ball comes to where it is carried"
+        name="Settle", default=4, min=1, max=1000,
+        description="Frames within which the ball comes to where it is carried",
     )
 
     @classmethod
@@ -47,7 +48,8 @@ constraint with a keyed influence. The ball's own action is put aside; Free Ball
 
 
 class BEYOND_MOCAP_OT_free_ball(Verb, bpy.types.Operator):
-    """Take back that the ball is carried: at one stretch, or at all. After the last one the ball plays its own action again"""
+    """Take back that the ball is carried: at one stretch, or at all.
+After the last one the ball plays its own action again"""
 
     bl_idname = "beyond_mocap.free_ball"
     bl_label = "Free Ball"

@@ -6,7 +6,8 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, ball, library, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline, video, view,
+    annotate, ball, library, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline,
+    video, view,
 )
 
 CLASSES = (

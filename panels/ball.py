@@ -10,7 +10,9 @@ from .aim import aim
 from .stream import live, stream
 from .tab import Step, paragraph, table
 
-PART_ICONS = {"foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"}
+PART_ICONS = {
+    "foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"
+}  # fmt: skip
 KIND_ICONS = {"toss": "IPO_SINE", "pass": "IPO_QUAD", "attack": "IPO_EXPO"}
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
 
@@ -39,7 +41,9 @@ class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
         row.label(text=f"{item.who} to {item.to}", icon=KIND_ICONS[item.kind])
         bounces = row.row()
         bounces.active, bounces.alignment = False, "RIGHT"
-        bounces.label(text=f"{item.bounces} {'bounce' if item.bounces == 1 else 'bounces'}" if item.bounces else "direct")
+        bounces.label(
+            text=f"{item.bounces} {'bounce' if item.bounces == 1 else 'bounces'}" if item.bounces else "direct"
+        )
         if item.error != "none":
             row.label(text="", icon="CANCEL")
 
@@ -188,7 +192,10 @@ def choices(layout, settings) -> None:
 def weights(layout, settings) -> None:
     """Of eq. 1 and 2."""
     column = split(layout)
-    for title, names in (("Two Strikes Compared", ("speed", "vectors", "times")), ("Two Poses Compared", ("position", "velocity", "bones"))):
+    for title, names in (
+        ("Two Strikes Compared", ("speed", "vectors", "times")),
+        ("Two Poses Compared", ("position", "velocity", "bones")),
+    ):
         column.label(text=title)
         for name in names:
             column.prop(settings.weights, name)
@@ -255,8 +262,13 @@ def hits(layout, context) -> None:
 def carried(layout, context) -> None:
     """Who carries the ball and when."""
     settings, body, ball = context.scene.beyond_mocap_passes, subject(context), ball_of(context)
-    layout.label(text=ball.name if ball is not None else "No ball: select one", icon="SPHERE" if ball is not None else "INFO")
-    layout.label(text=body.name if body is not None else "No armature: select one", icon="ARMATURE_DATA" if body is not None else "INFO")
+    layout.label(
+        text=ball.name if ball is not None else "No ball: select one", icon="SPHERE" if ball is not None else "INFO"
+    )
+    layout.label(
+        text=body.name if body is not None else "No armature: select one",
+        icon="ARMATURE_DATA" if body is not None else "INFO",
+    )
     row = layout.row(align=True)
     row.prop(settings, "hold_part", text="")
     row.prop(settings, "hold_side", text="")

@@ -2,8 +2,8 @@
 
     python sample_blend/make_passes.py [FOLDER]
 
-It is a library of its own (`passes/library`), so that takes from the sample's other one stay what they are. The same code
-gives the same bytes. Needs the core only."""
+It is a library of its own (`passes/library`), so that takes from the sample's other one stay what they are. The same
+code gives the same bytes. Needs the core only."""
 
 from __future__ import annotations
 

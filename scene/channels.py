@@ -27,9 +27,9 @@ def animate(
 ):
     """Give `target` a new action `name` and return it.
 
-    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for one
-    key on the first frame). generated: whether the keys are to be told from hand-made ones by their type. The action that
-    was there before is kept in the file. InputError as `check_free`.
+    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for
+    one key on the first frame). generated: whether the keys are to be told from hand-made ones by their type. The
+    action that was there before is kept in the file. InputError as `check_free`.
     """
     check_free(target)
     action = bpy.data.actions.new(name)
@@ -54,8 +54,8 @@ def animate(
 
 
 def rewrite(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np.ndarray]) -> None:
-    """Let the action that `target` plays have other keys, in place: data path -> values (F, n) at frames (F,), rising. Paths
-    without curves get no keys."""
+    """Let the action that `target` plays have other keys, in place: data path -> values (F, n) at frames (F,), rising.
+    Paths without curves get no keys."""
     found = curves(*playing(target))
     keys = np.empty((len(frames), 2), np.float32)
     keys[:, 0] = frames
@@ -83,8 +83,8 @@ def check_free(target: bpy.types.ID) -> None:
 
 
 def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> None:
-    """Play `action` on `target`, by `slot` or the first that fits; the action before is kept, even if unused. InputError
-    as `check_free`."""
+    """Play `action` on `target`, by `slot` or the first that fits; the action before is kept, even if unused.
+    InputError as `check_free`."""
     check_free(target)
     bpy.context.view_layer.update()  # a slot given to an object that the depsgraph has not met yet crashes Blender
     data = target.animation_data_create()

@@ -100,7 +100,8 @@ def _with_free_ball(context: bpy.types.Context, change) -> None:
 
 
 def _keep_free(context: bpy.types.Context) -> None:
-    """Ball and camera stay with what has been accepted: that is what comes back when previews of others are discarded."""
+    """Ball and camera stay with what has been accepted: that is what comes back when previews of others are
+    discarded."""
     shared, players = context.scene.beyond_mocap.shared, context.scene.beyond_mocap.players
     others, takes = any(player.result.state == "PREVIEW" for player in players), _takes(players, "ACCEPTED")
     if not others or bake.ball_of(takes, context.scene.beyond_mocap) is not None:

@@ -1,6 +1,7 @@
 """What a report says, as lines that a player's settings keep and the panel draws: columns with a tab between.
 
-- quality: name and value ("Feet slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as `evaluation.judged` has it)
+- quality: name and value ("Feet slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as `evaluation.judged`
+  has it)
 - moments: text, seconds, status
 - warnings: text, seconds at which its stretches begin, with blanks between ("" where it is about no time)
 """
@@ -45,7 +46,11 @@ def quality(report: Mapping) -> str:
         met = target.met(value, table) if target else None
         least, most = target.bounds(table) if target else (None, None)
         shown = [form.format(_shown(limit, factor)) for limit in (least, most) if limit is not None]
-        aim = (("≥ " if (least is not None) == (factor > 0) else "≤ ") + shown[0] if len(shown) == 1 else " .. ".join(shown))
+        aim = (
+            ("≥ " if (least is not None) == (factor > 0) else "≤ ") + shown[0]
+            if len(shown) == 1
+            else " .. ".join(shown)
+        )
         status = "" if met is None else ("met" if met else "missed")
         lines.append("\t".join((f"{name}: {form.format(_shown(value, factor))}{unit}", aim, status)))
     return "\n".join(lines)
@@ -56,8 +61,8 @@ def _shown(value: float, factor: float) -> float:
 
 
 def moments(report: Mapping) -> str:
-    """A line for each key moment: its time, what was asked for, what is shown where that is something else, the clip, and
-    the gap to the ball."""
+    """A line for each key moment: its time, what was asked for, what is shown where that is something else, the clip,
+    and the gap to the ball."""
     from ..beyond_mocap.evaluation.targets import KEY_TARGETS, target_of
 
     lines = []

@@ -88,7 +88,9 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
         name="Height", default=0.0, min=0.0, max=3.0, precision=2,
         description="Metres that the player is tall; 0: as tall as the library's skeleton",
     )
-    strong_foot: EnumProperty(name="Strong Foot", items=FEET, default="any", description="For key moments without a side")
+    strong_foot: EnumProperty(
+        name="Strong Foot", items=FEET, default="any", description="For key moments without a side"
+    )
     style: StringProperty(
         name="Style",
         description="Words, folders or clips (with * and ?) whose clips are taken rather than others; several with ;",
@@ -121,7 +123,8 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     rig: PointerProperty(
         name="Rig", type=bpy.types.Object, poll=is_armature,
-        description="This player's own rig for Bake to Rig with all players; a copy of the chosen rig where it is empty",
+        description="This player's own rig for Bake to Rig with all players; a copy of the chosen rig where it is "
+        "empty",
     )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
@@ -138,7 +141,8 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     """All steps of one scene."""
 
     version: IntProperty(
-        name="Version", options={"HIDDEN"}, description="Form of what is kept here, see scene/migrate.py; 0: not saved yet"
+        name="Version", options={"HIDDEN"},
+        description="Form of what is kept here, see scene/migrate.py; 0: not saved yet",
     )
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
@@ -212,8 +216,8 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     solve_touches: BoolProperty(
         name="Solve Touches", default=False,
-        description="Key moments move to the touches that the ball's samples tell, within 0.4 s; the ball goes as physics has "
-        "it, and is dribbled step by step",
+        description="Key moments move to the touches that the ball's samples tell, within 0.4 s; the ball goes as "
+        "physics has it, and is dribbled step by step",
     )
     mirror: BoolProperty(
         name="Mirrored Clips", default=True, description="Use each clip also with left and right exchanged"
@@ -223,7 +227,8 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         description="Where the library lacks a key moment's words, go on with the nearest that it has, and say so",
     )
     seed: IntProperty(
-        name="Seed", default=0, min=0, description="Of the clustering that Blocks and Distance search in; On the path does not draw lots"
+        name="Seed", default=0, min=0,
+        description="Of the clustering that Blocks and Distance search in; On the path does not draw lots",
     )
     rate: FloatProperty(
         name="Frame Rate", default=30.0, min=10.0, max=240.0,
@@ -248,7 +253,9 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Keep Hand-Made Keys", default=True,
         description="What you have keyed, moved or deleted on a result stays when it is made anew",
     )
-    accept_as: EnumProperty(name="Accept As", items=FORMS, default="ACTION", description="What an accepted take becomes")
+    accept_as: EnumProperty(
+        name="Accept As", items=FORMS, default="ACTION", description="What an accepted take becomes"
+    )
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
     shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
     view: PointerProperty(type=BeyondMocapView, description="What is drawn over the 3D view")

@@ -50,7 +50,9 @@ class BeyondMocapView(bpy.types.PropertyGroup):
     ghosts: _switch("Ghosts", "Stick figures of the body before and behind the current frame")
     path_source: _switch("Original Path", "The path that the original motion goes, as it was fitted", True)
     path_new: _switch("New Path", "The path that is ridden, as the curve is understood: without corners", True)
-    path_trackers: _switch("Trackers", "At the current frame, where the body is on either path and where it heads", True)
+    path_trackers: _switch(
+        "Trackers", "At the current frame, where the body is on either path and where it heads", True
+    )
     path_residuals: _switch("Residuals", "Lines from either path to the pelvis: what of the motion is not the path's")
     path_ghost: _switch("Original Motion", "The original as a stick figure at the current frame")
     shots: _switch("Ball Ways", "The ways that aimed and passed balls could take and take, strikes and bounces", True)
@@ -64,7 +66,8 @@ class BeyondMocapView(bpy.types.PropertyGroup):
         description="Ghosts and texts within this time of the current frame are drawn; 0 draws none",
     )
     in_front: BoolProperty(
-        name="In Front", default=False, update=_changed, description="Draw over everything, not only over what is behind"
+        name="In Front", default=False, update=_changed,
+        description="Draw over everything, not only over what is behind",
     )
 
     def on(self) -> list[str]:

@@ -115,8 +115,8 @@ def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str
 
 
 def avoided_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str]]:
-    """Per time of `times` (T,) seconds: the words that nothing shown then may carry. Spans without words of their own may
-    lie over others; what a span asks for counts more than that another one avoids it."""
+    """Per time of `times` (T,) seconds: the words that nothing shown then may carry. Spans without words of their own
+    may lie over others; what a span asks for counts more than that another one avoids it."""
     times = np.asarray(times, dtype=float)
     out: list[frozenset[str]] = [frozenset()] * len(times)
     for span in timeline.spans:

@@ -3,7 +3,8 @@
 Every clip and its mirrored twin are analysed for either side, so that what one foot can do the other can do too. All
 hit motions go by one distance: of the part's greatest speed, of its way from pose to pose, and of how long each part of
 the way takes. The example may be of another body: its speed and ways are taken in the library's size. Which way a hit
-motion is turned about the vertical does not matter here; `pass_choice` does that, by any angle or in steps of 45 degrees.
+motion is turned about the vertical does not matter here; `pass_choice` does that, by any angle or in steps of 45
+degrees.
 """
 
 from __future__ import annotations

@@ -33,7 +33,10 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
     way = "tcp" if options.tcp else "serve" if options.serve else "udp"
     sender = Sender(options.clip, options.port, way, options.form, options.fps, options.loop)
-    print(f"sending {options.clip.name} to port {options.port} of this machine ({way.upper()}, {options.form})", flush=True)
+    print(
+        f"sending {options.clip.name} to port {options.port} of this machine ({way.upper()}, {options.form})",
+        flush=True,
+    )
     count = len(sender.rows)
     sent = sender.run(told.cancelled, lambda frame: told.progress((frame - 1) % count / count, "Sending"))
     told.end()

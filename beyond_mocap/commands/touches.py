@@ -64,7 +64,9 @@ def _read(options):
         with open(options.input, "rb") as file:
             if b"time_s" in file.readline(4096):
                 if options.meta:
-                    raise InputError("--meta", f"{options.meta} beside a player's track", "none: a track has no metadata")
+                    raise InputError(
+                        "--meta", f"{options.meta} beside a player's track", "none: a track has no metadata"
+                    )
                 return read_track_csv(options.input)
     return read_match(options.input, options.meta, options.provider)
 

@@ -82,7 +82,9 @@ def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedLin
     for start in starts[hard]:
         flags[max(start - jerk.REACH // 2, 0) : start + jerk.REACH // 2] = True
     hardest = ratios[hard].max()
-    return _line(times, flags, f"cuts jolt up to {hardest:.2f} times as hard as recordings of that speed ({most:g} wanted)")
+    return _line(
+        times, flags, f"cuts jolt up to {hardest:.2f} times as hard as recordings of that speed ({most:g} wanted)"
+    )
 
 
 def stretches(times: np.ndarray, flags: np.ndarray) -> str:
@@ -229,7 +231,9 @@ def _at_moments(what: str, found: list[tuple[float, float]], form: str) -> Timed
     return TimedLine(f"{what}: {told}", *((time, time) for time, _ in found)) if found else None
 
 
-def _other_words(played: Played, asked: Timeline | None, keys: list[Moment], library: Library | None) -> TimedLine | None:
+def _other_words(
+    played: Played, asked: Timeline | None, keys: list[Moment], library: Library | None
+) -> TimedLine | None:
     """Words of the user's spans that clips carry, and that are not shown for WORD_SECONDS or more, but for entry and
     exit of key moments."""
     if asked is None or played.words is None or library is None:

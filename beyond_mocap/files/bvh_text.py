@@ -85,7 +85,9 @@ def _content(path: Path) -> bytes:
     except IsADirectoryError:
         raise InputError(path, "a folder", "a BVH file", "name a file in it") from None
     except (OSError, ValueError) as error:
-        raise InputError(path, f"cannot be read ({getattr(error, 'strerror', None) or error})", "a readable BVH file") from None
+        raise InputError(
+            path, f"cannot be read ({getattr(error, 'strerror', None) or error})", "a readable BVH file"
+        ) from None
     if not data or data.isspace():
         raise InputError(path, "empty file", "a BVH file", _EXPORT_AGAIN)
     if data.startswith(b"\xef\xbb\xbf"):
@@ -245,7 +247,10 @@ def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, f
     time_text, start, line = _labelled(path, data, start, line, rb"Frame\s*Time\s*:", expected)
     frame_time = _number(time_text)
     if frame_time is None or not 1e-5 <= frame_time <= 1e3:
-        raise InputError(f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0 (0.00001 to 1000)", "correct that line")
+        raise InputError(
+            f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0 (0.00001 to 1000)",
+            "correct that line",
+        )
     return frames, frame_time, start, line
 
 

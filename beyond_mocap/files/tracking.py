@@ -190,7 +190,10 @@ def _meta_beside(path: Path, provider: str, notes: list[str]) -> Path:
         if beside.is_file() and beside != path:
             notes.append(f"{name} taken as its {'second' if beside.suffix == path.suffix else 'metadata'} file")
             return beside
-    raise InputError(path, f"no metadata file beside it for {provider}", names[0], "put it there, or name it (--meta, in Blender Metadata)")
+    raise InputError(
+        path, f"no metadata file beside it for {provider}", names[0],
+        "put it there, or name it (--meta, in Blender Metadata)",
+    )
 
 
 _TEAMS = (("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home"))

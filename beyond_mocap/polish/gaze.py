@@ -1,9 +1,9 @@
 """Heads that follow the ball: the gaze turned to a place that moves, smoothly and as far as a neck turns.
 
-Where the head should turn is a continuous function of the direction in which the ball lies as the body sees it. Ahead it
-is that direction, within what a neck can do; to the side it stays at its limit; behind the body it goes back to looking
-ahead, and so changes sides without a jump; overhead, where no side is told, it looks up. The way there is then smoothed
-over time. Neck and chest take a share of each turn.
+Where the head should turn is a continuous function of the direction in which the ball lies as the body sees it. Ahead
+it is that direction, within what a neck can do; to the side it stays at its limit; behind the body it goes back to
+looking ahead, and so changes sides without a jump; overhead, where no side is told, it looks up. The way there is then
+smoothed over time. Neck and chest take a share of each turn.
 """
 
 from __future__ import annotations
@@ -31,12 +31,17 @@ _BEHIND = 0.5  # cosine from straight behind beyond which the head begins to tur
 
 
 def following(
-    motion: Motion, places: np.ndarray, look: np.ndarray, share: np.ndarray | float = 1.0, chest: np.ndarray | float = CHEST
+    motion: Motion,
+    places: np.ndarray,
+    look: np.ndarray,
+    share: np.ndarray | float = 1.0,
+    chest: np.ndarray | float = CHEST,
 ) -> Motion:
     """The motion with its head turned to follow `places` (T, 3) m, NaN where there is nothing to look at.
 
     look (3,): which way the head joint looks, in its own frame (`pins.look_axis`). share (T,): how much of the turn is
-    made at each frame; chest (T,): how much of it the chest takes. The motion itself where nothing is to be seen throughout.
+    made at each frame; chest (T,): how much of it the chest takes. The motion itself where nothing is to be seen
+    throughout.
     """
     known = np.isfinite(places).all(axis=1)
     if not known.any():
@@ -57,8 +62,8 @@ def following(
 
 
 def head_angles(seen: np.ndarray) -> np.ndarray:
-    """(N, 2) radians of yaw (to the left) and pitch (up) by which a head turns to look where `seen` (N, 3) lies from it,
-    x ahead of the body and y to its left; continuous but straight up and down."""
+    """(N, 2) radians of yaw (to the left) and pitch (up) by which a head turns to look where `seen` (N, 3) lies from
+    it, x ahead of the body and y to its left; continuous but straight up and down."""
     unit = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)

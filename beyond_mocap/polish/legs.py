@@ -73,7 +73,8 @@ class Legs:
         return path + np.pad(aside, ((0, 0), (0, 1)))
 
     def way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(N, 2) m along the ground by which balls (N, 3) m come out of the part of the body that they are deepest in."""
+        """(N, 2) m along the ground by which balls (N, 3) m come out of the part of the body that they are deepest
+        in."""
         away, gaps = self._away(balls, frames)
         rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
         way, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)

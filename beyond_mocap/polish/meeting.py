@@ -176,9 +176,9 @@ def shifted(
 
 
 def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int]) -> np.ndarray:
-    """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, from and to the frames `bounds` at
-    which it changes its course anyway: in between its velocity changes by the same at every frame, so that what flies
-    or rolls goes on doing so."""
+    """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, from and to the frames `bounds`
+    at which it changes its course anyway: in between its velocity changes by the same at every frame, so that what
+    flies or rolls goes on doing so."""
     shifts = places - ball[list(held)]
     out = lead(lead(ball, held[0], bounds[0], shifts[0]), held[1], bounds[1], shifts[1])
     out[list(held)] = places
@@ -186,8 +186,8 @@ def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tup
 
 
 def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.ndarray:
-    """The ball's path (T, 3) m moved by `shift` (3,) m at `frame`, by nothing at `anchor` and beyond, and evenly less in
-    between. Its height is what it was as soon as it comes to the ground."""
+    """The ball's path (T, 3) m moved by `shift` (3,) m at `frame`, by nothing at `anchor` and beyond, and evenly less
+    in between. Its height is what it was as soon as it comes to the ground."""
     between = np.arange(frame, anchor, 1 if anchor > frame else -1)
     between = between[(between >= 0) & (between < len(ball))]
     out = ball.copy()

@@ -91,7 +91,8 @@ class BvhStream:
         return [frame for frame in found if frame is not None]
 
     def lost(self) -> None:
-        """The connection was lost: what is half there will not be completed, and who comes next may have another name."""
+        """The connection was lost: what is half there will not be completed,
+        and who comes next may have another name."""
         self._waiting, self._opened, self._depth, self._sent, self._avatar = b"", [], 0, None, None
 
     def _piece(self, line: str) -> Frame | None:

@@ -72,8 +72,8 @@ class Status:
 
 
 class Listener:
-    """Receives one stream at a time. protocol: of PROTOCOLS. hierarchy: text of a BVH HIERARCHY for streams without one.
-    unit: metres per unit of the stream (None: guessed). seconds: that frames are kept."""
+    """Receives one stream at a time. protocol: of PROTOCOLS. hierarchy: text of a BVH HIERARCHY for streams without
+    one. unit: metres per unit of the stream (None: guessed). seconds: that frames are kept."""
 
     def __init__(
         self, port: int = PORT, protocol: str = "udp", hierarchy: str | None = None, unit: float | None = None,

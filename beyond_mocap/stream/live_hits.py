@@ -61,8 +61,9 @@ class LiveHits:
 
 
 def recorded(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
-    """The last `seconds` of a stream as a motion; None where there is less than two frames. rate: no more frames a second
-    than this. Networks bring frames in bunches, so they are taken to be evenly apart from the first to the last."""
+    """The last `seconds` of a stream as a motion; None where there is less than two frames. rate: no more frames a
+    second than this. Networks bring frames in bunches, so they are taken to be evenly apart from the first to the
+    last."""
     frames = listener.since(0)
     frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
     return even(frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None

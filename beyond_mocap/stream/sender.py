@@ -25,7 +25,8 @@ _LARGEST_DATAGRAM = 60000
 
 
 class Sender:
-    """Sends a BVH file. way: of WAYS. form: of FORMS. rate: frames a second (None: the file's). loop: again and again."""
+    """Sends a BVH file. way: of WAYS. form: of FORMS. rate: frames a second (None: the file's).
+    loop: again and again."""
 
     def __init__(
         self, path, port: int, way: str = "udp", form: str = "bvh", rate: float | None = None, loop: bool = False

@@ -60,8 +60,8 @@ Term = tuple[str, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Alike:
-    """How far two poses are apart: the sum of the distances of their bones (N, P, 3), weighted, of the library's frames;
-    the mean over `offsets` in frames from the cut, so that what follows and went before counts too."""
+    """How far two poses are apart: the sum of the distances of their bones (N, P, 3), weighted, of the library's
+    frames; the mean over `offsets` in frames from the cut, so that what follows and went before counts too."""
 
     bones: np.ndarray
     offsets: tuple[int, ...] = (0,)
@@ -74,8 +74,8 @@ class PathCosts:
         self, library: Library, wanted: Wanted, weights: Weights = Weights(), used: tuple[Used, ...] = (),
         alike: Alike | None = None,
     ):
-        """used: footage that another solution is to do without where it can. alike: another measure of how far two poses
-        are apart than that of the features."""
+        """used: footage that another solution is to do without where it can. alike: another measure of how far two
+        poses are apart than that of the features."""
         self.library, self.wanted, self.weights = library, wanted, weights
         self.price = price(library, used) if used else None
         self.alike = alike
@@ -150,7 +150,9 @@ class PathCosts:
         turn = _between(self.frames.heading, b, high) - _between(self.frames.heading, a, high)
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
         middle = self.inside((a + b) / 2.0)
-        yield from self._motion_terms(first, end, speed, turn, self.offer.offset[middle], self.offer.long_stance[middle])
+        yield from self._motion_terms(
+            first, end, speed, turn, self.offer.offset[middle], self.offer.long_stance[middle]
+        )
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
         far = self.weights.stretch * np.maximum(off - 0.15, 0.0)

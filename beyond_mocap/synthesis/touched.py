@@ -1,11 +1,11 @@
 """What an edit touches: where the new order differs from the old one, and what of it has to be searched anew.
 
-Touched is what is asked otherwise: other words, also such that must not be, another speed (by more than 5 cm/s), turning
-(by more than 0.05 rad over a slot) or facing (by more than 0.3 rad), and key moments that moved, changed their words, came,
-went, or whose ball has moved (by more than 15 cm), with the entry and exit of their clips. Around it a run-up of a second
-is searched too, so that the new motion finds into the old one; key moments that stay are gone round where they do not lie
-within. Where only the track or the ball lies elsewhere (by more than a millimetre), what is shown stays and is laid out
-anew.
+Touched is what is asked otherwise: other words, also such that must not be, another speed (by more than 5 cm/s),
+turning (by more than 0.05 rad over a slot) or facing (by more than 0.3 rad), and key moments that moved, changed their
+words, came, went, or whose ball has moved (by more than 15 cm), with the entry and exit of their clips. Around it a
+run-up of a second is searched too, so that the new motion finds into the old one; key moments that stay are gone round
+where they do not lie within. Where only the track or the ball lies elsewhere (by more than a millimetre), what is shown
+stays and is laid out anew.
 """
 
 from __future__ import annotations

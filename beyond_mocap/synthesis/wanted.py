@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import (
-    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill, gait_thresholds,
-    spoken, words_per_frame,
+    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill,
+    gait_thresholds, spoken, words_per_frame,
 )
 from ..errors import NotInLibrary, TimedLine
 from ..library.automatic import automatic_words
@@ -41,10 +41,11 @@ class WantedKey:
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
-    avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style: (N,)
-    float32 cost per slot of library frames without the style that is asked, None where none is. weak_foot: side of the
-    foot that key moments without a side rather leave, or "". gait: per frame index into the library's gaits. timeline:
-    filled. keys: in time order. allowed: (C,) clips to use. warnings: what the library lacks of what is asked."""
+    avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style:
+    (N,) float32 cost per slot of library frames without the style that is asked, None where none is. weak_foot: side of
+    the foot that key moments without a side rather leave, or "". gait: per frame index into the library's gaits.
+    timeline: filled. keys: in time order. allowed: (C,) clips to use. warnings: what the library lacks of what is
+    asked."""
 
     track: SampledTrack
     asked: tuple[Words, ...]
@@ -99,7 +100,9 @@ def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided:
     out = gait.copy()
     for frame in [frame for frame, avoid in enumerate(avoided) if library.gaits[gait[frame]].word in avoid]:
         others = [n for n, other in enumerate(library.gaits) if other.word not in avoided[frame]]
-        away = [abs(np.log((library.gaits[n].speed + STANDING_SPEED) / (speed[frame] + STANDING_SPEED))) for n in others]
+        away = [
+            abs(np.log((library.gaits[n].speed + STANDING_SPEED) / (speed[frame] + STANDING_SPEED))) for n in others
+        ]
         out[frame] = others[int(np.argmin(away))] if others else gait[frame]
     return out
 

@@ -73,7 +73,9 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     if heir is not None:  # what came before the first handover is brought back after the last
         theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
         if not kept.get("others"):
-            theirs.update({name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False)
+            theirs.update(
+                {name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False
+            )
         theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
         heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
         return

@@ -52,7 +52,8 @@ class BeyondMocapAim(bpy.types.PropertyGroup):
     )
     last: IntProperty(
         name="To", default=1, update=changed,
-        description="Last frame on which the ball may be struck; of all, the one with the part fastest that way is taken",
+        description="Last frame on which the ball may be struck; of all, the one with the part fastest that way is "
+        "taken",
     )
     place: FloatVectorProperty(
         name="From", size=3, options={"HIDDEN"}, description="Where the ball lies when nobody strikes it, metres"

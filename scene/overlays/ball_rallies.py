@@ -1,5 +1,6 @@
-"""What is drawn of a passing scene, as in Ball handling Fig. 6: the flight in which the ball is just now in white, before it those that
-its strike could have given in black, other flights thin; where strikes are, and where the ball bounces.
+"""What is drawn of a passing scene, as in Ball handling Fig. 6: the flight in which the ball is just now in white,
+before it those that its strike could have given in black, other flights thin; where strikes are, and where the ball
+bounces.
 
 Every shape hangs on the very rally that it was made of. Knows neither gpu nor how to draw.
 """
@@ -48,7 +49,9 @@ def whole(shown: rally.Rally) -> list[Mesh]:
         crosses = np.concatenate([shapes.cross(place, CROSS) for place in shown.strikes])
         found.append(Mesh("LINES", crosses, colours.repeated(colours.STRIKE, len(crosses)), WIDE))
     if len(shown.bounces):
-        rings = np.concatenate([shapes.circle(place + [0.0, 0.0, LIFT], RING) for place in shown.bounces]).astype(np.float32)
+        rings = np.concatenate(
+            [shapes.circle(place + [0.0, 0.0, LIFT], RING) for place in shown.bounces]
+        ).astype(np.float32)
         found.append(Mesh("LINES", rings, colours.repeated(colours.ORANGE, len(rings)), 2.5))
     return found
 

@@ -115,7 +115,8 @@ ROWS = {
     "speed": _keys(("asked speed", colours.ASKED), ("the body's", colours.PLAYED), ("1 m high: 5 m/s", colours.GREY)),
     "contacts": _keys(*_SIDES),
     "rides": _keys(("original", colours.SKY), ("new path", colours.ORANGE), ("a tick: 1 s", colours.GREY)),
-    "shots": _keys(("the ball's way", colours.WHITE), ("other ways", colours.BLACK), ("after the target", colours.VERMILION),
-                   ("striking part", colours.SKY), ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
+    "shots": _keys(("the ball's way", colours.WHITE), ("other ways", colours.BLACK),
+                   ("after the target", colours.VERMILION), ("striking part", colours.SKY),
+                   ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
     "moments": _keys(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),
 }

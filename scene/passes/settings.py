@@ -70,7 +70,9 @@ def touch_live(_settings, _context) -> None:
 
 def renamed(player, context) -> None:
     """A player's new name is his in all passes; one that another has is not taken, or their passes would be one's."""
-    if player.known and any(row != player and row.name == player.name for row in player.id_data.beyond_mocap_passes.players):
+    if player.known and any(
+        row != player and row.name == player.name for row in player.id_data.beyond_mocap_passes.players
+    ):
         player.name = player.known
         return
     if player.known and player.known != player.name:

@@ -1,7 +1,7 @@
 """Play live: while the scene plays, who has the ball does what the user does, and passes to whom the user has chosen.
 
-What the user does is recognised by `follow`; the pass is worked out in a thread, from where all stand, and laid into the
-running scene as soon as it is there. The bodies and the ball are those of the passing scene.
+What the user does is recognised by `follow`; the pass is worked out in a thread, from where all stand, and laid into
+the running scene as soon as it is there. The bodies and the ball are those of the passing scene.
 """
 
 from __future__ import annotations
@@ -105,7 +105,9 @@ def shown_by(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
     sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
     hits = [hit for side in sides for hit in analyse(motion, settings.part, side, settings.threshold or None).motions]
     if not hits:
-        raise InputError(f"armature {body.name}", f"no strike of the {settings.part}", "one", "choose the part under Live Stream")
+        raise InputError(
+            f"armature {body.name}", f"no strike of the {settings.part}", "one", "choose the part under Live Stream"
+        )
     now = scene.frame_current - (action.first_frame(body) or 0)
     return min(hits, key=lambda hit: (abs(hit.key - now), -hit.max_speed))
 

@@ -24,7 +24,8 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
         name="Port", default=7001, min=1024, max=65535, description="Of this machine; nothing from outside gets in"
     )
     clip: StringProperty(
-        name="Suit's BVH", subtype="FILE_PATH", description="A BVH file of the same suit, for streams that send numbers only; else empty"
+        name="Suit's BVH", subtype="FILE_PATH",
+        description="A BVH file of the same suit, for streams that send numbers only; else empty",
     )
     unit: FloatProperty(
         name="Unit", default=0.0, min=0.0, max=10.0, precision=4,
@@ -37,7 +38,9 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
         description="Metres above the ground that the part has to rise in a strike; 0: automatic",
     )
     target: StringProperty(
-        name="Target", description="Who gets the next pass in Play Live; empty: the next one of the list. Keys 1 to 9, or click a player"
+        name="Target",
+        description="Who gets the next pass in Play Live; empty: the next one of the list. Keys 1 to 9, or click a "
+        "player",
     )
     bounces: IntProperty(name="Bounces", default=0, min=0, max=5, description="Of the ball on its way in Play Live")
     body: PointerProperty(

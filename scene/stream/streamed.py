@@ -33,9 +33,11 @@ def create(context: bpy.types.Context, motion: Motion, name: str = "Stream") -> 
     return thing
 
 
-def pose(thing: bpy.types.Object, scene: bpy.types.Scene, skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> None:
-    """Put an armature into a pose: root (3,) m and local rotations (J, 4). Where the object lies and which way it is turned
-    about the vertical is left to the user, so that the streamed body can stand beside others."""
+def pose(
+    thing: bpy.types.Object, scene: bpy.types.Scene, skeleton: Skeleton, root: np.ndarray, local: np.ndarray
+) -> None:
+    """Put an armature into a pose: root (3,) m and local rotations (J, 4). Where the object lies and which way it is
+    turned about the vertical is left to the user, so that the streamed body can stand beside others."""
     lie, rest = armature.placement_now(thing, scene), armature.rest_rotations(thing, skeleton.names)
     turn = quaternion.about_up(quaternion.yaw(lie.rotation))
     root, local = lie.origin + quaternion.rotate(turn, root), np.array(local)

@@ -192,7 +192,10 @@ def test_physics_falls_as_fast_in_centimetres(body, room):
     wanted = room("aimed.shots").solved_of(ball).flight.at([14 / (24 / 1.001)])[0]
     bpy.ops.rigidbody.world_add()
     world = scene.rigidbody_world
-    before = world.effector_weights.gravity, world.point_cache.frame_start, world.point_cache.frame_end, world.substeps_per_frame
+    before = (
+        world.effector_weights.gravity, world.point_cache.frame_start, world.point_cache.frame_end,
+        world.substeps_per_frame,
+    )  # fmt: skip
     assert press(bpy.ops.beyond_mocap.ball_to_physics, frame=frame) == {"FINISHED"}
     for at in range(1, frame + 9):
         scene.frame_set(at)
@@ -200,7 +203,10 @@ def test_physics_falls_as_fast_in_centimetres(body, room):
     assert shown / 100.0 == pytest.approx(wanted, abs=0.05)
     assert press(bpy.ops.beyond_mocap.ball_from_physics) == {"FINISHED"}
     world = scene.rigidbody_world
-    assert before == (world.effector_weights.gravity, world.point_cache.frame_start, world.point_cache.frame_end, world.substeps_per_frame)
+    assert before == (
+        world.effector_weights.gravity, world.point_cache.frame_start, world.point_cache.frame_end,
+        world.substeps_per_frame,
+    )  # fmt: skip
 
 
 def test_two_balls_are_taken_back_in_any_order(aimed, room):

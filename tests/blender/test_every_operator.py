@@ -21,7 +21,8 @@ from conftest import EXTENSION
 from undo import press, state
 
 SAYS_NOTHING = re.compile(
-    r"Traceback|failed, context is incorrect|\w+Error: '|has no attribute|NoneType|StructRNA|<bpy|^\W*$|Errno|object is not"
+    r"Traceback|failed, context is incorrect|\w+Error: '|has no attribute|NoneType|StructRNA|<bpy|^\W*$|Errno|"
+    r"object is not"
 )
 
 
@@ -117,7 +118,9 @@ def ride_elsewhere():
 def ride_asked():
     """The same, and it has been asked to wait, though nobody is in the way."""
     ride()
-    rider = next(thing for thing in bpy.data.objects if thing.type == "ARMATURE" and thing.beyond_mocap_ride.on).beyond_mocap_ride
+    rider = next(
+        thing for thing in bpy.data.objects if thing.type == "ARMATURE" and thing.beyond_mocap_ride.on
+    ).beyond_mocap_ride
     rider.delay = rider.added = 1.0
 
 
@@ -264,7 +267,9 @@ ROWS = {
     "edit_words": Row("imported", lambda places: {"words": "header"}, pick_a_moment),
     "error_curves": Row("synthesized"),
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
-    "export_motion": Row("accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False),
+    "export_motion": Row(
+        "accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False
+    ),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
     "free_ball": Row("accepted", prepare=carry),
     "go_to_strike": Row("accepted", lambda places: {"frame": 7}, analyse),
@@ -294,7 +299,9 @@ ROWS = {
     "passes_clear": Row("imported", prepare=make_scene),
     "passes_make": Row("imported", prepare=one_pass),
     "passes_sample": Row("imported", lambda places: {"sample": "three"}),
-    "passes_to_json": Row("imported", lambda places: {"filepath": f"{places.out}/scene.json"}, fill_scene, changes=False),
+    "passes_to_json": Row(
+        "imported", lambda places: {"filepath": f"{places.out}/scene.json"}, fill_scene, changes=False
+    ),
     "path_apart": Row("accepted", prepare=ride_asked),
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "path_cameras": Row("accepted", prepare=ride),
@@ -435,7 +442,9 @@ def test_in_an_awkward_situation_it_works_or_says_what_to_do(wrong, begin, capfd
             complaints.append(f"{name}: says {said!r}")
         if said and state() != before:
             now = state()
-            complaints.append(f"{name}: failed and changed {[key for key in now if now[key] != before[key]]}; said {said!r}")
+            complaints.append(
+                f"{name}: failed and changed {[key for key in now if now[key] != before[key]]}; said {said!r}"
+            )
         if linked_motions() != linked:
             complaints.append(f"{name}: wrote to what is linked from another file, which is lost with the next load")
         if "Traceback" in printed and not said:
@@ -450,8 +459,8 @@ def test_it_says_what_it_is(name):
     assert operator.name and operator.description and not operator.description.endswith(".")
     assert cls.bl_options & {"REGISTER", "INTERNAL"}
     assert not ROWS[name].changes or "UNDO" in cls.bl_options
-    unnamed = [known.identifier for known in operator.properties if known.identifier != "rna_type" and not known.is_hidden
-               and not (known.name and known.description)]
+    unnamed = [known.identifier for known in operator.properties
+               if known.identifier != "rna_type" and not known.is_hidden and not (known.name and known.description)]
     assert not unnamed
 
 
@@ -460,5 +469,6 @@ def test_every_setting_says_what_it_is():
               if cls.__module__.startswith("bl_ext.user_default.beyond_mocap") and cls.is_registered]
     assert groups
     silent = [f"{cls.__name__}.{known.identifier}" for cls in groups for known in cls.bl_rna.properties
-              if known.identifier not in {"rna_type", "name", "bl_idname"} and not known.is_hidden and not known.description]
+              if known.identifier not in {"rna_type", "name", "bl_idname"}
+              and not known.is_hidden and not known.description]
     assert not silent

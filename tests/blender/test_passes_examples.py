@@ -11,7 +11,8 @@ from conftest import EXTENSION
 from undo import press, state
 
 LIBRARY = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "passes" / "library"
-USED = ("volley_pass", "volley_toss", "volley_attack", "volley_receive", "ready", "walking_1_2", "standing_turn", "walking_0")
+USED = ("volley_pass", "volley_toss", "volley_attack", "volley_receive", "ready", "walking_1_2", "standing_turn",
+        "walking_0")  # fmt: skip
 
 
 @pytest.fixture

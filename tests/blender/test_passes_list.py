@@ -105,7 +105,9 @@ def test_rows_are_added_moved_and_removed(room):
 def test_each_is_one_step_of_undo():
     assert_one_step(bpy.ops.beyond_mocap.passes_sample, sample="three")
     assert_one_step(bpy.ops.beyond_mocap.passes_list, rows="players", what="ADD")
-    assert_one_step(bpy.ops.beyond_mocap.passes_list, rows="passes", what="DOWN" if settings().active_pass == 0 else "UP")
+    assert_one_step(
+        bpy.ops.beyond_mocap.passes_list, rows="passes", what="DOWN" if settings().active_pass == 0 else "UP"
+    )
     assert_one_step(bpy.ops.beyond_mocap.passes_list, rows="players", what="REMOVE")
 
 

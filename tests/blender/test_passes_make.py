@@ -25,7 +25,8 @@ def clips(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("clips")
     for path in LIBRARY.iterdir():
-        if path.stem.startswith(("volley_pass", "volley_toss", "volley_receive", "volley_racquet", "ready", "walking_1_2", "standing_turn", "walking_0")):
+        if path.stem.startswith(("volley_pass", "volley_toss", "volley_receive", "volley_racquet", "ready",
+                                 "walking_1_2", "standing_turn", "walking_0")):  # fmt: skip
             shutil.copy(path, folder)
     return folder
 
@@ -87,7 +88,9 @@ def test_what_is_drawn_is_what_is_played(two, room):
     frame = int(lines[0].partition("\t")[0]) + 3
     two.frame_set(frame)
     meshes = [mesh for item in overlay.items(two) for mesh in item.meshes()]
-    assert len(meshes) == 5 and all(np.isfinite(mesh.points).all() and len(mesh.points) == len(mesh.colours) for mesh in meshes)
+    assert len(meshes) == 5 and all(
+        np.isfinite(mesh.points).all() and len(mesh.points) == len(mesh.colours) for mesh in meshes
+    )
     start = next(way[0] for way in shown.ways[1:])
     assert np.allclose(start, shown.strikes[0], atol=1e-3)
     press(bpy.ops.beyond_mocap.passes_clear)
@@ -125,7 +128,10 @@ def test_each_is_one_step_of_undo_and_clear_leaves_the_lists(two):
 
 def test_again_leaves_nothing_behind(two):
     press(bpy.ops.beyond_mocap.passes_make)
-    before = {kind: sorted(item.name for item in getattr(bpy.data, kind)) for kind in ("objects", "armatures", "actions", "meshes")}
+    before = {
+        kind: sorted(item.name for item in getattr(bpy.data, kind))
+        for kind in ("objects", "armatures", "actions", "meshes")
+    }
     settings().passes[0].bounces = 2
     press(bpy.ops.beyond_mocap.passes_make)
     after = {kind: sorted(item.name for item in getattr(bpy.data, kind)) for kind in before}

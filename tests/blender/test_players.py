@@ -10,8 +10,8 @@ import pytest
 from undo import assert_one_step, press, state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend"
-CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside",
-         "receive_foot", "dribble_jogging")
+CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
+         "kick_low_inside", "receive_foot", "dribble_jogging")
 WORDS = "6.0 kick right running low inside\n"
 
 
@@ -114,7 +114,10 @@ def test_what_the_panel_lets_one_set_is_what_the_plan_asks(extension, ready, cor
     ready.solve_touches = True
     plan = plans.plan_of(ready, player)[0]
     assert {name: getattr(plan, name) for name in numbers} == pytest.approx(numbers)
-    assert plain.made and not plan.made and plan.solve_touches and plan.gaits == (("walking", "walk.bvh"), ("jogging", "jog.bvh"))
+    assert (
+        plain.made and not plan.made and plan.solve_touches
+        and plan.gaits == (("walking", "walk.bvh"), ("jogging", "jog.bvh"))
+    )  # fmt: skip
     ready.gaits = "walking"
     with pytest.raises(RuntimeError, match="WORD=CLIP"):
         bpy.ops.beyond_mocap.synthesize()
@@ -185,7 +188,8 @@ def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, 
 
 
 def test_solved_touches_come_out_as_the_core_has_them(extension, ready, match, core, session):
-    """A ball that is kicked at 6.13 s, asked for at 6.0 s: played, shown in the quality's line, and made anew by Update."""
+    """A ball that is kicked at 6.13 s, asked for at 6.0 s: played, shown in the quality's line,
+    and made anew by Update."""
     rows = [line.split(",") for line in (match / "player1.csv").read_text().splitlines()[1:]]
     since = np.array([float(row[0]) for row in rows]) - 6.13
     place = [np.interp(0.0, since, [float(row[axis]) for row in rows]) for axis in (1, 2)]

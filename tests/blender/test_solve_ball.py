@@ -67,7 +67,9 @@ def test_the_ball_is_where_the_samples_have_it(match):
     for row in table[:: len(table) // 20]:
         frame = clock.frame(row["time_s"])
         match.frame_set(int(np.floor(frame)), subframe=frame - np.floor(frame))
-        off.append(np.linalg.norm(np.array(ball.matrix_world.translation) / 100.0 - [row[f"ball_{axis}_m"] for axis in "xyz"]))
+        off.append(
+            np.linalg.norm(np.array(ball.matrix_world.translation) / 100.0 - [row[f"ball_{axis}_m"] for axis in "xyz"])
+        )
     assert np.median(off) < 0.03 and max(off) < 0.3, off
 
 
@@ -80,7 +82,9 @@ def test_a_key_moment_that_is_there_already_stays_alone(match, lanes):
     player = match.beyond_mocap.players["player2"]
     words = [moment.key.words for moment in lanes.moments(player.dot)]
     assert words.count(("kick",)) == 0 and ("receive", "foot") in words and ("kick", "left") in words
-    assert not lanes.has(match.beyond_mocap.players["player1"].dot) or not lanes.moments(match.beyond_mocap.players["player1"].dot)
+    assert not lanes.has(match.beyond_mocap.players["player1"].dot) or not lanes.moments(
+        match.beyond_mocap.players["player1"].dot
+    )
 
 
 def test_each_is_one_step_of_undo(match):

@@ -62,7 +62,9 @@ def places(scene, frames):
 
 
 def test_all_stand_and_the_ball_lies(playing, room):
-    assert room("stream.play").rally().holder == "Ann" and told().playing and told().played.startswith("Ann has the ball")
+    assert (
+        room("stream.play").rally().holder == "Ann" and told().playing and told().played.startswith("Ann has the ball")
+    )
     assert all(row.body is not None for row in playing.beyond_mocap_passes.players)
     assert playing.frame_end >= 5 + 60 * 24
     assert np.ptp(places(playing, (5, 100, 900)), axis=0).max() < 1e-6
@@ -81,7 +83,9 @@ def test_a_strike_is_answered_from_now_on(playing, room, core):
     speed = np.linalg.norm(np.diff(way, axis=0), axis=1) * 24
     assert speed[: int(struck) - 54].max() < 4.0 < speed.max() < 20.0
     assert [row.body for row in playing.beyond_mocap_passes.players] == bodies
-    assert "Ben has the ball, passes so far: 1" in told().played and "Ann played volley_pass.bvh to Ben" in told().played
+    assert (
+        "Ben has the ball, passes so far: 1" in told().played and "Ann played volley_pass.bvh to Ben" in told().played
+    )
 
 
 def test_whom_the_user_chooses_gets_it(playing, room, core):

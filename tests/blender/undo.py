@@ -5,8 +5,8 @@ import zlib
 import bpy
 import numpy as np
 
-KINDS = ("objects", "armatures", "actions", "meshes", "curves", "materials", "cameras", "lights", "collections", "worlds",
-         "texts")
+KINDS = ("objects", "armatures", "actions", "meshes", "curves", "materials", "cameras", "lights", "collections",
+         "worlds", "texts")
 OURS = "beyond_mocap"  # every group of properties that the extension hangs on Blender's data has a name that begins so
 
 
@@ -23,10 +23,13 @@ def state():
         "drawn": {curve.name: [(*point.co, point.radius) for spline in curve.splines
                                for point in (spline.bezier_points or spline.points)] for curve in bpy.data.curves},
         "keys": {action.name: keys(action) for action in bpy.data.actions},
-        "owned": {f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind) if (found := ours(item))},
+        "owned": {
+            f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind) if (found := ours(item))
+        },
         "camera": scene.camera and scene.camera.name,
         "frames": (scene.frame_start, scene.frame_end, scene.render.fps, scene.frame_current),
-        "chosen": (layer.objects.active and layer.objects.active.name, sorted(o.name for o in layer.objects if o.select_get()),
+        "chosen": (layer.objects.active and layer.objects.active.name,
+                   sorted(o.name for o in layer.objects if o.select_get()),
                    bpy.context.mode),
         "settings": plain(scene.beyond_mocap),
         "passes": plain(scene.beyond_mocap_passes),

@@ -16,8 +16,8 @@ import pytest
 
 TOP = pathlib.Path(__file__).resolve().parents[2]
 CORE = "beyond_mocap"
-BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui", "bl_operators", "bmesh", "addon_utils",
-           "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}
+BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui", "bl_operators", "bmesh",
+           "addon_utils", "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}
 ARRAYS = {"numpy", "scipy"}
 FORBIDDEN = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve"}
 DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc"}
@@ -128,7 +128,9 @@ def extension_complaint(path, imported):
     room = path.parts[0]
     package = imported.name.split(".")[0]
     if imported.relative:
-        return None if any(below(imported.name, prefix) for prefix in EXTENSION[room]) else f"{room} may not import this"
+        return (
+            None if any(below(imported.name, prefix) for prefix in EXTENSION[room]) else f"{room} may not import this"
+        )
     if package == CORE or package in EXTENSION:
         return "our own modules are imported relatively"
     if package in sys.stdlib_module_names or package in BLENDER or package == "numpy":
@@ -226,4 +228,6 @@ def test_links_in_the_docs_lead_somewhere():
     pages = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
     links = [(page, link) for page in pages for link in re.findall(r"\]\(([^)#\s]+)", page.read_text("utf-8"))]
     assert links
-    assert [f"{page.name}: {link}" for page, link in links if "://" not in link and not (page.parent / link).exists()] == []
+    assert [
+        f"{page.name}: {link}" for page, link in links if "://" not in link and not (page.parent / link).exists()
+    ] == []

@@ -82,7 +82,11 @@ def test_default_takes_know_nothing_of_it(library, planted, timeline_of):
         ([(5.0, KICK)], [(5.0, False, "foot", "kick"), (5.3, True, "foot", "kick")], [5.3]),
         ([(5.0, KICK)], [(5.0, None, "foot", "kick")], [5.0]),
         ([(5.0, "receive foot"), (5.2, KICK)], [(5.05, True, "foot", "kick")], [None, 5.05]),
-        ([(5.0, "receive foot"), (5.4, KICK)], [(5.1, True, "foot", "receive"), (5.3, True, "foot", "kick")], [5.1, 5.3]),
+        (
+            [(5.0, "receive foot"), (5.4, KICK)],
+            [(5.1, True, "foot", "receive"), (5.3, True, "foot", "kick")],
+            [5.1, 5.3],
+        ),
         ([(5.0, "header")], [(5.2, True, "", "kick")], [5.2]),
         ([(5.0, "celebration")], [(5.0, True, "foot", "kick")], [None]),
         ([(5.0, KICK), (5.0, KICK)], [(5.1, True, "foot", "kick")], [None, None]),

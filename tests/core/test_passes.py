@@ -202,8 +202,12 @@ def test_strikes_that_no_words_tell_of_are_told(strikes_library):
     def quiet(row):
         return replace(row, words=("standing",), key=None) if "stroke" in row.words else row
 
-    assert not [line for line in passes(strikes_library, parse_scene(SAMPLES["racquet"])).warnings if "no words" in line]
-    silent = tuple(replace(clip, annotations=tuple(quiet(row) for row in clip.annotations)) for clip in strikes_library.clips)
+    assert not [
+        line for line in passes(strikes_library, parse_scene(SAMPLES["racquet"])).warnings if "no words" in line
+    ]
+    silent = tuple(
+        replace(clip, annotations=tuple(quiet(row) for row in clip.annotations)) for clip in strikes_library.clips
+    )
     told = passes(replace(strikes_library, clips=silent, kept=None), parse_scene(SAMPLES["racquet"])).warnings
     assert any("no words of the library tell of strikes with the tool" in line for line in told)
 

@@ -33,8 +33,8 @@ def annotations():
 def test_every_kind_of_movement_is_there():
     found = {word for _, _, rows in annotations() for row in rows for word in row.words}
     assert found >= {
-        "standing", "walking", "jogging", "running", "sprinting", "turning", "left", "right", "back", "dribble", "receive",
-        "kick", "header", "throwb", "getting_up", "celebration",
+        "standing", "walking", "jogging", "running", "sprinting", "turning", "left", "right", "back", "dribble",
+        "receive", "kick", "header", "throwb", "getting_up", "celebration",
     }  # fmt: skip
     assert found <= vocabulary_words()
 
@@ -103,5 +103,9 @@ def test_the_passing_library_is_what_its_script_makes(maker, monkeypatch):
         shipped = bvh.read(folder / f"{name}.bvh").motion
         assert np.allclose(shipped.root_positions, clips[name].motion.root_positions, atol=1e-4)
     assert shipped.skeleton.same_bones(bvh.read(SAMPLE / "library" / "standing_1.bvh").motion.skeleton)
-    keyed = {row.words for path in folder.glob("volley_*.bvh") for row in read_clip_annotations(path.with_suffix(".txt"), 30.0)}
+    keyed = {
+        row.words
+        for path in folder.glob("volley_*.bvh")
+        for row in read_clip_annotations(path.with_suffix(".txt"), 30.0)
+    }
     assert ("standing",) in keyed and len(keyed) == 9

@@ -5,7 +5,9 @@ import time
 
 import bpy
 import numpy as np
-from tab import PICTURES, assert_no_trouble_since, output, printed_since, room, run, sample, settings, wait_for_work, window
+from tab import (
+    PICTURES, assert_no_trouble_since, output, printed_since, room, run, sample, settings, wait_for_work, window,
+)  # fmt: skip
 
 LIMIT = 800
 BEFORE = {}
@@ -22,11 +24,13 @@ def thing(name):
 
 
 def own_tab(part):
-    """One part of the panel alone in a tab of its own, so that its buttons are found quickly; returns what puts it back.
-    part: name of the function that draws it."""
+    """One part of the panel alone in a tab of its own, so that its buttons are found quickly; returns what puts it
+    back. part: name of the function that draws it."""
     kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_ball")
     was, draw, drawn = (kind.bl_category, kind.bl_options), kind.draw, getattr(room("panels.ball"), part)
-    kind.draw = lambda self, context: drawn(*([self] if part in ("passing", "tracked", "live") else []), self.layout, context)
+    kind.draw = lambda self, context: drawn(
+        *([self] if part in ("passing", "tracked", "live") else []), self.layout, context
+    )
 
     def place(category, options):
         bpy.utils.unregister_class(kind)
@@ -123,7 +127,10 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
     match = sample() / "match"
-    run("beyond_mocap.import_tracking", "EXEC_DEFAULT", directory=f"{match}/", files=[{"name": "player1.csv"}, {"name": "player2.csv"}])
+    run(
+        "beyond_mocap.import_tracking", "EXEC_DEFAULT", directory=f"{match}/",
+        files=[{"name": "player1.csv"}, {"name": "player2.csv"}],
+    )
     for player in settings().players:  # without their words
         player.annotation_file = ""
         for track in list(player.dot.animation_data.nla_tracks):
@@ -148,7 +155,8 @@ def few_clips():
     folder = PICTURES / "few_clips"
     folder.mkdir(exist_ok=True)
     for path in (sample() / "passes" / "library").iterdir():
-        if path.stem.startswith(("volley_pass", "volley_toss", "volley_attack", "volley_receive", "ready", "walking_1_2", "standing_turn")):
+        if path.stem.startswith(("volley_pass", "volley_toss", "volley_attack", "volley_receive", "ready",
+                                 "walking_1_2", "standing_turn")):  # fmt: skip
             shutil.copy(path, folder)
     return str(folder.resolve())
 
@@ -209,10 +217,14 @@ def check_a_dragged_place_makes_the_scene_anew():
     assert np.linalg.norm(place - hips) < 0.8, (place, hips)
     yield from window.press("Z", ctrl=True)
     yield 1.0
-    assert passes().made_of == BEFORE["made"] and np.array_equal(places("Passing Ball"), BEFORE["ball"]), "undo is another scene"
+    assert passes().made_of == BEFORE["made"] and np.array_equal(
+        places("Passing Ball"), BEFORE["ball"]
+    ), "undo is another scene"
     yield from window.press("Z", ctrl=True)
     yield 2.0
-    assert np.allclose(thing("Ann place").location, BEFORE["place"], atol=1e-6), "the second undo does not take the drag back"
+    assert np.allclose(
+        thing("Ann place").location, BEFORE["place"], atol=1e-6
+    ), "the second undo does not take the drag back"
     assert passes().made_of == BEFORE["made"]
     assert_no_trouble_since(mark)
 

@@ -21,7 +21,10 @@ def test_it_is_equation_1(library):
     weights = BoneWeights((1.0, 0.5, 2.0, 0.0, 3.0, 1.0), (0.1, 0.2, 0.0, 0.3, 0.1, 0.4))
     first, other = library.frames.first[:2]
     clips, at = library.clips[:2], np.array([3.0, 11.0])
-    poses = [aligned(clip.motion, library.frames.source[start + 3 : start + 12 : 8]) for clip, start in zip(clips, (first, other))]
+    poses = [
+        aligned(clip.motion, library.frames.source[start + 3 : start + 12 : 8])
+        for clip, start in zip(clips, (first, other))
+    ]
     by_hand = np.zeros((2, 2))
     for bone in range(len(BONES)):
         for part, own in enumerate((weights.position, weights.velocity)):

@@ -35,7 +35,9 @@ def test_in_world_undoes_the_frame(kick):
     np.testing.assert_allclose(in_world(own.start, places[150, 0, :2], heading)[0], start, atol=1e-9)
 
 
-@pytest.mark.parametrize("part, side", [("foot", "right"), ("head", ""), ("chest", ""), ("hand", "left"), ("tool", "right")])
+@pytest.mark.parametrize(
+    "part, side", [("foot", "right"), ("head", ""), ("chest", ""), ("hand", "left"), ("tool", "right")]
+)
 @pytest.mark.parametrize("radius", [0.033, 0.105, 0.11])
 def test_the_ball_touches_from_any_side(kick, part, side, radius):
     """Planted: whatever the way from body to ball, the gap is nothing, at every frame."""

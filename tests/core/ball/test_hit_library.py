@@ -67,9 +67,13 @@ def test_the_words_moment_is_the_key(library, kicks):
 def test_a_touch_that_words_name_is_there_though_it_is_slow(tmp_path):
     """A trap: the foot hardly moves, and the analysis sees nothing."""
     bvh.write(tmp_path / "trap.bvh", gait(0.6, 3.0, 30.0))
-    (tmp_path / "trap.txt").write_text("0 3 walking\n1 2 receive foot right standing\n1.5 receive foot right standing\n")
+    (tmp_path / "trap.txt").write_text(
+        "0 3 walking\n1 2 receive foot right standing\n1.5 receive foot right standing\n"
+    )
     found = HitLibrary.of(build(tmp_path), "foot")
-    assert [(one.hit.side, one.hit.key, one.labelled) for one in found.hits] == [("right", 45, True), ("left", 45, True)]
+    assert [(one.hit.side, one.hit.key, one.labelled) for one in found.hits] == [
+        ("right", 45, True), ("left", 45, True)
+    ]  # fmt: skip
     assert all(30 <= one.hit.first < 45 < one.hit.last <= 60 for one in found.hits)
     assert found.of_kind("toss")[0] in (0, 1)
 

@@ -33,7 +33,9 @@ def planted(fps=60.0, moment=1.5, side="right", limb="upper_leg", strength=1.0):
     standing = gait(0.0, 3.0, fps, seed=3)
     times = np.arange(len(standing)) / fps
     angle = (
-        swung(times, moment - 0.45, -0.4, 0.1) + swung(times, moment, 1.9, 0.06) + swung(times, moment + 0.6, -1.5, 0.14)
+        swung(times, moment - 0.45, -0.4, 0.1)
+        + swung(times, moment, 1.9, 0.06)
+        + swung(times, moment + 0.6, -1.5, 0.14)
     )
     joint = getattr(getattr(identify(standing.skeleton), side), limb)
     rotations = np.array(standing.rotations)

@@ -1,4 +1,5 @@
-"""Made strikes out of standing: who strikes stands before and after, on a foot that does not slide, above the ground."""
+"""Made strikes out of standing: who strikes stands before and after, on a foot that does not slide,
+above the ground."""
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from beyond_mocap.motion.volleys import AFTER, BEFORE, VOLLEYS, volley
 
 # part, and the least and most m/s of its middle over the ground at the touch
 STRUCK = {
-    "toss": ("foot", 1.5, 5.0), "pass": ("foot", 3.0, 9.0), "attack": ("foot", 4.5, 15.0), "receive": ("foot", 0.0, 1.0),
-    "head": ("head", 1.0, 4.0), "chest": ("chest", 0.0, 0.6), "hand": ("hand", 1.0, 8.0), "racquet": ("tool", 8.0, 25.0),
+    "toss": ("foot", 1.5, 5.0), "pass": ("foot", 3.0, 9.0), "attack": ("foot", 4.5, 15.0),
+    "receive": ("foot", 0.0, 1.0), "head": ("head", 1.0, 4.0), "chest": ("chest", 0.0, 0.6),
+    "hand": ("hand", 1.0, 8.0), "racquet": ("tool", 8.0, 25.0),
 }  # fmt: skip
 
 

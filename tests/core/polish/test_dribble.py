@@ -1,4 +1,5 @@
-"""A made jog with the ball planted in the pelvis, as feeds have it: touched step by step, never in the body, slowing."""
+"""A made jog with the ball planted in the pelvis, as feeds have it: touched step by step, never in the body,
+slowing."""
 
 from dataclasses import replace
 
@@ -24,7 +25,9 @@ def run(request):
 
 
 def pelvis(motion):
-    return pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)[0][:, identify(motion.skeleton).hips]
+    return pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)[0][
+        :, identify(motion.skeleton).hips
+    ]
 
 
 def planted_ball(motion, ahead=0.0):
@@ -43,7 +46,9 @@ def dribbled(motion, ball, stretches=((15.0, 105.0),), held=(), **known):
 def gaps(motion, ball):
     """(T, 2) m, left and right foot."""
     places, world = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
-    return np.stack([ball_gap(f.line(places, world), f.radius, ball) for f in surfaces(motion.skeleton, {"dribble"})], 1)
+    return np.stack(
+        [ball_gap(f.line(places, world), f.radius, ball) for f in surfaces(motion.skeleton, {"dribble"})], 1
+    )
 
 
 def test_the_ball_is_touched_stride_by_stride_and_never_inside_a_foot(run):

@@ -102,7 +102,8 @@ def test_a_hierarchy_that_comes_again_changes_nothing(text):
 
 @pytest.mark.parametrize("rubbish", [
     b"hello there\n", b"\x00\xff\xfe\x80\n", b"1 2 3\n", b"nan " * 60 + b"\n", b"1e300 " * 60 + b"\n", b"}}}{{{\n",
-    b"HIERARCHY\nROOT a\n{\nOFFSET x y z\n}\n", b"HIERARCHY\n}\n", b"||||||\n", b"MOTION\nFrames: many\nFrame Time: x\n",
+    b"HIERARCHY\nROOT a\n{\nOFFSET x y z\n}\n", b"HIERARCHY\n}\n", b"||||||\n",
+    b"MOTION\nFrames: many\nFrame Time: x\n",
     b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 9 a b c\n}\n",
 ])  # fmt: skip
 def test_rubbish_is_counted_and_left_out(text, rubbish):
@@ -152,7 +153,9 @@ def test_what_is_sent_arrives(clip, port, way, protocol, form):
         np.testing.assert_allclose(root, motion.root_positions, atol=1e-5)
         assert status.rubbish == 0 and skeleton.same_bones(motion.skeleton)
         assert (status.way is not None and status.way < 0.5) == (form == "bvh")
-        assert [one.number for one in listener.since(status.frames - 3)] == list(range(status.frames - 2, status.frames + 1))
+        assert [one.number for one in listener.since(status.frames - 3)] == list(
+            range(status.frames - 2, status.frames + 1)
+        )
     finally:
         listener.stop()
     assert not listener.running and listener.status().state == "stopped"
