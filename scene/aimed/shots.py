@@ -15,6 +15,7 @@ from .. import channels, linked
 from ..material import colour
 from ..measure import frames_per_second, units_per_metre
 from ..passes.hits_shown import motion_of
+from ..passes.settings import KEPT
 from ..set_aside import bring_back, put_aside
 from .settings import MARK
 
@@ -120,6 +121,9 @@ def wish_of(scene: bpy.types.Scene, ball: bpy.types.Object) -> Wish:
     if aim.body is not None and aim.body.name not in scene.objects:
         found = f"{aim.body.name} is not in this scene"
         raise InputError(f"ball {ball.name}", found, "a body of this scene", "pick another body")
+    if aim.body is None and ball.get(KEPT):
+        step = "pick a body, or press Leave Aim"  # a ball that was made for a strike has no place of its own
+        raise InputError(f"ball {ball.name}", "no body strikes it", "the body that it was made for, or another", step)
     same = {field.name: getattr(aim, field.name) for field in fields(Wish) if field.name not in ("target", "place")}
     return Wish(**same, target=place_of(scene, aim.target), place=tuple(aim.place))
 

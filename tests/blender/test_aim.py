@@ -81,6 +81,14 @@ def test_the_way_does_not_hang_on_how_the_target_came_there(aimed, room):
     assert aim.arrived == pytest.approx(before, abs=0.05)
 
 
+def test_a_ball_without_its_body_is_told_and_stays(aimed, room):
+    before = [place(aimed, frame) for frame in (60, 100)]
+    aimed.beyond_mocap_aim.body = None
+    room("aimed.live").follow(bpy.context.scene)
+    assert "no body strikes it" in aimed.beyond_mocap_aim.told
+    assert np.array_equal([place(aimed, frame) for frame in (60, 100)], before)
+
+
 def test_what_is_out_of_reach_is_told_and_the_way_stays(aimed, room):
     aim, live = aimed.beyond_mocap_aim, room("aimed.live")
     kept = place(aimed, aim.arrived)
