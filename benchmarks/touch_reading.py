@@ -1,4 +1,4 @@
-"""Pictures from which a person reads when who touched the ball:
+"""Pictures from which touches are read by eye when who touched the ball:
 `python -m benchmarks.touch_reading MATCH FROM TO --out FOLDER`.
 
 Nothing here looks for touches. A picture shows some seconds of what the feed says: the ball's speed and the change of

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +68,7 @@ def _read(options):
                     raise InputError(
                         "--meta", f"{options.meta} beside a player's track", "none: a track has no metadata"
                     )
-                return read_track_csv(options.input)
+                return replace(read_track_csv(options.input), name=options.input.stem)  # who touches, in the table
     return read_match(options.input, options.meta, options.provider)
 
 
