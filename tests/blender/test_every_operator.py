@@ -198,6 +198,13 @@ def show_how():
     bpy.ops.beyond_mocap.import_clips(filepath=str(worlds.SAMPLE / "kick_low_inside.bvh"))
 
 
+def free_port():
+    """A port that no other run of the tests on this machine listens to."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
 def listen():
     """A stream is listened to, and a few frames have arrived."""
     scene = importlib.import_module(f"{EXTENSION}.scene.stream.receiver")
@@ -207,7 +214,9 @@ def listen():
         for piece in (text.split("MOTION")[0], *text.strip().split("\n")[-40:]):
             out.sendto(piece.encode(), ("127.0.0.1", listener.port))
             time.sleep(0.01)
+    end = time.monotonic() + 20.0
     while listener.status().frames < 20:
+        assert time.monotonic() < end, f"{listener.status()}"
         time.sleep(0.01)
 
 
@@ -379,6 +388,7 @@ def begin(stages):
         (places.clips / ".beyond_mocap").is_file() and (places.clips / ".beyond_mocap").unlink()
         row = ROWS[name]
         bpy.ops.wm.open_mainfile(filepath=str(top / f"{row.begin}.blend"))
+        bpy.context.scene.beyond_mocap_stream.port = free_port()
         row.prepare()
         return places, row.arguments(places)
 

@@ -2,6 +2,7 @@
 
 import importlib
 import pathlib
+import socket
 import threading
 import time
 from dataclasses import replace
@@ -106,9 +107,12 @@ def test_whom_the_user_chooses_gets_it(playing, room, core):
 
 def test_a_stream_is_answered(playing, room, core):
     """A kick that arrives over the network, told by what it is and laid into the scene."""
-    playing.beyond_mocap_stream.port = 7361
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:  # no other run of the tests listens there
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    playing.beyond_mocap_stream.port = port
     OPS.stream_start()
-    sender = core("stream.sender").Sender(CLIPS / "volley_toss.bvh", 7361)
+    sender = core("stream.sender").Sender(CLIPS / "volley_toss.bvh", port)
     thread = threading.Thread(target=sender.run, args=(lambda: False,))
     thread.start()
     look, end = room("stream.follow").look, time.monotonic() + 60.0
