@@ -58,7 +58,7 @@ HOLDS = (
     ("TOUCH", "Touching", "The ball comes to touch the part: the palm, the foot, the brow"),
 )
 PLAYED = "live"  # `made_of` of a scene that was played live: no edit of the lists makes it anew
-KEPT = "beyond_mocap_ball"  # custom property of balls and their actions that were made here
+KEPT = "beyond_mocap_scene_ball"  # custom property of balls and actions made here; no group has its name
 
 
 def touch_live(_settings, _context) -> None:
