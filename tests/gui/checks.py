@@ -31,9 +31,9 @@ def check_enabling_is_light():
         addon_utils.disable(EXTENSION)
         for name in [name for name in sys.modules if name == EXTENSION or name.startswith(EXTENSION + ".")]:
             del sys.modules[name]
-        start = time.perf_counter()
+        start = time.process_time()  # not the clock: others may be at work
         assert addon_utils.enable(EXTENSION) is not None
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.process_time() - start)
         yield 0.1
     output.say(f"     enabling took {min(seconds):.3f} s")
     assert min(seconds) < 0.3, seconds
