@@ -8,7 +8,7 @@ from ..scene.passes import graph
 from ..scene.passes.settings import active_row, ball_of, subject, told_lines
 from .aim import aim
 from .stream import live, stream
-from .tab import Step, paragraph, table
+from .tab import Step, paragraph, section, split, table
 
 PART_ICONS = {
     "foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"
@@ -70,28 +70,13 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
     def draw(self, context):
         """Its parts, each folded until it is wanted."""
         layout = self.layout
-        section(layout, "scene", "Passing Scene", lambda opened: passing(self, opened, context), closed=False)
-        section(layout, "tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
-        section(layout, "hits", "Hit Analysis", lambda opened: hits(opened, context))
-        section(layout, "hold", "Carried Ball", lambda opened: carried(opened, context))
-        section(layout, "aim", "Aim Ball", lambda opened: aim(opened, context))
-        section(layout, "stream", "Live Stream", lambda opened: stream(opened, context))
-        section(layout, "live", "Play Live", lambda opened: live(self, opened, context))
-
-
-def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
-    """A part that can be folded."""
-    header, body = layout.panel(f"beyond_mocap_ball_{name}", default_closed=closed)
-    header.label(text=title)
-    if body:
-        draw(body)
-
-
-def split(layout):
-    """A column of named values."""
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
-    return column
+        section(layout, "ball_scene", "Passing Scene", lambda opened: passing(self, opened, context), closed=False)
+        section(layout, "ball_tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
+        section(layout, "ball_hits", "Hit Analysis", lambda opened: hits(opened, context))
+        section(layout, "ball_hold", "Carried Ball", lambda opened: carried(opened, context))
+        section(layout, "ball_aim", "Aim Ball", lambda opened: aim(opened, context))
+        section(layout, "ball_stream", "Live Stream", lambda opened: stream(opened, context))
+        section(layout, "ball_live", "Play Live", lambda opened: live(self, opened, context))
 
 
 def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
@@ -126,9 +111,9 @@ def passing(panel, layout, context) -> None:
     for line in settings.told.splitlines():
         paragraph(layout, line, "INFO")
     if settings.strikes:
-        section(layout, "strikes", "Strikes", lambda opened: strikes(opened, settings))
-    section(layout, "choices", "Choices", lambda opened: choices(opened, settings))
-    section(layout, "ball", "Ball & Air", lambda opened: of_ball(opened, settings))
+        section(layout, "ball_strikes", "Strikes", lambda opened: strikes(opened, settings))
+    section(layout, "ball_choices", "Choices", lambda opened: choices(opened, settings))
+    section(layout, "ball_ball", "Ball & Air", lambda opened: of_ball(opened, settings))
 
 
 def strikes(layout, settings) -> None:
@@ -186,7 +171,7 @@ def choices(layout, settings) -> None:
     if settings.net:
         for name in ("net_from", "net_to", "net_height"):
             column.prop(settings, name)
-    section(column, "weights", "Weights", lambda opened: weights(opened, settings))
+    section(column, "ball_weights", "Weights", lambda opened: weights(opened, settings))
 
 
 def weights(layout, settings) -> None:

@@ -7,7 +7,7 @@ import bpy
 from ..scene.ride.figure_lines import lines
 from ..scene.ride.settings import meant
 from ..scene.settings import active_player
-from .tab import Step, figures, paragraph
+from .tab import Step, figures, paragraph, section, split
 
 OVERLAYS = {
     "path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
@@ -42,13 +42,13 @@ class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
             ride = body.beyond_mocap_ride
             who(layout, body, ride)
             if ride.on:
-                section(layout, "curve", "New Curve", lambda opened: new_curve(opened, context.scene.beyond_mocap))
-                section(layout, "following", "How It Follows", lambda opened: following(opened, ride))
-                section(layout, "body", "Body", lambda opened: own_body(opened, ride))
+                section(layout, "path_curve", "New Curve", lambda opened: new_curve(opened, context.scene.beyond_mocap))
+                section(layout, "path_following", "How It Follows", lambda opened: following(opened, ride))
+                section(layout, "path_body", "Body", lambda opened: own_body(opened, ride))
                 if told := lines(ride.figures):
-                    section(layout, "figures", "Figures", lambda opened: figures(opened, told))
-        section(layout, "cameras", "Cameras & Nudging", lambda opened: looking(opened, context), closed=False)
-        section(layout, "overlays", "Overlays", lambda opened: overlays(opened, context.scene.beyond_mocap.view))
+                    section(layout, "path_figures", "Figures", lambda opened: figures(opened, told))
+        section(layout, "path_cameras", "Cameras & Nudging", lambda opened: looking(opened, context), closed=False)
+        section(layout, "path_overlays", "Overlays", lambda opened: overlays(opened, context.scene.beyond_mocap.view))
 
 
 def subject(context) -> bpy.types.Object | None:
@@ -61,21 +61,6 @@ def subject(context) -> bpy.types.Object | None:
     player = active_player(context.scene.beyond_mocap)
     body = player.body if player is not None else None
     return body if body is not None and body.type == "ARMATURE" else None
-
-
-def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
-    """A part that can be folded."""
-    header, body = layout.panel(f"beyond_mocap_path_{name}", default_closed=closed)
-    header.label(text=title)
-    if body:
-        draw(body)
-
-
-def split(layout):
-    """A column of named values."""
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
-    return column
 
 
 def who(layout, body, ride) -> None:
@@ -127,7 +112,7 @@ def own_body(layout, ride) -> None:
     column = split(layout)
     for name in ("plant", "lean", "slopes", "ground"):
         column.prop(ride, name)
-    section(layout, "paper", "As in the Paper", lambda opened: paper(opened, ride))
+    section(layout, "path_paper", "As in the Paper", lambda opened: paper(opened, ride))
 
 
 def paper(layout, ride) -> None:

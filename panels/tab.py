@@ -55,6 +55,21 @@ def wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, max(16, int((width - EDGES) / LETTER)))
 
 
+def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
+    """A part that can be folded; name: its own among all panels."""
+    header, body = layout.panel(f"beyond_mocap_{name}", default_closed=closed)
+    header.label(text=title)
+    if body:
+        draw(body)
+
+
+def split(layout):
+    """A column of named values."""
+    column = layout.column()
+    column.use_property_split, column.use_property_decorate = True, False
+    return column
+
+
 class Step:
     """One step: a collapsible panel in the 3D view's sidebar. The steps stand in the order of `bl_order`."""
 
