@@ -3,6 +3,7 @@
 The way through is `import -> library -> annotate -> synthesize -> polish -> bake`, and the rooms stand in that order:
 
 - `motion`      what a movement is: quaternions, skeletons, motions, tracks, contacts, mirroring
+- `markers`     from optical markers to a skeleton
 - `files`       what enters or leaves by disk, converted once at the border
 - `annotation`  the shared language: vocabulary, timelines, their text form
 - `library`     what we choose from: clips, words, features, clusters

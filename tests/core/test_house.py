@@ -29,18 +29,19 @@ ROOMS = {
     "annotation": ["motion"],
     "plan": ["motion", "annotation"],
     "take": ["motion", "annotation", "plan", "synthesis.edit_list"],
-    "files": ["motion", "annotation", "take", "plan", "ball.pass_scene", "ball.contact"],
+    "markers": ["motion", "polish.reach", "polish.foot_plant"],
+    "files": ["motion", "annotation", "take", "plan", "ball.pass_scene", "ball.contact", "markers"],
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "polish": ["motion"],
-    "ball": ["motion", "annotation", "library", "polish"],
+    "ball": ["motion", "annotation", "library", "polish", "markers.trial"],
     "stream": ["motion", "files", "ball"],
     "evaluation": ["motion", "annotation", "plan", "take", "ball", "library"],
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
 LAZY = {
     "library": ["sklearn", "threadpoolctl"],
-    "files": ["kloppy"],
+    "files": ["kloppy", "c3d"],
     "evaluation": ["matplotlib"],
     "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn", "threadpoolctl"],
 }

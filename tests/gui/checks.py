@@ -16,7 +16,7 @@ from tab import (
 from window import unfold
 
 LIMIT = 600
-HEAVY = {"scipy", "sklearn", "kloppy", "lxml", "joblib", "matplotlib"}
+HEAVY = {"scipy", "sklearn", "kloppy", "c3d", "lxml", "joblib", "matplotlib"}
 
 
 def check_it_is_enabled():
