@@ -6,8 +6,8 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest test test-core test-blender test-oldest demo bench extension extension-all window-test pictures \
-  clean
+.PHONY: help venv venv-oldest test test-core test-blender test-oldest demo bench extension extension-all window-test window-bench \
+  pictures clean
 
 help:
 	@echo 'make venv           .venv with Blender as a Python module and all that the tests need'
@@ -17,6 +17,7 @@ help:
 	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
 	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
 	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
+	@echo 'make window-bench   the same, and times in the window that are above their targets are failures'
 	@echo 'make pictures       the pictures of docs/, taken in a real Blender of our own sample'
 	@echo 'make clean          remove build/ and the links to the virtual environments'
 
@@ -54,6 +55,9 @@ extension-all: extension
 
 window-test: extension
 	@tests/gui/run $(REAL_BLENDER)
+
+window-bench: extension
+	@SPEED=--speed tests/gui/run $(REAL_BLENDER)
 
 pictures: extension
 	@tests/gui/run $(REAL_BLENDER) tests/gui/pictures.py

@@ -4,7 +4,7 @@ import shutil
 import time
 
 import bpy
-from tab import PICTURES, TAB, moves, output, room, run, sample, settings, window
+from tab import PICTURES, TAB, moves, output, room, run, sample, settings, window, within
 from window import unfold
 
 LIMIT = 900
@@ -135,7 +135,9 @@ def check_ten_thousand_files_do_not_freeze_the_window():
     fold()
     spent.sort()
     output.say(f"     drawn {len(spent)} times, {1000 * spent[len(spent) // 2]:.1f} ms in the median; longest wait {longest:.2f} s")
-    assert listing().total == 10043 and spent[len(spent) // 2] < 0.005 and longest < 3.0
+    assert listing().total == 10043
+    within("the panel, s", spent[len(spent) // 2], 0.005)
+    within("longest wait, s", longest, 3.0)
     settings().library_watch = False
     shutil.rmtree(folder)
 

@@ -5,7 +5,7 @@ import time
 
 import bpy
 import numpy as np
-from tab import PICTURES, assert_no_trouble_since, output, room, run, sample, settings, window
+from tab import PICTURES, assert_no_trouble_since, output, room, run, sample, settings, window, within
 
 LIMIT = 600
 FRAMES = 600
@@ -240,9 +240,12 @@ def check_the_body_follows_a_dragged_point():
     output.say(f"     the body is {max(off):.3f} m off the curve at most; it went {np.linalg.norm(pelvis() - before):.2f} m")
     assert np.linalg.norm(pelvis() - before) > 0.2, "the body stayed where it was"
     assert max(off) < 0.15, off
-    assert statistics.median(spent) < BUDGET, spent
-    assert count >= 0.7 * moves or count / wall > 15.0, f"{count} updates in {moves} moves"
-    assert free < FREE or count / wall >= FLOOR, f"{count} in {wall:.2f} s"
+    assert count > 0
+    within("one update, ms", statistics.median(spent), BUDGET)
+    if free >= FREE:
+        within("seconds an update, wall clock", wall / count, 1.0 / FLOOR)
+    else:
+        within("moves an update", moves / count, 1.0 / 0.7)
     yield from window.press("LEFTMOUSE")
     yield from settled()
     assert_no_trouble_since(mark)

@@ -4,7 +4,7 @@ import statistics
 import time
 
 import bpy
-from tab import EXTENSION, PICTURES, TAB, output, sample, window
+from tab import EXTENSION, PICTURES, TAB, output, sample, window, within
 from window import unfold
 
 PLAYERS, LIMIT_MS = 22, 5.0
@@ -96,7 +96,7 @@ def told(heading, medians):
     return sum(medians.values())
 
 
-def check_the_tab_draws_within_five_milliseconds():
+def check_the_tab_draws_quickly():
     bpy.ops.wm.read_homefile(use_empty=True, load_ui=True)
     yield 1
     settings = bpy.context.scene.beyond_mocap
@@ -114,17 +114,18 @@ def check_the_tab_draws_within_five_milliseconds():
     window.picture(PICTURES / "redraw.png")
     for fold in fold_again:
         fold()
-    slow = {name: value for name, value in sums.items() if value > LIMIT_MS}
-    assert not slow, slow
+    for name, value in sums.items():
+        within(f"the tab {name}, ms", value, LIMIT_MS)
 
 
-def check_the_tabs_of_the_timelines_draw_within_five_milliseconds():
+def check_the_tabs_of_the_timelines_draw_quickly():
     kinds = {panel.bl_space_type for panel in ours(bpy.types.Panel) if getattr(panel, "bl_category", "") == TAB}
     area = window.area("VIEW_3D")
     for kind in [kind for kind in EDITORS[1:] if kind in kinds]:
         area.type = kind
         yield 0.5
         spent = told(kind, (yield from redraw(kind)))
-        assert 0.0 < spent <= LIMIT_MS, spent
+        assert spent > 0.0
+        within(f"the tab in {kind}, ms", spent, LIMIT_MS)
         area.type = "VIEW_3D"
         yield 0.5
