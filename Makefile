@@ -33,7 +33,7 @@ test: test-core venv venv-oldest
 	status=0; $(MAKE) -s test-blender || status=1; wait $$oldest || status=1; cat build/test-oldest.txt; exit $$status
 
 test-core: venv
-	.venv/bin/python $(PYTEST) tests/core tests/packaging
+	.venv/bin/python $(PYTEST) -n 2 tests/core tests/packaging
 
 test-blender: venv
 	.venv/bin/python $(PYTEST) tests/blender

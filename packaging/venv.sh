@@ -31,7 +31,7 @@ probe() {  # prints nothing where the environment works, else the reason
   "$1/bin/python" - 2>&1 <<'PY' | tail -1
 import bpy
 from importlib.util import find_spec
-for name in ("numpy", "scipy", "sklearn", "kloppy", "c3d", "pytest", "hypothesis", "matplotlib"):
+for name in ("numpy", "scipy", "sklearn", "kloppy", "c3d", "pytest", "xdist", "hypothesis", "matplotlib"):
     if find_spec(name) is None:
         raise SystemExit(f"{name} is missing")
 PY
