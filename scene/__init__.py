@@ -27,6 +27,7 @@
 - `passes`      the ball and who keeps it going: hit analysis, passing scenes, who carries the ball, the solved ball
 - `aimed`       a ball aimed at a target that can be dragged; rigid bodies take it over
 - `stream`      a body that arrives over this machine's own network while it moves
+- `markers`     a recording of optical markers as a cloud that plays, and the way from it to a body
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -41,6 +42,7 @@ from . import (
 )
 from .aimed import live as aimed_live
 from .aimed import settings as aimed
+from .markers import settings as markers
 from .passes import hits_shown
 from .passes import live as passes_live
 from .passes import settings as passes
@@ -57,6 +59,7 @@ CLASSES = (
     *passes.CLASSES,
     *stream.CLASSES,
     aimed.BeyondMocapAim,
+    *markers.CLASSES,
     video.BeyondMocapVideo,
     view_settings.BeyondMocapView,
     view_settings.BeyondMocapPlayhead,
@@ -83,6 +86,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_hits", passes.BeyondMocapHits),
     ("Object", "beyond_mocap_ball", passes.BeyondMocapBall),
     ("Object", "beyond_mocap_aim", aimed.BeyondMocapAim),
+    ("Object", "beyond_mocap_cloud", markers.BeyondMocapCloud),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
     ("Scene", "beyond_mocap_passes", passes.BeyondMocapPasses),
     ("Scene", "beyond_mocap_stream", stream.BeyondMocapStream),

@@ -1,0 +1,168 @@
+"""A trial as objects: a mesh with one vertex for each marker, played by `nodes`, and its trajectories beside it.
+
+The trajectories hang on the cloud alone, in no collection, so that nobody sees them and they go with it. A vertex knows
+its marker by an attribute, so that vertices can be deleted: those markers are then left out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import InputError
+from .. import bake, linked
+from ..measure import frames_per_second, units_per_metre
+from . import lines, nodes
+from .settings import is_cloud
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.markers.trial import MarkerTrial
+
+RADIUS = 0.007  # metres of a marker's sphere
+
+
+def create(
+    context: bpy.types.Context, trial: "MarkerTrial", name: str = "", start: float | None = None, collection=None
+) -> bpy.types.Object:
+    """A cloud that plays a trial from the scene frame `start` (the scene's first if None); the scene is lengthened."""
+    scene, units = context.scene, units_per_metre(context.scene)
+    check(trial)
+    mesh = bpy.data.meshes.new(name or trial.name)
+    mesh.vertices.add(len(trial.labels))
+    _attribute(mesh, nodes.MARKER, "INT", np.arange(len(trial.labels), dtype=np.int32))
+    cloud = bpy.data.objects.new(name or trial.name, mesh)
+    (collection or context.collection).objects.link(cloud)
+    kept = cloud.beyond_mocap_cloud
+    kept.on = True
+    for label in trial.labels:
+        kept.labels.add().name = label
+    start = float(scene.frame_start) if start is None else float(start)
+    nodes.hang(cloud, {"Start": start, "Radius": RADIUS * units})
+    write(cloud, trial, scene)
+    bake.lengthen(scene, start + trial.duration * frames_per_second(scene))
+    return cloud
+
+
+def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
+    """Let a cloud play other trajectories, or the same ones mended; labels and segments stay by name."""
+    linked.refuse(cloud, cloud.data)
+    check(trial)
+    kept = cloud.beyond_mocap_cloud
+    if tuple(label.name for label in kept.labels) != trial.labels:
+        _relabel(cloud, trial.labels)
+    for label, share in zip(kept.labels, trial.seen.mean(axis=0)):
+        label.seen = 100.0 * float(share)
+    kept.fps, kept.start, kept.subject = trial.fps, trial.start, trial.subject
+    kept.events.clear()
+    for event in trial.events:
+        row = kept.events.add()
+        row.name, row.side, row.seconds = event.label, event.side, event.seconds
+    places = held(trial.positions) * units_per_metre(scene)
+    modifier = nodes.modifier_of(cloud)
+    before = nodes.get(modifier, "Trajectories")
+    nodes.put(modifier, "Trajectories", _trajectories(cloud.name, places, trial.seen))
+    nodes.put(modifier, "Markers", len(trial.labels))
+    nodes.put(modifier, "Samples", len(trial))
+    nodes.put(modifier, "Step", trial.fps / frames_per_second(scene))
+    if before is not None and before.users == 0:
+        mesh = before.data
+        bpy.data.objects.remove(before)
+        bpy.data.meshes.remove(mesh)
+    cloud.data.attributes["position"].data.foreach_set(
+        "vector", places[0, markers(cloud)].astype(np.float32).ravel()
+    )
+    lines.draw(cloud)
+
+
+def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
+    """The trial that a cloud plays, with its labels as they are now, in the cloud's own space. InputError where the
+    object has lost what it needs."""
+    from ...beyond_mocap.markers.trial import MarkerEvent, MarkerTrial
+
+    modifier = nodes.modifier_of(cloud) if is_cloud(cloud) else None
+    held_by = nodes.get(modifier, "Trajectories") if modifier is not None else None
+    if held_by is None:
+        raise InputError(cloud.name, "no trajectories", "a cloud of markers", "import the recording again")
+    kept, count, samples = cloud.beyond_mocap_cloud, nodes.get(modifier, "Markers"), nodes.get(modifier, "Samples")
+    mesh = held_by.data
+    if len(mesh.vertices) != count * samples or len(kept.labels) != count or not samples:
+        found = f"{len(mesh.vertices)} places for {count} markers and {samples} samples"
+        raise InputError(cloud.name, found, "one for each", "import the recording again")
+    places, seen = np.empty(3 * count * samples, np.float32), np.empty(count * samples, bool)
+    mesh.attributes["position"].data.foreach_get("vector", places)
+    mesh.attributes[nodes.SEEN].data.foreach_get("value", seen)
+    places = places.reshape(samples, count, 3).astype(float) / units_per_metre(scene)
+    places[~seen.reshape(samples, count)] = np.nan
+    events = tuple(MarkerEvent(row.seconds, row.name, row.side) for row in kept.events)
+    names = tuple(label.name.strip() for label in kept.labels)
+    trial = MarkerTrial(names, places, kept.fps, None, events, kept.start, cloud.name, kept.subject)
+    there = np.sort(markers(cloud))
+    return trial if len(there) == count else trial.only([trial.labels[i] for i in there])
+
+
+def start_frame(cloud: bpy.types.Object) -> float:
+    """The scene frame of the first sample."""
+    return float(nodes.get(nodes.modifier_of(cloud), "Start"))
+
+
+def played_rate(cloud: bpy.types.Object, scene: bpy.types.Scene) -> float:
+    """Samples a second as the scene plays them: another than the recording's where the user slows it down."""
+    return float(nodes.get(nodes.modifier_of(cloud), "Step")) * frames_per_second(scene)
+
+
+def markers(cloud: bpy.types.Object) -> np.ndarray:
+    """Which marker each vertex is: (V,) places in the list of labels."""
+    mesh = cloud.data
+    found = np.empty(len(mesh.vertices), np.int32)
+    mesh.attributes[nodes.MARKER].data.foreach_get("value", found)
+    return np.clip(found, 0, max(len(cloud.beyond_mocap_cloud.labels) - 1, 0))
+
+
+def check(trial: "MarkerTrial") -> None:
+    """InputError where there is nothing to show."""
+    if not len(trial) or not trial.seen.any():
+        raise InputError(trial.name, "no marker is ever seen", "a recording with markers", "choose another file")
+
+
+def held(positions: np.ndarray) -> np.ndarray:
+    """Positions (T, M, 3) without gaps: what is not seen stands where it was seen last, or will be first; what is never
+    seen in the middle of all."""
+    out, seen = positions.copy(), np.isfinite(positions).all(axis=-1)
+    rows = np.arange(len(out))
+    for marker in range(out.shape[1]):
+        there = np.flatnonzero(seen[:, marker])
+        if not len(there):
+            out[:, marker] = positions[seen].mean(axis=0)
+        elif len(there) < len(out):
+            out[:, marker] = out[there[np.maximum(np.searchsorted(there, rows, side="right") - 1, 0)], marker]
+    return out
+
+
+def _relabel(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
+    """Other labels, as after markers were joined or left out; segments go along by name."""
+    kept, mesh = cloud.beyond_mocap_cloud, cloud.data
+    segments = {label.name: label.segment for label in kept.labels}
+    mesh.clear_geometry()
+    mesh.vertices.add(len(names))
+    _attribute(mesh, nodes.MARKER, "INT", np.arange(len(names), dtype=np.int32))
+    kept.labels.clear()
+    with lines.at_once():
+        for name in names:
+            label = kept.labels.add()
+            label.name, label.segment = name, segments.get(name, "")
+
+
+def _trajectories(name: str, places: np.ndarray, seen: np.ndarray) -> bpy.types.Object:
+    """The mesh of all samples (T, M, 3), on an object that stands in no collection."""
+    mesh = bpy.data.meshes.new(f"{name} trajectories")
+    mesh.vertices.add(seen.size)
+    mesh.attributes["position"].data.foreach_set("vector", places.astype(np.float32).ravel())
+    _attribute(mesh, nodes.SEEN, "BOOLEAN", seen.ravel())
+    return bpy.data.objects.new(mesh.name, mesh)
+
+
+def _attribute(mesh: bpy.types.Mesh, name: str, kind: str, values: np.ndarray) -> None:
+    found = mesh.attributes.get(name) or mesh.attributes.new(name, kind, "POINT")
+    found.data.foreach_set("value", np.ascontiguousarray(values))

@@ -1,0 +1,160 @@
+"""The node group that plays markers: each vertex of a cloud goes where the trajectories say at the scene's time.
+
+The trajectories are a mesh of their own, sample after sample, in each as many vertices as the cloud has. It is Blender
+that samples them, so that a saved file plays without the extension. Where a marker is not seen, it has neither sphere
+nor lines.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ..material import colour
+
+NAME = "Marker Cloud"
+SEEN, SIDE, MARKER = "seen", "side", "marker"
+"""Attributes: of the trajectories, whether a sample was seen; of a cloud's vertices, a place in COLOURS, and which marker
+it is."""
+COLOURS = (
+    ("Marker", (0.80, 0.80, 0.80)), ("Marker left", (0.80, 0.05, 0.03)), ("Marker right", (0.03, 0.50, 0.08)),
+    ("Marker without segment", (0.95, 0.55, 0.02)),
+)  # fmt: skip
+INPUTS = (
+    ("Trajectories", "NodeSocketObject", None, "The mesh of all samples"),
+    ("Markers", "NodeSocketInt", 1, "Vertices of a sample"),
+    ("Samples", "NodeSocketInt", 1, "How many samples there are"),
+    ("Start", "NodeSocketFloat", 1.0, "Scene frame of the first sample"),
+    ("Step", "NodeSocketFloat", 1.0, "Samples in a scene frame"),
+    ("Radius", "NodeSocketFloat", 0.007, "Of the spheres, in Blender units"),
+    ("Lines", "NodeSocketBool", True, "Draw lines between a segment's markers"),
+)
+
+
+def group() -> bpy.types.NodeTree:
+    """The node group, made where the file does not have it yet."""
+    found = bpy.data.node_groups.get(NAME)
+    if found is not None and all(name in found.interface.items_tree for name, *_ in INPUTS):
+        return found
+    tree = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
+    tree.is_modifier = True
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    for name, kind, value, told in INPUTS:
+        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind, description=told)
+        if value is not None:
+            socket.default_value = value
+    _Builder(tree).build()
+    return tree
+
+
+def hang(cloud: bpy.types.Object, values: dict) -> bpy.types.Modifier:
+    """The modifier that plays a cloud, with the inputs in `values` by name."""
+    modifier = cloud.modifiers.new(NAME, "NODES")
+    modifier.node_group = group()
+    modifier.show_on_cage = True
+    for name, value in values.items():
+        put(modifier, name, value)
+    return modifier
+
+
+def modifier_of(cloud: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The modifier that plays a cloud; None where there is none."""
+    nodes = (found for found in cloud.modifiers if found.type == "NODES" and found.node_group is not None)
+    return next((found for found in nodes if "Trajectories" in found.node_group.interface.items_tree), None)
+
+
+def put(modifier: bpy.types.Modifier, name: str, value) -> None:
+    """Set an input by its name."""
+    modifier[modifier.node_group.interface.items_tree[name].identifier] = value
+
+
+def get(modifier: bpy.types.Modifier, name: str):
+    """An input by its name."""
+    return modifier[modifier.node_group.interface.items_tree[name].identifier]
+
+
+class _Builder:
+    """Puts the nodes of the group together."""
+
+    def __init__(self, tree: bpy.types.NodeTree):
+        """tree: empty, with its inputs and outputs."""
+        self.tree = tree
+        self.inputs = self.node("NodeGroupInput").outputs
+
+    def node(self, kind: str, *sources, **settings):
+        """A node with these settings, its first sockets fed from `sources` (sockets or values; None leaves one)."""
+        node = self.tree.nodes.new(kind)
+        node.location = (220 * (len(self.tree.nodes) % 12), -220 * (len(self.tree.nodes) // 12))
+        for name, value in settings.items():
+            setattr(node, name, value)
+        feeds = [socket for socket in node.inputs if socket.enabled]
+        for socket, source in zip(feeds, sources):
+            if isinstance(source, bpy.types.NodeSocket):
+                self.tree.links.new(source, socket)
+            elif source is not None:
+                socket.default_value = source
+        return node
+
+    def out(self, kind: str, *sources, **settings):
+        """The first output of such a node."""
+        return next(socket for socket in self.node(kind, *sources, **settings).outputs if socket.enabled)
+
+    def number(self, operation: str, *sources):
+        """Arithmetic."""
+        return self.out("ShaderNodeMath", *sources, operation=operation)
+
+    def whole(self, operation: str, *sources):
+        """Arithmetic of whole numbers, exact for any number of samples."""
+        return self.out("FunctionNodeIntegerMath", *sources, operation=operation)
+
+    def logic(self, operation: str, *sources):
+        """And, or, not."""
+        return self.out("FunctionNodeBooleanMath", *sources, operation=operation)
+
+    def build(self) -> None:
+        """The whole group."""
+        points, seen = self.sampled()
+        moved = self.out("GeometryNodeSetPosition", self.inputs["Geometry"], None, points)
+        kept = self.out("GeometryNodeStoreNamedAttribute", moved, None, SEEN, seen, data_type="BOOLEAN", domain="POINT")
+        shown = self.out("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
+        hidden = self.logic("NOT", self.logic("AND", shown, self.inputs["Lines"]))
+        lines = self.out("GeometryNodeDeleteGeometry", kept, hidden, domain="EDGE", mode="EDGE_FACE")
+        joined = self.node("GeometryNodeJoinGeometry")
+        for source in (*reversed([self.spheres(kept, shown, number) for number in range(len(COLOURS))]), lines):
+            self.tree.links.new(source, joined.inputs[0])
+        self.node("NodeGroupOutput", joined.outputs[0])
+
+    def sampled(self):
+        """Where each vertex is now, and whether it was seen: between two samples both, where both were seen."""
+        frame = self.node("GeometryNodeInputSceneTime").outputs["Frame"]
+        row = self.number("MULTIPLY", self.number("SUBTRACT", frame, self.inputs["Start"]), self.inputs["Step"])
+        end = self.whole("SUBTRACT", self.inputs["Samples"], 1)
+        row = self.number("MAXIMUM", self.number("MINIMUM", row, end), 0.0)
+        before = self.out("FunctionNodeFloatToInt", row, rounding_mode="FLOOR")
+        share = self.number("SUBTRACT", row, before)
+        after = self.whole("MINIMUM", self.whole("ADD", before, 1), end)
+        (place, saw), (then, sees) = self.sample(before), self.sample(after)
+        late = self.number("GREATER_THAN", share, 0.5)
+        share = self.out("GeometryNodeSwitch", self.logic("AND", saw, sees), sees, share, input_type="FLOAT")
+        points = self.out("ShaderNodeMix", share, place, then, data_type="VECTOR", clamp_factor=True)
+        return points, self.out("GeometryNodeSwitch", late, saw, sees, input_type="BOOLEAN")
+
+    def sample(self, row):
+        """Place and sight of each vertex in one sample."""
+        about = self.node("GeometryNodeObjectInfo", self.inputs["Trajectories"], transform_space="ORIGINAL")
+        marker = self.out("GeometryNodeInputNamedAttribute", MARKER, data_type="INT")
+        at = self.whole("ADD", self.whole("MULTIPLY", row, self.inputs["Markers"]), marker)
+        position = self.out("GeometryNodeInputPosition")
+        sight = self.out("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
+        geometry = about.outputs["Geometry"]
+        place = self.out("GeometryNodeSampleIndex", geometry, position, at, data_type="FLOAT_VECTOR", domain="POINT")
+        return place, self.out("GeometryNodeSampleIndex", geometry, sight, at, data_type="BOOLEAN", domain="POINT")
+
+    def spheres(self, points, shown, number: int):
+        """Spheres on the seen markers of one colour."""
+        side = self.out("GeometryNodeInputNamedAttribute", SIDE, data_type="INT")
+        mine = self.out("FunctionNodeCompare", side, number, data_type="INT", operation="EQUAL")
+        ball = self.out("GeometryNodeMeshIcoSphere", self.inputs["Radius"], 2)
+        name, rgb = COLOURS[number]
+        ball = self.out("GeometryNodeSetMaterial", ball, None, colour(name, rgb))
+        return self.out("GeometryNodeInstanceOnPoints", points, self.logic("AND", shown, mine), ball)
