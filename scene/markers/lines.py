@@ -2,45 +2,64 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
+import bmesh
 import bpy
 import numpy as np
 
 from . import nodes
-from .settings import is_cloud
 
 NEIGHBOURS = 3  # edges that each marker begins
 
+_waiting: list[bool] = []
+
+
+@contextmanager
+def at_once():
+    """Many labels are changed; whoever does it draws at the end."""
+    _waiting.append(True)
+    try:
+        yield
+    finally:
+        _waiting.pop()
+
 
 def draw(cloud: bpy.types.Object) -> None:
-    """Write edges and colours by the segments of the labels."""
-    if not is_cloud(cloud) or cloud.library is not None or cloud.data.library is not None or cloud.mode == "EDIT":
+    """Write edges and colours by the segments of the labels, in edit mode too; what is selected stays selected."""
+    if _waiting or cloud.library is not None or cloud.data.library is not None:
         return
-    from .cloud import markers
-
     mesh, labels = cloud.data, cloud.beyond_mocap_cloud.labels
-    who, places = markers(cloud), np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", places)
-    segments = [labels[marker].segment for marker in who]
-    pairs = edges(places.reshape(-1, 3), segments)
-    mesh.clear_geometry()
-    mesh.vertices.add(len(who))
-    mesh.attributes["position"].data.foreach_set("vector", places)
-    mesh.attributes.new(nodes.MARKER, "INT", "POINT").data.foreach_set("value", who)
-    mesh.attributes.new(nodes.SIDE, "INT", "POINT").data.foreach_set("value", [side(name) for name in segments])
-    mesh.edges.add(len(pairs))
-    mesh.edges.foreach_set("vertices", pairs.ravel())
-    mesh.update()
+    shape = bmesh.from_edit_mesh(mesh) if mesh.is_editmode else bmesh.new()
+    if not mesh.is_editmode:
+        shape.from_mesh(mesh)
+    colours = shape.verts.layers.int.get(nodes.SIDE) or shape.verts.layers.int.new(nodes.SIDE)
+    which = shape.verts.layers.int[nodes.MARKER]
+    shape.verts.ensure_lookup_table()
+    segments = [labels[vertex[which]].segment if vertex[which] < len(labels) else "" for vertex in shape.verts]
+    for vertex, segment in zip(shape.verts, segments):
+        vertex[colours] = side(segment)
+    for edge in list(shape.edges):
+        shape.edges.remove(edge)
+    for one, other in edges(np.array([vertex.co for vertex in shape.verts]), segments):
+        shape.edges.new((shape.verts[one], shape.verts[other]))
+    if mesh.is_editmode:
+        bmesh.update_edit_mesh(mesh)
+    else:
+        shape.to_mesh(mesh)
+        shape.free()
 
 
-def edges(places: np.ndarray, segments: list[str]) -> np.ndarray:
-    """Pairs (E, 2) of markers: each with its nearest of the same segment. places: (M, 3); segments: "" belongs to none."""
+def edges(places: np.ndarray, segments: list[str]) -> list[tuple[int, int]]:
+    """Pairs of markers: each with its nearest of the same segment. places: (M, 3); segments: "" belongs to none."""
     found = set()
     for segment in sorted({name for name in segments if name}):
         mine = np.flatnonzero([name == segment for name in segments])
         apart = np.linalg.norm(places[mine, None] - places[None, mine], axis=-1)
         for row, order in zip(mine, np.argsort(apart, axis=1, kind="stable")):
-            found |= {(min(row, mine[near]), max(row, mine[near])) for near in order[: NEIGHBOURS + 1] if mine[near] != row}
-    return np.array(sorted(found), np.int32).reshape(-1, 2)
+            near = [mine[other] for other in order[: NEIGHBOURS + 1] if mine[other] != row]
+            found |= {(int(min(row, other)), int(max(row, other))) for other in near}
+    return sorted(found)
 
 
 def side(segment: str) -> int:
