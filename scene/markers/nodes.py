@@ -65,12 +65,20 @@ def modifier_of(cloud: bpy.types.Object) -> bpy.types.Modifier | None:
 
 def put(modifier: bpy.types.Modifier, name: str, value) -> None:
     """Set an input by its name."""
-    modifier[modifier.node_group.interface.items_tree[name].identifier] = value
+    identifier = modifier.node_group.interface.items_tree[name].identifier
+    if hasattr(modifier, "properties"):  # Blender 5.2
+        getattr(modifier.properties.inputs, identifier).value = value
+    else:
+        modifier[identifier] = value
+    modifier.id_data.update_tag()
 
 
 def get(modifier: bpy.types.Modifier, name: str):
     """An input by its name."""
-    return modifier[modifier.node_group.interface.items_tree[name].identifier]
+    identifier = modifier.node_group.interface.items_tree[name].identifier
+    if hasattr(modifier, "properties"):
+        return getattr(modifier.properties.inputs, identifier).value
+    return modifier[identifier]
 
 
 class _Builder:
