@@ -1,0 +1,142 @@
+"""Planted markers: the truth stays the recording's, and what is said to be done to the trial is done."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.markers.planted import planted
+from beyond_mocap.markers.planted_body import in_marker_axes
+from beyond_mocap.markers.planted_faults import mirrored, sides_exchanged
+from beyond_mocap.markers.planted_places import SETS
+from beyond_mocap.markers.planted_skin import markers_on
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.motion import forward_kinematics, pose_kinematics
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return gait(1.4, 3.0, fps=100.0)
+
+
+@pytest.fixture(scope="module")
+def known(walk):
+    return planted(walk, "driveline", seed=3, occlusion=0.05, swaps=2, jumps=4, unlabeled=2)
+
+
+def test_joints_keep_their_places(walk):
+    truth = in_marker_axes(walk)
+    before, _ = forward_kinematics(walk)
+    after, _ = forward_kinematics(truth)
+    for side in ("Left", "Right"):
+        for part in ("Arm", "ForeArm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase"):
+            apart = before[:, walk.skeleton.index(side + part)] - after[:, truth.skeleton.index(side + part)]
+            assert np.abs(apart).max() < 1e-6, side + part
+
+
+def test_rests_in_a_t_pose_facing_x(walk):
+    skeleton = in_marker_axes(walk).skeleton
+    places, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
+    at = dict(zip(skeleton.names, places[0]))
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        upper, lower = at[side + "ForeArm"] - at[side + "Arm"], at[side + "Hand"] - at[side + "ForeArm"]
+        for bone in (upper, lower):
+            np.testing.assert_allclose(bone / np.linalg.norm(bone), [0.0, sign, 0.0], atol=1e-6)
+        shank = at[side + "Foot"] - at[side + "Leg"]
+        np.testing.assert_allclose(shank / np.linalg.norm(shank), [0.0, 0.0, -1.0], atol=1e-6)
+        assert (at[side + "ToeBase"] - at[side + "Foot"])[0] > 0.05
+
+
+def test_knees_and_elbows_bend_about_one_axis(walk):
+    truth = in_marker_axes(walk)
+    for joint, axis in (("LeftLeg", 1), ("RightLeg", 1)):
+        bend = quaternion.to_rotation_vector(truth.rotations[:, truth.skeleton.index(joint)])
+        assert np.abs(np.delete(bend, axis, axis=1)).max() < 0.02
+        assert bend[:, axis].max() > 0.5
+
+
+def test_wrists_do_not_twist(walk):
+    truth = in_marker_axes(walk)
+    hand = truth.rotations[:, truth.skeleton.index("RightHand")]
+    assert np.abs(hand[:, 2]).max() < 1e-9
+
+
+def test_markers_on_bone_are_rigid(walk):
+    known = planted(walk, "plug_in_gait", noise=0.0, softness=0.0)
+    np.testing.assert_allclose(known.trial.positions, markers_on(known.motion, known.markers), atol=1e-12)
+    for places in (known.trial.positions, known.static.positions):
+        thigh = [known.trial.index(label) for label in ("LTHI", "LKNE")]
+        apart = np.linalg.norm(places[:, thigh[0]] - places[:, thigh[1]], axis=1)
+        assert np.ptp(apart) < 1e-9
+
+
+def test_skin_shifts_thighs_more_than_feet(walk):
+    known = planted(walk, "plug_in_gait", noise=0.0)
+    off = np.linalg.norm(known.clean - markers_on(known.motion, known.markers), axis=-1).max(axis=0)
+    of = dict(zip(known.markers.labels, off))
+    assert 0.004 < of["LTHI"] < 0.03 and of["LHEE"] < 0.006 and of["LFHD"] < 0.005
+
+
+def test_faults_are_where_they_are_told(known):
+    kinds = [fault.kind for fault in known.faults]
+    assert kinds.count("swap") == 2 and kinds.count("jump") == 4 and kinds.count("unlabeled") == 2
+    for fault in known.faults:
+        frames = slice(fault.start, fault.stop)
+        mine = [known.trial.index(label) for label in fault.labels]
+        if fault.kind == "gap":
+            assert np.isnan(known.trial.positions[frames, mine]).all()
+        if fault.kind == "swap":
+            np.testing.assert_array_equal(known.trial.positions[frames, mine], known.clean[frames, mine[::-1]])
+        if fault.kind == "jump":
+            assert 0.015 < np.linalg.norm(known.trial.positions[fault.start, mine[0]] - known.clean[fault.start, mine[0]])
+        if fault.kind == "unlabeled":
+            np.testing.assert_array_equal(known.trial.positions[frames, mine[1]], known.clean[frames, mine[0]])
+    gaps = sum(fault.stop - fault.start for fault in known.faults if fault.kind == "gap")
+    assert 0.04 < gaps / known.clean[..., 0].size < 0.07
+
+
+def test_all_else_is_untouched(known):
+    touched = np.zeros(known.clean.shape[:2], bool)
+    for fault in known.faults:
+        for label in fault.labels:
+            if not label.startswith("*"):
+                touched[fault.start : fault.stop, known.trial.index(label)] = True
+    own = known.trial.positions[:, : known.clean.shape[1]]
+    np.testing.assert_array_equal(own[~touched], known.clean[~touched])
+
+
+def test_same_seed_same_trial(walk):
+    one, two, other = (planted(walk, seed=seed, occlusion=0.02).trial.positions for seed in (5, 5, 6))
+    np.testing.assert_array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
+def test_static_stands_upright_with_all_markers(known):
+    at = dict(zip(known.static.labels, known.static.positions.mean(axis=0)))
+    assert known.static.seen.all()
+    assert at["LSHO"][1] > at["RSHO"][1] and at["LTOE"][0] > at["LHEE"][0] + 0.1
+    assert 0.0 < at["LTOE"][2] < 0.08 and abs(at["C7"][2] - at["LSHO"][2]) < 0.06 and at["LFHD"][2] > at["C7"][2] + 0.15
+
+
+def test_sprinter_takes_markers_off_after_the_static_trial(walk):
+    known = planted(walk, "sprinter")
+    assert set(known.static.labels) - set(known.trial.labels) == {"LMEPI", "RMEPI", "LMMAL", "RMMAL"}
+
+
+@pytest.mark.parametrize("name", sorted(SETS))
+def test_every_label_finds_its_place(walk, name):
+    assert set(planted(walk, name).static.labels) == set(SETS[name])
+
+
+def test_mirrors(known):
+    trial = known.static
+    assert mirrored(trial).positions[0, 0, 1] == -trial.positions[0, 0, 1]
+    exchanged = sides_exchanged(trial)
+    np.testing.assert_array_equal(
+        exchanged.positions[:, exchanged.index("LKNE")], trial.positions[:, trial.index("RKNE")]
+    )
+
+
+def test_unknown_set_is_told(walk):
+    with pytest.raises(InputError, match="plug_in_gait"):
+        planted(walk, "nothing")
