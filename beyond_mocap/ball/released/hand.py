@@ -1,0 +1,150 @@
+"""Where a hand is, frame by frame: by its joint of a solved motion, and sharper by the markers that it carries.
+
+A solved motion is filtered, which takes off the very peak that a throw is about; the hand's markers are not. Where at
+least three markers near the wrist are seen, the hand's frame is the one that carries them (eq. 3.14), else the motion's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...markers.frames import rigid_fit
+from ...markers.trial import MarkerTrial
+from ...motion import quaternion
+from ...motion.humanoid import identify
+from ...motion.motion import Motion, forward_kinematics
+
+NEAR = 0.14
+"""m from the wrist within which a marker belongs to the hand."""
+_HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
+_PASSES = 4
+_STEADY = 0.012  # m, spread in the hand's frame below which a marker is the hand's
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """One hand over T frames.
+
+    side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
+    finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's frame.
+    elbow: (T, 3) m. markers: labels that sharpen it. worth: (T,) bool, where markers did.
+    """
+
+    side: str
+    fps: float
+    origin: np.ndarray
+    rotation: np.ndarray
+    finger: np.ndarray
+    reach: float
+    elbow: np.ndarray
+    markers: tuple[str, ...] = ()
+    worth: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.origin)
+
+    @property
+    def times(self) -> np.ndarray:
+        """(T,) seconds from frame 0."""
+        return np.arange(len(self)) / self.fps
+
+    def carried(self, place: np.ndarray) -> np.ndarray:
+        """(T, 3) m: where a point `place` (3,) m of the hand's frame is."""
+        return self.origin + np.einsum("tij,j->ti", self.rotation, np.asarray(place, float))
+
+    def taken_back(self, points: np.ndarray) -> np.ndarray:
+        """(T, 3) m in the hand's frame of points (T, 3) m of the world, one a frame."""
+        return np.einsum("tji,tj->ti", self.rotation, points - self.origin)
+
+
+def hand_of(motion: Motion, side: str) -> Hand:
+    """The hand of a solved motion. InputError where the skeleton has none."""
+    limb = getattr(identify(motion.skeleton), side)
+    if limb.hand is None or limb.lower_arm is None:
+        raise InputError("release", f"a skeleton without a {side} hand", "joints for the hand and the forearm")
+    places, rotations = forward_kinematics(motion)
+    finger, reach = _finger(motion, limb)
+    return Hand(
+        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach,
+        places[:, limb.lower_arm],
+    )  # fmt: skip
+
+
+def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Hand:
+    """The hand as its own markers have it, in every frame in which they tell.
+
+    trial: as many frames, at even times. never: labels that are no part of the hand (the ball's). A constant shift of
+    the motion against the markers, as setting feet on the floor makes, is found and taken off.
+    """
+    names, seen = _near(hand, trial, never)
+    if not names:
+        return hand
+    shift = np.zeros(3)
+    for _ in range(_PASSES):
+        local = np.einsum("tji,tmj->tmi", hand.rotation, seen - (hand.origin + shift)[:, None, :])
+        places = np.nanmedian(local, axis=0)
+        shift = shift + np.nanmedian(seen - _placed(hand, shift, places), axis=(0, 1))
+    moved = replace(hand, origin=hand.origin + shift, elbow=hand.elbow + shift)
+    fit = rigid_fit(places, seen)
+    tells = fit.sound & np.isfinite(fit.rms)
+    known = np.isfinite(seen).all(axis=-1)
+    off = np.where(known[..., None], seen - _placed(hand, shift, places), 0.0).sum(axis=1)
+    off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers move it, and cannot turn it
+    return replace(
+        moved,
+        origin=np.where(tells[:, None], fit.shift, moved.origin + off),
+        rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation),
+        markers=names,
+        worth=known.any(axis=1),
+    )
+
+
+def _placed(hand: Hand, shift: np.ndarray, places: np.ndarray) -> np.ndarray:
+    return (hand.origin + shift)[:, None, :] + np.einsum("tij,mj->tmi", hand.rotation, places)
+
+
+def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+    """Labels of the markers that stay with the hand, and their places (T, M, 3) m."""
+    away = np.linalg.norm(trial.positions - hand.origin[:, None, :], axis=-1)
+    kept = []
+    for number, label in enumerate(trial.labels):
+        known = np.isfinite(away[:, number])
+        if label in never or np.count_nonzero(known) < 0.3 * len(trial):
+            continue
+        distance = away[known, number]
+        spread = np.subtract(*np.percentile(distance, [90, 10]))
+        if np.median(distance) < NEAR and spread < 3.0 * _STEADY:
+            kept.append(number)
+    return tuple(trial.labels[number] for number in kept), trial.positions[:, kept]
+
+
+def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
+    """Unit direction (3,) of the fingers in the hand's frame, and how far their tips are from the wrist, m.
+
+    The skeleton's own tip where it has a likely one, else straight on from the forearm.
+    """
+    skeleton, hand = motion.skeleton, limb.hand
+    forearm = float(np.linalg.norm(skeleton.offsets[hand]))
+    usual = _HAND_OF_ARM * forearm
+    tips = _tips(skeleton, hand)
+    lengths = np.linalg.norm(tips, axis=-1) if len(tips) else np.zeros(0)
+    if len(lengths) and 0.6 * usual < lengths.max() < 1.5 * usual:
+        tip = tips[int(np.argmax(lengths))]
+        return tip / lengths.max(), float(lengths.max())
+    if len(lengths) and lengths.max() > 0.1 * usual:
+        tip = tips[int(np.argmax(lengths))]
+        return tip / lengths.max(), usual
+    return skeleton.offsets[hand] / max(forearm, 1e-9), usual
+
+
+def _tips(skeleton, hand: int) -> np.ndarray:
+    """(N, 3) m at rest, in the hand's frame: the joints and end sites below the hand."""
+    at = {hand: np.zeros(3)}
+    for joint in range(hand + 1, len(skeleton)):
+        if skeleton.parents[joint] in at:
+            at[joint] = at[skeleton.parents[joint]] + skeleton.offsets[joint]
+    ends = [at[parent] + offset for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets) if parent in at]
+    return np.array([place for joint, place in at.items() if joint != hand] + ends).reshape(-1, 3)
