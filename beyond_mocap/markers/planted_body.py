@@ -132,6 +132,12 @@ def _above(name: str) -> list[str]:
     return arm[arm.index(name) + 1 :] + trunk if name in arm else leg[leg.index(name) + 1 :] + ["Hips"]
 
 
+def adult_share(skeleton: Skeleton) -> float:
+    """How large the body is against an adult of 1.80 m: by its legs."""
+    bones = [skeleton.offsets[skeleton.index(side + part)] for side in ("Left", "Right") for part in ("Leg", "Foot")]
+    return float(np.linalg.norm(bones, axis=1).sum() / 2.0 / _LEG)
+
+
 def calibration_pose(skeleton: Skeleton, seconds: float, fps: float, seed: int) -> Motion:
     """Somebody who stands still for a static trial: arms lifted 45 degrees, elbows bent a little, swaying a little.
 

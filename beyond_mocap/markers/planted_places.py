@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion.skeleton import Skeleton
+from .planted_body import adult_share
 
-_LEG = 0.873
 _DEPTH, _TILT = 0.62, np.radians(9.0)  # of a pelvis: depth in widths; how much lower its front spines lie
 
 
@@ -140,7 +140,7 @@ class Placed:
 def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: float = 0.003) -> Placed:
     """Those of `labels` for which the skeleton (`planted_body.in_marker_axes`) has a joint, scattered by `scatter` m."""
     rng = np.random.default_rng(seed)
-    size = _size(skeleton)
+    size = adult_share(skeleton)
     rows = []
     for label in labels:
         found = _place(label)
@@ -203,8 +203,3 @@ def _on_pelvis(skeleton: Skeleton, label: str) -> np.ndarray:
         local = np.array([forward - depth, 0.2 * width * side * label.endswith("PSI"), up])
     return 0.5 * (left + right) + tilted @ local
 
-
-def _size(skeleton: Skeleton) -> float:
-    """How large the body is against an adult: by its legs."""
-    bones = [skeleton.offsets[skeleton.index(side + part)] for side in ("Left", "Right") for part in ("Leg", "Foot")]
-    return float(np.linalg.norm(bones, axis=1).sum() / 2.0 / _LEG)

@@ -5,6 +5,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.markers.planted import planted
+from beyond_mocap.markers.planted_ball import PlantedBall
 from beyond_mocap.markers.planted_body import in_marker_axes
 from beyond_mocap.markers.planted_faults import mirrored, sides_exchanged
 from beyond_mocap.markers.planted_places import SETS
@@ -12,6 +13,7 @@ from beyond_mocap.markers.planted_skin import markers_on
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.motion import forward_kinematics, pose_kinematics
+from beyond_mocap.motion.throws import throw
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +142,47 @@ def test_mirrors(known):
 def test_unknown_set_is_told(walk):
     with pytest.raises(InputError, match="plug_in_gait"):
         planted(walk, "nothing")
+
+
+class TestBall:
+    @pytest.fixture(scope="class")
+    def thrown(self):
+        made = throw((15.0, 1.0, 1.0), 24.0, fps=240.0)
+        return made, planted(made.motion, "driveline", ball=PlantedBall(made.release, turns=20.0), noise=0.0)
+
+    def test_leaves_with_the_hands_velocity_and_hits_the_target(self, thrown):
+        made, known = thrown
+        np.testing.assert_allclose(known.ball.position, made.position, atol=0.015)
+        np.testing.assert_allclose(known.ball.velocity, made.velocity, atol=1.0)
+        seconds = (15.0 - known.ball.position[0]) / known.ball.velocity[0]
+        landed = known.ball.position + seconds * known.ball.velocity - [0, 0, 0.5 * 9.81 * seconds**2]
+        assert np.linalg.norm(landed - [15.0, 1.0, 1.0]) < 0.8
+
+    def test_marker_stays_on_the_surface(self, thrown):
+        ball = thrown[1].ball
+        np.testing.assert_allclose(np.linalg.norm(ball.marker - ball.places, axis=1), 0.0366, atol=1e-9)
+        steps = np.linalg.norm(np.diff(ball.places, axis=0), axis=1) * 240.0
+        assert np.abs(np.diff(steps)).max() < 3.0
+
+    def test_falls_freely_after_release(self, thrown):
+        made, known = thrown
+        after = np.arange(len(known.motion)) / 240.0 > made.release + 0.01
+        pull = np.diff(known.ball.places[after], 2, axis=0) * 240.0**2
+        np.testing.assert_allclose(pull[:40], np.broadcast_to([0, 0, -9.81], (40, 3)), atol=1e-4)
+
+    def test_is_seen_for_a_while(self, thrown):
+        made, known = thrown
+        seen = known.trial.seen[:, known.trial.index("BALL")]
+        assert seen[: int((made.release + 0.29) * 240)].all() and not seen[int((made.release + 0.32) * 240) :].any()
+
+    def test_air_slows_it(self, thrown):
+        made, _ = thrown
+        slow = planted(made.motion, "lower_body", ball=PlantedBall(made.release, drag=0.01)).ball
+        free = planted(made.motion, "lower_body", ball=PlantedBall(made.release)).ball
+        frame = int((made.release + 0.3) * 240)
+        flown = free.places[frame] - free.position
+        assert 0.02 < np.linalg.norm(flown - (slow.places[frame] - slow.position)) / np.linalg.norm(flown) < 0.06
+
+    def test_release_outside_is_told(self, thrown):
+        with pytest.raises(InputError, match="release"):
+            planted(thrown[0].motion, "lower_body", ball=PlantedBall(60.0))
