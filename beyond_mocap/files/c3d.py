@@ -1,8 +1,8 @@
 """C3D files: markers of optical motion capture (www.c3d.org, "The C3D file format: a user guide").
 
 The `c3d` package reads header and parameters; the samples are read here, all frames at once, since it goes frame by
-frame, converts analog channels that nobody asked for, and refuses files whose header and parameters disagree. Where they
-do, the file's own size tells who is right.
+frame, converts analog channels that nobody asked for, and refuses files whose header and parameters disagree. Where
+they do, the file's own size tells who is right.
 """
 
 from __future__ import annotations
@@ -132,9 +132,8 @@ def _parameters(path: Path, handle, size: int) -> _Parameters:
     handle.seek(0)
     section = bytearray(handle.read(min(first + max(start[2], 1) * BLOCK, size)))
     order = _PROCESSORS[start[3]]
-    if first:
-        events = int.from_bytes(section[300:302], "little" if order == "<" else "big")
-        section[300:302] = (events if events <= _EVENTS_IN_HEADER else 0).to_bytes(2, "little" if order == "<" else "big")
+    if int.from_bytes(section[300:302], "little" if order == "<" else "big") > _EVENTS_IN_HEADER:
+        section[300:302] = b"\0\0"
     return _Parameters(_parsed(path, bytes(section)), order, start[3] == _DEC)
 
 
@@ -202,7 +201,8 @@ def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
     if not fitting:
         best = layouts[0]
         there = max(size - best.data, 0) // best.stride
-        raise InputError(path, f"{there} frames", f"{best.frames} as the header says", f"the file is cut off; {_EXPORT_AGAIN}")
+        expected = f"{best.frames} as the header says"
+        raise InputError(path, f"{there} frames", expected, f"the file is cut off; {_EXPORT_AGAIN}")
     chosen = layouts[fitting[0]]
     notes = [f"header and parameters disagree on {name}: {getattr(chosen, name)} fits the file"
              for name, said in counts.items() if len(said) > 1]  # fmt: skip
@@ -311,7 +311,8 @@ def _events(parameters: _Parameters) -> list[tuple[float, str, str, str]]:
     labels, sides, whose = (parameters.texts(f"EVENT:{name}") for name in ("LABELS", "CONTEXTS", "SUBJECTS"))
     used = parameters.number("EVENT:USED")
     count = min(len(times) // 2, int(used) if math.isfinite(used) else 0)
-    out = [(60 * times[2 * i] + times[2 * i + 1], _at(labels, i), _side(_at(sides, i)), _at(whose, i)) for i in range(count)]
+    out = [(60 * times[2 * i] + times[2 * i + 1], _at(labels, i), _side(_at(sides, i)), _at(whose, i))
+           for i in range(count)]  # fmt: skip
     if not out:
         header = parameters.header
         out = [(float(seconds), " ".join(str(label).split()).strip("\0"), "", "") for seconds, label in header.events]

@@ -134,7 +134,7 @@ def _labels(said: str, place: str) -> tuple[str, ...]:
 
 
 def marker_set_text(marker_set: MarkerSet) -> str:
-    """The set as `read_marker_set` reads it. InputError where a label cannot be written: with a comma, a colon, ` #`."""
+    """The set as `read_marker_set` reads it. InputError for labels with a comma, a colon or ` #`."""
     lines = [f"marker set: {marker_set.name}"]
     lines += [f"about: {' '.join(marker_set.about.split())}"] if marker_set.about else []
     lines += ["", *(f"segment {joint}: {_joined(labels)}" for joint, labels in marker_set.segments.items() if labels)]

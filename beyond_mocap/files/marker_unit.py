@@ -34,7 +34,7 @@ def metres_per_unit(unit: float | str, where: object = "--unit") -> float:
         except (TypeError, ValueError):
             value = math.nan
     if not 1e-9 < value < 1e4:
-        raise InputError(where, f"unit {str(unit)[:40]!r}", "metres per unit, or one of mm, cm, m, in", "check the unit")
+        raise InputError(where, f"unit {str(unit)[:40]!r}", "metres per unit, or mm, cm, m, in", "check the unit")
     return value
 
 

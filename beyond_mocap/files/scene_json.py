@@ -12,6 +12,7 @@ from pathlib import Path
 from ..ball.contact import Tool
 from ..ball.pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ..errors import InputError
+from .json_values import check_names, check_object, number, numbers, object_of, shown, text, truth, whole_number
 
 LARGEST = 10_000_000
 """Bytes of a file above which it is no scene."""
@@ -36,20 +37,11 @@ def read_scene(path: str | os.PathLike) -> PassScene:
 def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
     """The scene in a text, or in the object that it stands for; `name` stands before what is wrong with it, as
     InputError."""
-    whole = _object_of(said, name) if isinstance(said, str) else said
+    whole = object_of(said, name, "docs/passes.md") if isinstance(said, str) else said
     try:
         return _scene(whole)
     except InputError as error:
         raise InputError(name, str(error)) from None
-
-
-def _object_of(text: str, name: str):
-    try:
-        return json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
-    except json.JSONDecodeError as error:
-        raise InputError(f"{name}:{error.lineno}:{error.colno}", error.msg, "JSON", "see docs/passes.md") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(name, str(error) or "nested too deep", "JSON", "see docs/passes.md") from None
 
 
 def scene_text(scene: PassScene) -> str:
@@ -106,27 +98,14 @@ def _pass_out(one: Pass) -> dict:
 # -- reading
 
 
-def _once(pairs) -> dict:
-    """An object in which no name comes twice."""
-    out = dict(pairs)
-    if len(out) != len(pairs):
-        names = [name for name, _ in pairs]
-        raise ValueError(f"{next(name for name in names if names.count(name) > 1)!r} twice in one object")
-    return out
-
-
-def _no_number(text: str):
-    raise ValueError(f"{text}, which is no number")
-
-
 def _scene(whole) -> PassScene:
     read = {
-        "players": _list_of(_player), "repeat": _whole, "fps": _number, "seed": _whole, "ball": _ball, "net": _net,
-        "serve": _serve, "transition": _number, "lead_in": _number, "lead_out": _number, "directions": _whole,
-        "watch": _truth, "weights": _weights,
+        "players": _list_of(_player), "repeat": whole_number, "fps": number, "seed": whole_number, "ball": _ball,
+        "net": _net, "serve": _serve, "transition": number, "lead_in": number, "lead_out": number, "directions": whole_number,
+        "watch": truth, "weights": _weights,
     }  # fmt: skip
     known = {*read, "passes", "defaults", "errors"}
-    _check_names(whole, "the scene", known, ("players", "passes"))
+    check_names(whole, "the scene", known, ("players", "passes"))
     found = {name: of(whole[name], name) for name, of in read.items() if name in whole}
     usual = _settings(whole.get("defaults", {}), "defaults")
     passes = _list_of(lambda value, where: _pass(value, where, usual))(whole["passes"], "passes")
@@ -135,40 +114,40 @@ def _scene(whole) -> PassScene:
 
 def _player(value, where: str) -> Player:
     read = {
-        "name": _text, "place": _place, "facing": _angle, "part": _text, "side": _text, "tool": _tool,
-        "height": _number,
+        "name": text, "place": _place, "facing": _angle, "part": text, "side": text, "tool": _tool,
+        "height": number,
     }  # fmt: skip
-    _check_names(value, where, read, ("name", "place"))
+    check_names(value, where, read, ("name", "place"))
     return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
 
 
 def _pass(value, where: str, usual: Mapping) -> Pass:
-    _check_names(value, where, ("from", "to", *_OF_PASS), ("from", "to"))
+    check_names(value, where, ("from", "to", *_OF_PASS), ("from", "to"))
     settings = _settings({name: value[name] for name in value if name in _OF_PASS}, where)
-    giver, receiver = (_text(value[name], f"{where}: {name}") for name in ("from", "to"))
+    giver, receiver = (text(value[name], f"{where}: {name}") for name in ("from", "to"))
     return Pass(giver, receiver, **{**usual, **settings})
 
 
 def _settings(value, where: str) -> dict:
     """What a pass may say beside its players."""
     read = {
-        "kind": _text, "bounces": _whole, "part": _text, "side": _text, "seconds": _number, "at": _place,
-        "example": _example, "error": _text,
+        "kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
+        "example": _example, "error": text,
     }  # fmt: skip
-    _check_names(value, where, read, ())
+    check_names(value, where, read, ())
     return {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
 
 
 def _example(value, where: str) -> Example:
-    _check_names(value, where, ("clip", "from", "to"), ("clip",))
+    check_names(value, where, ("clip", "from", "to"), ("clip",))
     names = {"from": "start", "to": "end"}
-    found = {names[old]: _number(value[old], f"{where}: {old}") for old in names if old in value}
-    return Example(_text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
+    found = {names[old]: number(value[old], f"{where}: {old}") for old in names if old in value}
+    return Example(text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
 
 
 def _tool(value, where: str) -> Tool:
-    read = {"name": _text, "length": _number, "radius": _number, "reach": _number}
-    _check_names(value, where, read, ())
+    read = {"name": text, "length": number, "radius": number, "reach": number}
+    check_names(value, where, read, ())
     found = {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
     try:
         return Tool(**found)
@@ -179,111 +158,56 @@ def _tool(value, where: str) -> Tool:
 def _ball(value, where: str) -> BallChoice:
     if isinstance(value, str):
         return BallChoice(value)
-    _check_object(value, where)
-    numbers = {name: _ball_number(one, f"{where}: {name}") for name, one in value.items() if name != "kind"}
-    return BallChoice(_text(value.get("kind", BallChoice.kind), f"{where}: kind"), numbers)
+    check_object(value, where)
+    changes = {name: _ball_number(one, f"{where}: {name}") for name, one in value.items() if name != "kind"}
+    return BallChoice(text(value.get("kind", BallChoice.kind), f"{where}: kind"), changes)
 
 
 def _ball_number(value, where: str):
-    return tuple(_number(one, where) for one in value) if isinstance(value, (list, tuple)) else _number(value, where)
+    return tuple(number(one, where) for one in value) if isinstance(value, (list, tuple)) else number(value, where)
 
 
 def _net(value, where: str) -> Net:
-    _check_names(value, where, ("from", "to", "height"), ("from", "to", "height"))
+    check_names(value, where, ("from", "to", "height"), ("from", "to", "height"))
     ends = (_place(value[name], f"{where}: {name}") for name in ("from", "to"))
-    return Net(*ends, _number(value["height"], f"{where}: height"))
+    return Net(*ends, number(value["height"], f"{where}: height"))
 
 
 def _serve(value, where: str):
-    return _triple(value, where) if isinstance(value, (list, tuple)) else _text(value, where)
+    return _triple(value, where) if isinstance(value, (list, tuple)) else text(value, where)
 
 
 def _errors(value, where: str) -> dict[str, float]:
-    _check_names(value, where, ("missed", "dropped"), ())
-    return {name: _number(one, f"{where}: {name}") for name, one in value.items()}
+    check_names(value, where, ("missed", "dropped"), ())
+    return {name: number(one, f"{where}: {name}") for name, one in value.items()}
 
 
 def _weights(value, where: str) -> Weights:
     names = [entry.name for entry in fields(Weights)]
-    _check_names(value, where, names, ())
+    check_names(value, where, names, ())
     bones = value.get("bones", {})
-    _check_object(bones, f"{where}: bones")
-    found = Weights(**{name: _number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"})
-    return replace(found, bones={name: _number(one, f"{where}: {name}") for name, one in bones.items()})
+    check_object(bones, f"{where}: bones")
+    found = Weights(**{name: number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"})
+    return replace(found, bones={name: number(one, f"{where}: {name}") for name, one in bones.items()})
 
 
 def _list_of(read: Callable) -> Callable:
     def lines(value, where: str) -> tuple:
         if not isinstance(value, (list, tuple)):
-            raise InputError(where, _shown(value), "a list [...]")
+            raise InputError(where, shown(value), "a list [...]")
         one = {"players": "player", "passes": "pass"}[where]
         return tuple(read(entry, f"{one} {number}") for number, entry in enumerate(value, start=1))
 
     return lines
 
 
-def _check_object(value, where: str) -> None:
-    if not isinstance(value, dict):
-        raise InputError(where, _shown(value), "an object {...}")
-
-
-def _check_names(value, where: str, known, needed) -> None:
-    _check_object(value, where)
-    for name in needed:
-        if name not in value:
-            raise InputError(where, f"no {name!r}", f"{', '.join(needed)}")
-    for name in value:
-        if name not in known:
-            raise InputError(where, _shown(name), f"one of {', '.join(sorted(known))}", "check the spelling")
-
-
-def _number(value, where: str) -> float:
-    try:
-        good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    except OverflowError:
-        good = False
-    if not good:
-        raise InputError(where, _shown(value), "a number")
-    return float(value)
-
-
-def _whole(value, where: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) and _number(value, where) != int(value):
-        raise InputError(where, _shown(value), "a whole number")
-    return int(value)
-
-
 def _angle(value, where: str) -> float:
-    return math.radians(_number(value, where))
-
-
-def _truth(value, where: str) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(where, _shown(value), "true or false")
-    return value
-
-
-def _text(value, where: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(where, _shown(value), "a text")
-    return value
+    return math.radians(number(value, where))
 
 
 def _place(value, where: str) -> tuple[float, float]:
-    return _numbers(value, where, 2, "[x, y] in metres")
+    return numbers(value, where, 2, "[x, y] in metres")
 
 
 def _triple(value, where: str) -> tuple[float, float, float]:
-    return _numbers(value, where, 3, "[x, y, z]")
-
-
-def _numbers(value, where: str, count: int, expected: str) -> tuple:
-    if not isinstance(value, (list, tuple)) or len(value) != count:
-        raise InputError(where, _shown(value), expected)
-    return tuple(_number(one, where) for one in value)
-
-
-def _shown(value) -> str:
-    """A value as it stands in the file, shortened."""
-    text = json.dumps(value, ensure_ascii=True, default=str)
-    return text if len(text) <= 40 else text[:37] + "..."
+    return numbers(value, where, 3, "[x, y, z]")

@@ -150,9 +150,10 @@ def _by_coordinates(path, cells, below, labels, starts, tabs):
         raise InputError(f"{path}:{below + 1}", f"{' '.join(names[:4])[:40]!r}", "X1 Y1 Z1 X2 ...", _EXPORT_AGAIN)
     count = len(names) // 3
     if count < len(labels):
-        raise InputError(f"{path}:{below + 1}", f"coordinates of {count} markers", f"{len(labels)}, as there are labels",
-                         _EXPORT_AGAIN)  # fmt: skip
-    return labels + [""] * (count - len(labels)), [2 + 3 * i for i in range(count)], tuple(letters.index(c) for c in "XYZ")
+        found, expected = f"coordinates of {count} markers", f"{len(labels)}, as there are labels"
+        raise InputError(f"{path}:{below + 1}", found, expected, _EXPORT_AGAIN)
+    order = tuple(letters.index(axis) for axis in "XYZ")
+    return labels + [""] * (count - len(labels)), [2 + 3 * i for i in range(count)], order
 
 
 def _values(lines: list[str], at: int, tabs: bool) -> dict[str, str]:
@@ -230,7 +231,8 @@ def _number(path: Path, cell: str, line: int, column: int) -> float:
 def _on_one_clock(path: Path, head: _Head, times: list[str], positions: np.ndarray):
     """(frames per second, seconds of the first frame, places, notes): frames that the times leave out are put in, not
     seen. InputError where times go back or are not those of one rate."""
-    said = next((rate for name in ("datarate", "camerarate", "origdatarate") if (rate := head.number(name)) > 0), math.nan)
+    rates = (head.number(name) for name in ("datarate", "camerarate", "origdatarate"))
+    said = next((rate for rate in rates if rate > 0), math.nan)
     seconds, coarse = _seconds(times)
     if len(times) < 2 or not np.isfinite(seconds).all() or np.ptp(seconds) == 0:
         _check_rate(path, said)
@@ -239,8 +241,8 @@ def _on_one_clock(path: Path, head: _Head, times: list[str], positions: np.ndarr
     steps = np.diff(seconds)
     if (steps <= 0).any() and not _only_coarse(steps, coarse, said):
         frame = int(np.argmax(steps <= 0)) + 2
-        raise InputError(path, f"Time of frame {frame} is {times[frame - 1]}, after {times[frame - 2]}", "times that grow",
-                         "one recording a file")  # fmt: skip
+        found = f"Time of frame {frame} is {times[frame - 1][:20]}, after {times[frame - 2][:20]}"
+        raise InputError(path, found, "times that grow", "one recording a file")
     fps, told = _rate(said, seconds, steps, coarse)
     _check_rate(path, fps)
     frames = np.rint((seconds - seconds[0]) * fps).astype(int)
@@ -290,7 +292,8 @@ def _rate(said: float, seconds: np.ndarray, steps: np.ndarray, coarse: float) ->
 
 def _check_rate(path: Path, fps: float) -> None:
     if not FEWEST_FPS <= fps <= MOST_FPS:
-        raise InputError(path, f"{fps:g} frames per second", f"{FEWEST_FPS:g} to {MOST_FPS:g}", "check DataRate and Time")
+        expected = f"{FEWEST_FPS:g} to {MOST_FPS:g}"
+        raise InputError(path, f"{fps:g} frames per second", expected, "check DataRate and Time")
 
 
 def _with_gaps(path: Path, frames: np.ndarray, positions: np.ndarray, told: list[str]):

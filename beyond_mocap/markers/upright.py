@@ -1,4 +1,5 @@
-"""Which way is up, and whether left is left, as the names of markers tell: heads stand above feet, toes before heels."""
+"""Which way is up, and whether left is left, as the names of markers tell: heads stand above feet, toes before
+heels."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ _SURE = 0.25  # sine volume of the three directions
 
 
 def up_axis(labels: Sequence[str], positions: np.ndarray) -> tuple[int, int] | None:
-    """(axis 0..2, sign) along which heads (or pelvis) lie above feet; None where the names do not tell or the body lies down.
+    """(axis 0..2, sign) along which heads (or pelvis) lie above feet; None where the names do not tell or the body
+    lies down.
 
     positions: (T, M, 3), any unit, any axes, NaN where not seen.
     """
