@@ -6,7 +6,7 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, ball, library, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline,
+    annotate, ball, library, markers, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline,
     video, view,
 )
 
@@ -28,6 +28,8 @@ CLASSES = (
     ball.BEYOND_MOCAP_UL_passes,
     ball.BEYOND_MOCAP_UL_touches,
     ball.BEYOND_MOCAP_PT_ball,
+    markers.BEYOND_MOCAP_UL_markers,
+    markers.BEYOND_MOCAP_PT_markers,
     view.BEYOND_MOCAP_PT_view,
     timeline.BEYOND_MOCAP_MT_choose_player,
     timeline.BEYOND_MOCAP_PT_timeline,

@@ -42,6 +42,7 @@ from . import (
 )
 from .aimed import live as aimed_live
 from .aimed import settings as aimed
+from .markers import labels as marker_labels
 from .markers import settings as markers
 from .passes import hits_shown
 from .passes import live as passes_live
@@ -88,6 +89,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_aim", aimed.BeyondMocapAim),
     ("Object", "beyond_mocap_cloud", markers.BeyondMocapCloud),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
+    ("Scene", "beyond_mocap_markers", markers.BeyondMocapMarkers),
     ("Scene", "beyond_mocap_passes", passes.BeyondMocapPasses),
     ("Scene", "beyond_mocap_stream", stream.BeyondMocapStream),
     ("WindowManager", "beyond_mocap_streaming", stream.BeyondMocapStreaming),
@@ -112,6 +114,7 @@ def register():
     moment_names.register()
     freshness.register()
     drawn_labels.register()
+    marker_labels.register()
     live.register()
     ride_live.register()
     ride_measure.register()
@@ -134,6 +137,7 @@ def unregister():
     ride_measure.unregister()
     ride_live.unregister()
     live.unregister()
+    marker_labels.unregister()
     drawn_labels.unregister()
     freshness.unregister()
     overlays.unregister()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...beyond_mocap.errors import InputError
 from .. import bake, linked
@@ -39,7 +40,8 @@ def create(
     for label in trial.labels:
         kept.labels.add().name = label
     start = float(scene.frame_start) if start is None else float(start)
-    nodes.hang(cloud, {"Start": start, "Radius": RADIUS * units})
+    nodes.hang(cloud, {"Start": start})
+    kept.size = RADIUS * units
     write(cloud, trial, scene)
     bake.lengthen(scene, start + trial.duration * frames_per_second(scene))
     return cloud
@@ -110,6 +112,28 @@ def start_frame(cloud: bpy.types.Object) -> float:
 def played_rate(cloud: bpy.types.Object, scene: bpy.types.Scene) -> float:
     """Samples a second as the scene plays them: another than the recording's where the user slows it down."""
     return float(nodes.get(nodes.modifier_of(cloud), "Step")) * frames_per_second(scene)
+
+
+def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]:
+    """Markers that are seen on a scene frame and their places in the cloud's own space, quickly, in any mode."""
+    modifier = nodes.modifier_of(cloud)
+    holder = nodes.get(modifier, "Trajectories") if modifier is not None else None
+    if holder is None:
+        return []
+    count, samples = nodes.get(modifier, "Markers"), nodes.get(modifier, "Samples")
+    row = min(max((frame - nodes.get(modifier, "Start")) * nodes.get(modifier, "Step"), 0.0), samples - 1.0)
+    here = round(row)
+    other = min(max(here + (1 if row > here else -1), 0), samples - 1)
+    places, seen = holder.data.vertices, holder.data.attributes[nodes.SEEN].data
+    if len(places) != count * samples:
+        return []
+    found = []
+    for marker in range(count):
+        near, far = here * count + marker, other * count + marker
+        if seen[near].value:
+            place = places[near].co
+            found.append((marker, place.lerp(places[far].co, abs(row - here)) if seen[far].value else place.copy()))
+    return found
 
 
 def markers(cloud: bpy.types.Object) -> np.ndarray:

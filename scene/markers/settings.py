@@ -1,27 +1,72 @@
-"""What a cloud of markers keeps. Saved with the file, and known to undo."""
+"""What a cloud of markers keeps, and what the panel shows. Saved with the file, and known to undo."""
 
 from __future__ import annotations
 
 import bpy
 from bpy.props import (
-    BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty,
+    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty,
 )
 
+ROLES = (
+    ("NEEDED", "Needed", "It is in every recording of this marker set", "BLANK1", 0),
+    ("OPTIONAL", "Optional", "It may be missing", "CHECKBOX_DEHLT", 1),
+    ("STATIC", "Static Only", "It may be missing in all but the static trial", "ARMATURE_DATA", 2),
+    ("BALL", "Ball", "It is on a ball", "MESH_UVSPHERE", 3),
+    ("OTHER", "Other", "It is neither on the body nor on a ball", "CANCEL", 4),
+)
+FILTERS = (
+    ("butterworth", "Butterworth", "Zero-phase low-pass filter of fourth order"),
+    ("kalman", "Kalman", "Smoothing by how a body moves, forwards and backwards"),
+    ("none", "None", "As it was solved"),
+)
+HANDS = (
+    ("AUTO", "Found", "The hand that throws"), ("left", "Left", "The left hand"), ("right", "Right", "The right hand"),
+)  # fmt: skip
 
-def segment_changed(label, _context) -> None:
+
+def redraw(label, _context) -> None:
     """Draw lines and colours by the new segments."""
     from . import lines
 
     lines.draw(label.id_data)
 
 
+def shown(kept, _context) -> None:
+    """Lines and the size of the spheres as they were chosen."""
+    from . import nodes
+
+    modifier = nodes.modifier_of(kept.id_data)
+    if modifier is not None:
+        nodes.put(modifier, "Lines", kept.lines)
+        nodes.put(modifier, "Radius", kept.size)
+
+
+def segments(_label, _context, typed: str) -> list[str]:
+    """The segments that can carry a marker."""
+    from ...beyond_mocap.markers.template import JOINTS
+
+    return [name for name in JOINTS if typed.lower() in name.lower()]
+
+
+def landmarks(_label, _context, typed: str) -> list[str]:
+    """The anatomical points that a marker can lie on."""
+    from ...beyond_mocap.markers.landmarks import LANDMARKS
+
+    return [name for name in sorted(LANDMARKS) if typed.lower() in name]
+
+
 class BeyondMocapMarker(bpy.types.PropertyGroup):
-    """One marker of a cloud: its label, and the body segment that carries it."""
+    """One marker of a cloud: its label, and what carries it."""
 
     name: StringProperty(name="Label", description="The marker's name")
     segment: StringProperty(
-        name="Segment", update=segment_changed, description="The segment of the body that carries it; empty: none",
+        name="Segment", update=redraw, search=segments, description="The segment of the body that carries it",
     )
+    landmark: StringProperty(
+        name="Lies on", search=landmarks,
+        description="The anatomical point that it lies on, by which joints are found; several with commas between",
+    )
+    role: EnumProperty(name="Role", items=ROLES, default="NEEDED", description="Whether it may be missing")
     seen: FloatProperty(name="Seen", subtype="PERCENTAGE", max=100.0, description="Share of the samples with it")
 
 
@@ -33,18 +78,82 @@ class BeyondMocapMarkerEvent(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Time", description="Seconds on the recording's clock")
 
 
+def a_cloud(_own, thing) -> bool:
+    """Whether an object can be chosen as a trial."""
+    return is_cloud(thing)
+
+
 class BeyondMocapCloud(bpy.types.PropertyGroup):
     """A trial that stands in the scene as a cloud of markers."""
 
     on: BoolProperty(name="Markers", description="Whether this object is a cloud of markers")
     labels: CollectionProperty(type=BeyondMocapMarker, description="The markers, in the order of the recording")
     active_label: IntProperty(name="Marker", description="The marker chosen in the list")
+    lines: BoolProperty(
+        name="Lines", default=True, update=shown, description="Draw lines between the markers of a segment"
+    )
+    size: FloatProperty(
+        name="Size", default=0.007, min=0.0, soft_max=0.05, unit="LENGTH", update=shown,
+        description="Radius of the spheres at the markers",
+    )
     events: CollectionProperty(type=BeyondMocapMarkerEvent, description="Events of the recording")
     fps: FloatProperty(name="Rate", description="Samples a second")
     start: FloatProperty(name="Start", description="Seconds on the recording's clock at the first sample")
     subject: StringProperty(name="Subject", description="Who was recorded")
     file: StringProperty(name="File", subtype="FILE_PATH", description="The recording's file")
     set_name: StringProperty(name="Marker Set", description="The marker set that the labels belong to")
+    static: PointerProperty(
+        name="Static Trial", type=bpy.types.Object, poll=a_cloud,
+        description="A recording of the same body standing still, from which its joints are found; none: from the "
+        "motion itself",
+    )
+    model: PointerProperty(
+        name="Model", type=bpy.types.Text,
+        description="The body's joints and where the markers lie on it, as the last reconstruction left it or as read "
+        "from a file",
+    )
+    use_model: BoolProperty(
+        name="Use Model", description="Take joints and markers from the model instead of finding them anew"
+    )
+    made: StringProperty(name="Made", options={"HIDDEN"}, description="The reconstruction in this session's memory")
+    body: PointerProperty(name="Body", type=bpy.types.Object, description="The armature that was reconstructed from it")
+    ball: PointerProperty(name="Ball", type=bpy.types.Object, description="The ball that was thrown")
+    told: StringProperty(name="Told", options={"HIDDEN"}, description="What was decided or is wrong, line by line")
+    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about the body that came out")
+    cleaned: StringProperty(name="Cleaned", options={"HIDDEN"}, description="Lines about what was cleaned up")
+    release: StringProperty(name="Release", options={"HIDDEN"}, description="Lines about the ball's release")
+
+
+class BeyondMocapMarkers(bpy.types.PropertyGroup):
+    """How recordings of markers are read and worked on, per scene."""
+
+    names: BoolProperty(name="Names", default=True, description="Write the labels of the active cloud at its markers")
+    unit: FloatProperty(
+        name="Unit", default=0.0, min=0.0, max=10.0, precision=4,
+        description="Metres in one unit of a recording; 0: as its file says, or by the body's size",
+    )
+    filter: EnumProperty(name="Filter", items=FILTERS, default="butterworth", description="How the motion is smoothed")
+    cutoff: FloatProperty(
+        name="Cutoff", default=13.4, min=0.5, max=100.0, precision=1,
+        description="Hertz up to which the Butterworth filter lets movements through",
+    )
+    plant: BoolProperty(name="Plant Feet", default=True, description="Hold feet where they stand")
+    weights: BoolProperty(
+        name="Weigh Markers", default=True, description="Trust markers less while their segment is deformed"
+    )
+    limits: BoolProperty(name="Joint Limits", default=True, description="Joints turn no further than a body's")
+    smoothness: FloatProperty(
+        name="Smoothness", default=0.0, min=0.0, max=100.0, precision=2,
+        description="How much the solution of the whole sequence avoids accelerations; 0: each frame for itself",
+    )
+    dressed: BoolProperty(name="Make Body", default=True, description="Give the armature a simple body")
+    add: BoolProperty(name="Add to Library", description="Write the motion with its words into the library's folder too")
+    words: StringProperty(name="Words", default="throwb", description="The words of the clip that is added")
+    hand: EnumProperty(name="Hand", items=HANDS, default="AUTO", description="The hand that throws")
+    radius: FloatProperty(
+        name="Ball Radius", default=0.0, min=0.0, max=0.5, precision=4,
+        description="Metres; 0: fitted where a marker lies on the ball, else a baseball's",
+    )
 
 
 def is_cloud(thing: bpy.types.Object | None) -> bool:
@@ -58,12 +167,19 @@ def clouds(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def cloud_meant(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The cloud that is meant: the active object, one that is selected, or the only one."""
-    if is_cloud(context.view_layer.objects.active):
-        return context.view_layer.objects.active
-    chosen = [thing for thing in context.selected_objects if is_cloud(thing)]
-    found = chosen or clouds(context.scene)
-    return found[0] if chosen or len(found) == 1 else None
+    """The cloud that is meant: the active object or the one whose body it is, one that is selected, or the only one."""
+    active, found = context.view_layer.objects.active, clouds(context.scene)
+    meant = [thing for thing in found if thing == active]
+    meant += [thing for thing in found if active is not None and thing.beyond_mocap_cloud.body == active]
+    meant += [thing for thing in found if thing.select_get()]
+    meant += found if len(found) == 1 else []
+    return meant[0] if meant else None
 
 
-CLASSES = (BeyondMocapMarker, BeyondMocapMarkerEvent, BeyondMocapCloud)
+def active_label(cloud: bpy.types.Object) -> BeyondMocapMarker | None:
+    """The marker chosen in the list."""
+    kept = cloud.beyond_mocap_cloud
+    return kept.labels[kept.active_label] if 0 <= kept.active_label < len(kept.labels) else None
+
+
+CLASSES = (BeyondMocapMarker, BeyondMocapMarkerEvent, BeyondMocapCloud, BeyondMocapMarkers)

@@ -1,0 +1,118 @@
+"""Optical Markers: a recording of markers, what they are on, and the body that moved under them."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.markers.settings import active_label, cloud_meant
+from .tab import Step, paragraph, section, split, table
+
+ROLE_ICONS = {"OPTIONAL": "CHECKBOX_DEHLT", "STATIC": "ARMATURE_DATA", "BALL": "MESH_UVSPHERE", "OTHER": "CANCEL"}
+
+
+class BEYOND_MOCAP_UL_markers(bpy.types.UIList):
+    """The markers of a cloud."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One marker."""
+        row = layout.split(factor=0.36)
+        row.prop(item, "name", text="", emboss=False)
+        right = row.row(align=True)
+        free = not item.segment and item.role not in ("BALL", "OTHER")
+        right.prop(item, "segment", text="", emboss=False, icon="ERROR" if free else ROLE_ICONS.get(item.role, "BLANK1"))
+        share = right.row()
+        share.alignment, share.active = "RIGHT", item.seen > 99.95
+        share.label(text=f"{item.seen:.0f} %")
+
+
+class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
+    """Recordings of optical markers, and the way from them to a body."""
+
+    bl_label = "Optical Markers"
+    bl_order = 9
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """The active cloud, part by part."""
+        layout, cloud = self.layout, cloud_meant(context)
+        layout.operator("beyond_mocap.import_markers", icon="IMPORT")
+        if cloud is None:
+            return
+        kept, settings = cloud.beyond_mocap_cloud, context.scene.beyond_mocap_markers
+        row = layout.row(align=True)
+        row.label(text=cloud.name, icon="POINTCLOUD_DATA")
+        row.prop(settings, "names", text="", icon="FONT_DATA")
+        row.prop(kept, "lines", text="", icon="MOD_WIREFRAME")
+        row.prop(kept, "size", text="")
+        section(layout, "markers_labels", "Labels & Segments", lambda opened: labels(opened, kept), closed=False)
+        section(layout, "markers_clean", "Clean Up", lambda opened: clean(self, opened, context, kept))
+        section(layout, "markers_model", "Static Trial & Model", lambda opened: model(opened, kept))
+        section(layout, "markers_pose", "Reconstruct", lambda opened: pose(self, opened, context, kept), closed=False)
+        section(layout, "markers_release", "Ball & Release", lambda opened: release(self, opened, context, kept))
+
+
+def labels(layout, kept) -> None:
+    """The list, and what is known of the marker that is chosen."""
+    row = layout.row(align=True)
+    row.operator_menu_enum("beyond_mocap.use_marker_set", "name", text=kept.set_name or "Marker Set", icon="PRESET")
+    row.operator("beyond_mocap.load_marker_set", text="", icon="FILE_FOLDER")
+    row.operator("beyond_mocap.save_marker_set", text="", icon="FILE_TICK")
+    layout.template_list("BEYOND_MOCAP_UL_markers", "", kept, "labels", kept, "active_label", rows=5)
+    layout.operator_menu_enum("beyond_mocap.assign_markers", "segment", text="Assign to Segment", icon="BONE_DATA")
+    label = active_label(kept.id_data)
+    if label is not None:
+        column = split(layout)
+        for name in ("segment", "landmark", "role"):
+            column.prop(label, name)
+
+
+def clean(panel, layout, context, kept) -> None:
+    """The button, and what was done."""
+    layout.operator("beyond_mocap.clean_markers", icon="BRUSH_DATA")
+    panel.progress(context, "clean markers")
+    for line in kept.cleaned.splitlines():
+        paragraph(layout, line, "DOT")
+
+
+def model(layout, kept) -> None:
+    """From what the body's joints are found."""
+    column = split(layout)
+    column.prop(kept, "static")
+    layout.operator("beyond_mocap.set_static", icon="ARMATURE_DATA")
+    column = split(layout)
+    column.prop(kept, "model")
+    column.prop(kept, "use_model")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.load_marker_model", text="Load Model", icon="FILE_FOLDER")
+    row.operator("beyond_mocap.save_marker_model", text="Save Model", icon="FILE_TICK")
+
+
+def pose(panel, layout, context, kept) -> None:
+    """The settings, the button, and what came out."""
+    settings = context.scene.beyond_mocap_markers
+    column = split(layout)
+    column.prop(settings, "filter")
+    if settings.filter != "none":
+        column.prop(settings, "cutoff")
+    for name in ("plant", "weights", "limits", "smoothness", "dressed", "add"):
+        column.prop(settings, name)
+    if settings.add:
+        column.prop(settings, "words")
+    row = layout.row()
+    row.scale_y = 1.3
+    row.operator("beyond_mocap.reconstruct_markers", icon="PLAY")
+    panel.progress(context, "reconstruct markers")
+    table(layout, kept.figures.splitlines())
+    for line in kept.told.splitlines():
+        paragraph(layout, line, "INFO")
+
+
+def release(panel, layout, context, kept) -> None:
+    """When and how the ball left the hand."""
+    settings = context.scene.beyond_mocap_markers
+    column = split(layout)
+    column.prop(settings, "hand")
+    column.prop(settings, "radius")
+    layout.operator("beyond_mocap.find_release", icon="FORCE_FORCE")
+    panel.progress(context, "find release")
+    table(layout, kept.release.splitlines())
