@@ -9,6 +9,7 @@ def draw_import(self, _context):
     """File > Import."""
     self.layout.operator("beyond_mocap.import_clips", text="Beyond Mocap Clips (.bvh, .fbx ...)")
     self.layout.operator("beyond_mocap.import_tracking", text="Beyond Mocap Tracking (.csv ...)")
+    self.layout.operator("beyond_mocap.import_markers", text="Beyond Mocap Optical Markers (.c3d, .trc)")
 
 
 def draw_export(self, _context):

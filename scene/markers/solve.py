@@ -1,0 +1,131 @@
+"""From a cloud to a body: what the recipe gets, and what its result becomes in the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...beyond_mocap.errors import InputError
+from .. import action, armature, bake, body, linked
+from ..measure import frames_per_second, units_per_metre
+from ..settings import absolute
+from . import cloud as clouds
+from . import kept as store
+from . import models, sets
+from .settings import is_cloud
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.markers.model import MarkerModel
+    from ...beyond_mocap.markers.trial import MarkerTrial
+    from ...beyond_mocap.reconstruct import Reconstruction, ReconstructSettings
+
+SKIN = (0.55, 0.55, 0.60)
+
+
+@dataclass(frozen=True)
+class Order:
+    """All that the recipe needs of a cloud, without bpy. cloud: its name; add: the clip to write, with `words`."""
+
+    cloud: str
+    trial: "MarkerTrial"
+    static: "MarkerTrial | None"
+    model: "MarkerModel | None"
+    settings: "ReconstructSettings"
+    add: Path | None = None
+    words: tuple[str, ...] = ()
+
+
+def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
+    """What is asked of a cloud by its own settings and the scene's. InputError where something is missing."""
+    linked.refuse(cloud, cloud.data)
+    kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
+    trial = clouds.read(cloud, scene)
+    static = kept.static if not kept.use_model and is_cloud(kept.static) and kept.static != cloud else None
+    words = tuple(chosen.words.split()) if chosen.add else ()
+    return Order(
+        cloud.name, trial, static and clouds.read(static, scene),
+        models.of_cloud(cloud) if kept.use_model else None, settings_of(cloud, chosen, words),
+        clip_place(scene, cloud.name) if chosen.add else None, words,
+    )
+
+
+def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) -> "ReconstructSettings":
+    """The recipe's settings; the marker set is the cloud's own where its markers have segments."""
+    from ...beyond_mocap.reconstruct import ReconstructSettings
+
+    assigned = any(row.segment for row in cloud.beyond_mocap_cloud.labels)
+    throw = any(word.startswith("throw") for word in words)
+    return ReconstructSettings(
+        marker_set=sets.of_cloud(cloud) if assigned else None, weights=chosen.weights, limits=chosen.limits,
+        smoothness=chosen.smoothness, filter=chosen.filter, cutoff=chosen.cutoff, plant=chosen.plant,
+        radius=chosen.radius or None, release="yes" if throw else "auto",
+    )  # fmt: skip
+
+
+def clip_place(scene: bpy.types.Scene, name: str) -> Path:
+    """Where the clip goes in the library's folder. InputError where there is none, or where the name is taken."""
+    folder = scene.beyond_mocap.library_folder
+    if not folder or not Path(absolute(folder)).is_dir():
+        raise InputError("library", f"{folder or 'no folder'}", "a folder", "choose one in the panel Library")
+    place = Path(absolute(folder), f"{bpy.path.clean_name(name)}.bvh")
+    if place.exists():
+        raise InputError(place, "is there already", "a name that is free", "rename the cloud or the clip")
+    return place
+
+
+def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruction") -> bpy.types.Object:
+    """The result beside the cloud: an armature that moves with it, and what is told in the panel; returns it."""
+    scene, kept = context.scene, cloud.beyond_mocap_cloud
+    thing = kept.body
+    if thing is None or not fits(thing, made, scene):
+        room = cloud.users_collection[0] if cloud.users_collection else context.collection
+        thing = armature.create(context, made.motion.skeleton, f"{cloud.name} body", room)
+        if scene.beyond_mocap_markers.dressed:
+            body.create(thing, thing.name, SKIN, room, scene, made.motion)
+        kept.body = thing
+    thing.matrix_world = Matrix()
+    context.view_layer.update()
+    slowed = clouds.played_rate(cloud, scene) / kept.fps
+    played = replace(made.motion, fps=made.motion.fps * slowed)
+    action.write(thing, played, scene, clouds.start_frame(cloud), cloud.name, generated=True)
+    thing.matrix_world = cloud.matrix_world @ Matrix.Translation((0.0, 0.0, made.floor * units_per_metre(scene)))
+    bake.lengthen(scene, clouds.start_frame(cloud) + played.duration * frames_per_second(scene))
+    kept.made, kept.figures, kept.told = store.keep(made), "\n".join(figures(made)), "\n".join(made.warnings)
+    models.onto(cloud, made.model)
+    return thing
+
+
+def fits(thing: bpy.types.Object, made: "Reconstruction", scene: bpy.types.Scene) -> bool:
+    """Whether a body from before has the same bones and may be written to."""
+    if thing.type != "ARMATURE" or thing.library is not None or thing.name not in scene.objects:
+        return False
+    return armature.skeleton_of(thing, scene).same_bones(made.motion.skeleton, 1e-4)
+
+
+def figures(made: "Reconstruction") -> list[str]:
+    """Lines "name: value" for the panel."""
+    residual = made.solved.residual
+    away = 1000.0 * residual[np.isfinite(residual)]
+    lines = [f"Frames: {len(made.motion)} at {made.motion.fps:g}/s", f"Joints: {len(made.motion.skeleton)}"]
+    lines.append(f"Markers: {len(made.model.markers)}")
+    if len(away):
+        lines.append(f"Markers off: {away.mean():.1f} mm, 95 % below {np.percentile(away, 95.0):.0f}")
+    spent = sum(value for name, value in made.seconds.items() if name != "total")
+    lines.append(f"Took: {spent:.1f} s")
+    return lines
+
+
+def add(order: Order, made: "Reconstruction") -> list[str]:
+    """Write the clip and its words into the library, where that was asked for; lines about it."""
+    if order.add is None:
+        return []
+    from types import SimpleNamespace
+
+    from ...beyond_mocap.commands.reconstructing import add_to_library
+
+    return add_to_library(made, order.add, SimpleNamespace(words=list(order.words)))
