@@ -7,7 +7,8 @@ from bpy.props import EnumProperty
 
 from ..beyond_mocap.errors import InputError
 from ..scene.markers import sets
-from .marker_verb import MarkerVerb
+from .marker_verb import OnMarkers
+from .verb import Verb
 
 _items: list[tuple[str, str, str]] = []
 
@@ -22,7 +23,7 @@ def segments(_operator, _context):
     return _items
 
 
-class BEYOND_MOCAP_OT_assign_markers(MarkerVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_assign_markers(OnMarkers, Verb, bpy.types.Operator):
     """Say which segment carries the markers that are selected in Edit Mode, or else the one chosen in the list"""
 
     bl_idname = "beyond_mocap.assign_markers"

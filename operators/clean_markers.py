@@ -6,11 +6,11 @@ import bpy
 
 from ..scene.markers import cloud, sets
 from ..scene.markers.settings import is_cloud
-from .marker_verb import MarkerVerb
+from .marker_verb import OnMarkers
 from .verb import BackgroundVerb
 
 
-class BEYOND_MOCAP_OT_clean_markers(MarkerVerb, BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_clean_markers(OnMarkers, BackgroundVerb, bpy.types.Operator):
     """Fill the gaps of the active cloud's markers, mend exchanged labels and jumps, and name those that nobody has
 named where the others tell. Reconstruct does the same for itself"""
 

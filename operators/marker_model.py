@@ -9,11 +9,11 @@ from bpy_extras.io_utils import ExportHelper
 from ..beyond_mocap.errors import InputError
 from ..scene.markers import models
 from ..scene.markers.settings import cloud_meant
-from .marker_verb import MarkerVerb
-from .verb import ImportVerb
+from .marker_verb import OnMarkers
+from .verb import ImportVerb, Verb
 
 
-class BEYOND_MOCAP_OT_load_marker_model(ImportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operator):
     """Take joints and markers of the active cloud's body from a MODEL.json, as the command reconstruct saves it"""
 
     bl_idname = "beyond_mocap.load_marker_model"
@@ -22,8 +22,6 @@ class BEYOND_MOCAP_OT_load_marker_model(ImportVerb, bpy.types.Operator):
 
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    poll = MarkerVerb.poll
-
     def do(self, context):
         """Read it, keep it with the cloud."""
         from ..beyond_mocap.files.model_json import read_model
@@ -31,13 +29,13 @@ class BEYOND_MOCAP_OT_load_marker_model(ImportVerb, bpy.types.Operator):
         chosen = self.chosen()
         if len(chosen) != 1:
             raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one MODEL.json")
-        thing = MarkerVerb.cloud(context)
+        thing = self.cloud(context)
         models.onto(thing, read_model(chosen[0]))
         thing.beyond_mocap_cloud.use_model = True
         self.report({"INFO"}, f"{thing.name}: model from {chosen[0].name}")
 
 
-class BEYOND_MOCAP_OT_save_marker_model(MarkerVerb, bpy.types.Operator, ExportHelper):
+class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
     """Write the model that the active cloud keeps as a MODEL.json, for other recordings and the command line"""
 
     bl_idname = "beyond_mocap.save_marker_model"

@@ -12,8 +12,8 @@ from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
 from ..scene.markers import sets
 from ..scene.markers.settings import cloud_meant
-from .marker_verb import MarkerVerb
-from .verb import ImportVerb
+from .marker_verb import OnMarkers
+from .verb import ImportVerb, Verb
 
 _items: list[tuple[str, str, str]] = []
 
@@ -28,7 +28,7 @@ def shipped(_operator, _context):
     return _items
 
 
-class BEYOND_MOCAP_OT_use_marker_set(MarkerVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
     """Give the markers their segments by a marker set that comes along"""
 
     bl_idname = "beyond_mocap.use_marker_set"
@@ -49,7 +49,7 @@ class BEYOND_MOCAP_OT_use_marker_set(MarkerVerb, bpy.types.Operator):
         self.report({"INFO"}, f"{thing.name}: {found.name}")
 
 
-class BEYOND_MOCAP_OT_load_marker_set(ImportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator):
     """Give the markers of the active cloud their segments by a marker set in a text file"""
 
     bl_idname = "beyond_mocap.load_marker_set"
@@ -58,8 +58,6 @@ class BEYOND_MOCAP_OT_load_marker_set(ImportVerb, bpy.types.Operator):
 
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
-    poll = MarkerVerb.poll
-
     def do(self, context):
         """Read it, apply it."""
         from ..beyond_mocap.files.marker_set_text import read_marker_set
@@ -67,12 +65,12 @@ class BEYOND_MOCAP_OT_load_marker_set(ImportVerb, bpy.types.Operator):
         chosen = self.chosen()
         if len(chosen) != 1:
             raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one marker set")
-        thing = MarkerVerb.cloud(context)
+        thing = self.cloud(context)
         for line in sets.apply(thing, read_marker_set(chosen[0])):
             self.report({"WARNING"}, line)
 
 
-class BEYOND_MOCAP_OT_save_marker_set(MarkerVerb, bpy.types.Operator, ExportHelper):
+class BEYOND_MOCAP_OT_save_marker_set(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
     """Write labels, segments and landmarks of the active cloud as a marker set, for other recordings and the command
 line"""
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from ..scene import linked
 from ..scene.markers.settings import cloud_meant
-from .verb import Verb
 
 
-class MarkerVerb(Verb):
-    """A verb on the cloud of markers that is meant."""
+class OnMarkers:
+    """To be mixed into a verb: it is about the cloud of markers that is meant."""
 
     @classmethod
     def poll(cls, context):

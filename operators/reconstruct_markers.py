@@ -8,11 +8,11 @@ import bpy
 
 from ..scene.markers import solve
 from ..scene.markers.settings import is_cloud
-from .marker_verb import MarkerVerb
+from .marker_verb import OnMarkers
 from .verb import BackgroundVerb
 
 
-class BEYOND_MOCAP_OT_reconstruct_markers(MarkerVerb, BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_reconstruct_markers(OnMarkers, BackgroundVerb, bpy.types.Operator):
     """Find the skeleton that moves under the markers of the active cloud: an armature with an action beside it, and a
 clip of the library where asked for"""
 

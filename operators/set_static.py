@@ -7,10 +7,11 @@ import bpy
 from ..beyond_mocap.errors import InputError
 from ..scene import linked
 from ..scene.markers.settings import clouds, is_cloud
-from .marker_verb import MarkerVerb
+from .marker_verb import OnMarkers
+from .verb import Verb
 
 
-class BEYOND_MOCAP_OT_set_static(MarkerVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_set_static(OnMarkers, Verb, bpy.types.Operator):
     """The active cloud is a static trial: the other selected clouds, or all others where none is selected, get the places of
 their joints from it"""
 

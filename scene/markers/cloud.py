@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import bmesh
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -51,6 +52,8 @@ def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene)
     """Let a cloud play other trajectories, or the same ones mended; labels and segments stay by name."""
     linked.refuse(cloud, cloud.data)
     check(trial)
+    if cloud.data.is_editmode:
+        bpy.ops.object.mode_set(mode="OBJECT")
     kept = cloud.beyond_mocap_cloud
     if tuple(label.name for label in kept.labels) != trial.labels:
         _relabel(cloud, trial.labels)
@@ -139,8 +142,13 @@ def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]
 def markers(cloud: bpy.types.Object) -> np.ndarray:
     """Which marker each vertex is: (V,) places in the list of labels."""
     mesh = cloud.data
-    found = np.empty(len(mesh.vertices), np.int32)
-    mesh.attributes[nodes.MARKER].data.foreach_get("value", found)
+    if mesh.is_editmode:  # the mesh itself has no data meanwhile
+        shape = bmesh.from_edit_mesh(mesh)
+        layer = shape.verts.layers.int[nodes.MARKER]
+        found = np.array([vertex[layer] for vertex in shape.verts], np.int32)
+    else:
+        found = np.empty(len(mesh.vertices), np.int32)
+        mesh.attributes[nodes.MARKER].data.foreach_get("value", found)
     return np.clip(found, 0, max(len(cloud.beyond_mocap_cloud.labels) - 1, 0))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import bmesh
 import bpy
 
 from ...beyond_mocap.errors import InputError
@@ -104,6 +105,5 @@ def chosen(cloud: bpy.types.Object) -> list[str]:
     kept = cloud.beyond_mocap_cloud
     if cloud.mode != "EDIT":
         return [row.name for number, row in enumerate(kept.labels) if number == kept.active_label]
-    cloud.update_from_editmode()
-    selected = [vertex.select for vertex in cloud.data.vertices]
+    selected = [vertex.select for vertex in bmesh.from_edit_mesh(cloud.data).verts]
     return [kept.labels[marker].name for marker, on in zip(markers(cloud), selected) if on]

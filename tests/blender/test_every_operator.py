@@ -234,6 +234,38 @@ def another_rig():
     worlds.choose(rigs.unreal())
 
 
+def a_cloud(name="walk.trc"):
+    """A recording of markers, as a cloud that is active."""
+    bpy.ops.beyond_mocap.import_markers(filepath=str(worlds.MARKERS / name))
+
+
+def two_clouds():
+    """The same, and its static trial, which is active."""
+    a_cloud()
+    a_cloud("static.trc")
+
+
+def a_body_of_markers():
+    """The same, reconstructed."""
+    a_cloud()
+    bpy.ops.beyond_mocap.reconstruct_markers()
+
+
+def marker_set_file(places):
+    """A marker set in a file."""
+    a_cloud()
+    bpy.ops.beyond_mocap.save_marker_set(filepath=f"{places.out}/set.txt")
+    bpy.context.object.beyond_mocap_cloud.labels[0].segment = ""
+    return places.out / "set.txt"
+
+
+def marker_model_file(places):
+    """A model in a file."""
+    a_body_of_markers()
+    bpy.ops.beyond_mocap.save_marker_model(filepath=f"{places.out}/model.json")
+    return places.out / "model.json"
+
+
 def saved_map(places):
     """A map in a file: of the rig before its map was taken away."""
     bpy.ops.beyond_mocap.map_bones()
@@ -261,6 +293,7 @@ ROWS = {
     "aim_ball": Row("accepted", lambda places: {"found": False, "first": 5, "last": 6}),
     "annotate": Row("imported", lambda places: {"keys": "2 2 3 5 ENTER"}),
     "annotate_clip": Row("imported", prepare=list_clips),
+    "assign_markers": Row("imported", lambda places: {"segment": "Head"}, a_cloud),
     "bake_path": Row("accepted", prepare=ride),
     "bake_to_rig": Row("rig"),
     "ball_from_physics": Row("accepted", prepare=hand_the_ball_over),
@@ -268,6 +301,7 @@ ROWS = {
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
     "choose_player": Row("imported", lambda places: {"player": "player2"}),
+    "clean_markers": Row("imported", prepare=a_cloud),
     "clear_hits": Row("accepted", prepare=analyse),
     "delete_moment": Row("imported", prepare=pick_a_moment),
     "discard": Row("synthesized"),
@@ -286,6 +320,7 @@ ROWS = {
     "hit_analysis": Row("accepted"),
     "import_clip": Row("imported", prepare=list_clips),
     "import_clips": Row("imported", lambda places: {"filepath": f"{places.clips}/walking_1_2.bvh"}),
+    "import_markers": Row("imported", lambda places: {"filepath": f"{places.match}/walk.trc"}),
     "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
     "import_words": Row("imported", lambda places: {"filepath": f"{places.match}/player1.txt"}),
     "join_spans": Row("imported", prepare=two_spans),
@@ -295,6 +330,8 @@ ROWS = {
     "leave_path": Row("accepted", prepare=ride),
     "list_clips": Row("imported", changes=False),
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
+    "load_marker_model": Row("imported", lambda places: {"filepath": f"{marker_model_file(places)}"}),
+    "load_marker_set": Row("imported", lambda places: {"filepath": f"{marker_set_file(places)}"}),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "make_assets": Row("imported", prepare=list_clips),
     "map_bones": Row("rig", prepare=unmapped),
@@ -321,6 +358,7 @@ ROWS = {
     "preview": Row("synthesized", lambda places: {"number": 2}, two_variants),
     "propose_words": Row("clip"),
     "read_words": Row("imported", prepare=forget_dots),
+    "reconstruct_markers": Row("imported", prepare=a_cloud),
     "reduce_keys": Row("rig", prepare=bake_it),
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
@@ -329,7 +367,14 @@ ROWS = {
     "remove_video": Row("video"),
     "resynthesize_stretch": Row("synthesized", lambda places: {"player": "player1", "start": 1.0, "end": 2.0}),
     "save_bone_map": Row("rig", lambda places: {"filepath": f"{places.out}/saved.json"}, changes=False),
+    "save_marker_model": Row(
+        "imported", lambda places: {"filepath": f"{places.out}/model.json"}, a_body_of_markers, changes=False
+    ),
+    "save_marker_set": Row(
+        "imported", lambda places: {"filepath": f"{places.out}/set.txt"}, a_cloud, changes=False
+    ),
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
+    "set_static": Row("imported", prepare=two_clouds),
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_timeline": Row("imported", changes=False),
     "show_video": Row("video", changes=False),
@@ -349,6 +394,7 @@ ROWS = {
     "update": Row("synthesized"),
     "update_path": Row("accepted", prepare=ride_elsewhere),
     "update_live": Row("synthesized", lambda places: {"player": "player1", "kind": "quick"}),
+    "use_marker_set": Row("imported", lambda places: {"name": "plug_in_gait_legs"}, a_cloud),
     "use_selected_rig": Row("rig", prepare=another_rig),
     "variants": Row("synthesized", lambda places: {"count": 2}),
     "words_to_text": Row("imported"),

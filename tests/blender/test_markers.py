@@ -5,7 +5,9 @@ import importlib
 import bpy
 import numpy as np
 import pytest
+import worlds
 from conftest import EXTENSION
+from undo import assert_one_step
 
 
 @pytest.fixture
@@ -118,3 +120,98 @@ def test_a_saved_file_plays_and_reads(cloud, trial, tmp_path):
     places, *_ = seen_at(thing, bpy.context.scene.frame_start)
     assert np.abs(places - trial.positions[0]).max() < 1e-5
     assert np.nanmax(np.abs(cloud.read(thing, bpy.context.scene).positions - trial.positions)) < 1e-6
+
+
+@pytest.fixture
+def walk(core):
+    """A recording in a file: Plug-in Gait on a walking body."""
+    worlds.plant_markers()
+    return worlds.MARKERS / "walk.trc"
+
+
+def imported(path):
+    bpy.ops.beyond_mocap.import_markers(filepath=str(path))
+    return bpy.context.object
+
+
+def test_importing_gives_what_the_reader_reads_and_is_one_step(cloud, core, walk):
+    assert_one_step(bpy.ops.beyond_mocap.import_markers, filepath=str(walk))
+    read = core("files.marker_files").read_markers(walk)
+    thing = bpy.data.objects["walk"]
+    back = cloud.read(thing, bpy.context.scene)
+    assert back.labels == read.labels and back.fps == read.fps
+    assert np.allclose(back.positions, read.positions, atol=1e-6, equal_nan=True)
+    assert thing.beyond_mocap_cloud.set_name == "plug_in_gait"
+    assert thing.beyond_mocap_cloud.labels["LKNE"].segment == "LeftUpLeg"
+
+
+def test_dropped_files_become_clouds_with_names_of_their_own(walk):
+    files = [{"name": "walk.trc"}, {"name": "static.trc"}]
+    bpy.ops.beyond_mocap.import_markers("INVOKE_DEFAULT", directory=str(walk.parent), files=files)
+    assert {thing.name for thing in bpy.context.selected_objects} == {"walk", "static"}
+
+
+def test_a_marker_set_goes_to_a_file_and_comes_back(walk, tmp_path):
+    thing = imported(walk)
+    kept = thing.beyond_mocap_cloud
+    kept.labels["*1"].role = "OTHER"
+    kept.labels["LFIN"].role, kept.labels["RBAK"].role = "OPTIONAL", "STATIC"
+    rows = [(row.name, row.segment, row.landmark, row.role) for row in kept.labels]
+    path = str(tmp_path / "mine.txt")
+    bpy.ops.beyond_mocap.save_marker_set(filepath=path)
+    for row in kept.labels:
+        row.segment = row.landmark = ""
+        row.role = "NEEDED"
+    assert_one_step(bpy.ops.beyond_mocap.load_marker_set, filepath=path)
+    kept = bpy.data.objects["walk"].beyond_mocap_cloud
+    assert [(row.name, row.segment, row.landmark, row.role) for row in kept.labels] == rows
+    assert kept.set_name == "mine"
+
+
+def test_selected_vertices_are_assigned_to_a_segment(walk):
+    thing = imported(walk)
+    labels = thing.beyond_mocap_cloud.labels
+    wanted = [row.name in ("LTHI", "LKNE") for row in labels]
+    thing.data.vertices.foreach_set("select", wanted)
+    thing.data.edges.foreach_set("select", [False] * len(thing.data.edges))
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.beyond_mocap.assign_markers(segment="RightLeg")
+    assert [row.name for row in labels if row.segment == "RightLeg"] == ["LTHI", "LKNE", "RTIB", "RANK"]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    side = np.empty(len(thing.data.vertices), np.int32)
+    thing.data.attributes["side"].data.foreach_get("value", side)
+    assert all(side[[row.name for row in labels].index(name)] == 2 for name in ("LTHI", "LKNE"))
+    thing.beyond_mocap_cloud.active_label = 0
+    bpy.ops.beyond_mocap.assign_markers(segment="NONE")
+    assert not labels[0].segment and thing.beyond_mocap_cloud.set_name == "own"
+
+
+def test_labels_are_written_where_markers_are_seen(walk):
+    labels = importlib.import_module(f"{EXTENSION}.scene.markers.labels")
+    thing = imported(walk)
+    thing.location.x = 3.0
+    bpy.context.scene.frame_set(5)
+    bpy.context.view_layer.update()
+    found = {text: place for place, text, _ in labels.labels(bpy.context)}
+    places, seen, *_ = seen_at(thing, 5)
+    names = [row.name for row in thing.beyond_mocap_cloud.labels]
+    assert set(found) == {name for name, there in zip(names, seen) if there}
+    for name, place in found.items():
+        assert np.allclose(np.array(place) - [3.0, 0.0, 0.0], places[names.index(name)], atol=1e-5)
+    bpy.context.scene.beyond_mocap_markers.names = False
+    assert not labels.labels(bpy.context)
+
+
+def test_the_active_cloud_becomes_the_others_static_trial(walk):
+    trial, still = imported(walk), imported(walk.with_name("static.trc"))
+    assert_one_step(bpy.ops.beyond_mocap.set_static)
+    trial, still = bpy.data.objects["walk"], bpy.data.objects["static"]
+    assert trial.beyond_mocap_cloud.static == still and still.beyond_mocap_cloud.static is None
+
+
+def test_a_file_that_is_none_is_refused_and_nothing_comes(tmp_path):
+    path = tmp_path / "broken.c3d"
+    path.write_bytes(b"\x02P" + bytes(600))
+    with pytest.raises(RuntimeError, match="broken.c3d"):
+        bpy.ops.beyond_mocap.import_markers(filepath=str(path))
+    assert not len(bpy.data.objects) and not len(bpy.data.meshes)

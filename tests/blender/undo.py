@@ -32,6 +32,7 @@ def state():
                    sorted(o.name for o in layer.objects if o.select_get()),
                    bpy.context.mode),
         "settings": plain(scene.beyond_mocap),
+        "markers of": plain(scene.beyond_mocap_markers),
         "passes": plain(scene.beyond_mocap_passes),
         "stream": plain(scene.beyond_mocap_stream),
         "constraints": sorted((o.name, c.name, round(c.influence, 6)) for o in bpy.data.objects for c in o.constraints),

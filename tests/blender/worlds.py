@@ -1,16 +1,21 @@
 """Files in which every operator can be tried: how far a user has come, and what can then be wrong with the scene."""
 
+import importlib
 import pathlib
 import shutil
+import tempfile
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 import rigs
+from conftest import EXTENSION
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
 CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside",
          "receive_foot", "dribble_jogging")
+_markers = tempfile.TemporaryDirectory(prefix="beyond-mocap-markers-")
+MARKERS = pathlib.Path(_markers.name)
 PICTURE = "video_0001.png"
 FOREIGN = "foreign.blend"
 
@@ -39,10 +44,27 @@ def make_places(top):
         lines += [f"{t:.1f},{a:.3f},{b:.3f},{a + 0.6:.3f},{b:.3f},0.11" for t, a, b in zip(time, x, y)]
         (places.match / f"player{number}.csv").write_text("\n".join(lines) + "\n")
     (places.match / "player1.txt").write_text("0.5 1.5 walking\n2.4 kick right running low inside\n")
+    plant_markers()
+    for name in ("walk", "static"):
+        shutil.copy(MARKERS / f"{name}.trc", places.match)
     picture = bpy.data.images.new("Picture", 16, 9)
     picture.filepath_raw, picture.file_format = str(places.match / PICTURE), "PNG"
     picture.save()
     return places
+
+
+def plant_markers():
+    """walk.trc and static.trc below MARKERS: markers on a made walk of half a second, and on the same body standing."""
+    if (MARKERS / "static.trc").exists():
+        return
+    core = f"{EXTENSION}.beyond_mocap"
+    gait = importlib.import_module(f"{core}.motion.gait").gait(1.4, 0.6, fps=100.0)
+    known = importlib.import_module(f"{core}.markers.planted").planted(
+        gait, "plug_in_gait", seed=3, occlusion=0.02, swaps=0, jumps=0, unlabeled=1
+    )
+    write = importlib.import_module(f"{core}.files.trc_write").write_trc
+    write(known.trial, MARKERS / "walk.trc")
+    write(known.static.frames(0, 40), MARKERS / "static.trc")
 
 
 # How far a user has come; each begins where the one before it ends.
