@@ -100,7 +100,9 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
     fps: FloatProperty(name="Rate", description="Samples a second")
     start: FloatProperty(name="Start", description="Seconds on the recording's clock at the first sample")
     subject: StringProperty(name="Subject", description="Who was recorded")
-    file: StringProperty(name="File", subtype="FILE_PATH", description="The recording's file")
+    file: StringProperty(
+        name="File", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, description="The recording's file"
+    )
     set_name: StringProperty(name="Marker Set", description="The marker set that the labels belong to")
     static: PointerProperty(
         name="Static Trial", type=bpy.types.Object, poll=a_cloud,

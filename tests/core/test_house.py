@@ -50,7 +50,8 @@ EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
     "panels": ["panels", "scene.settings", "scene.preferences", "scene.ride.settings", "scene.ride.figure_lines",
-               "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings"],
+               "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings",
+               "scene.markers.settings"],
 }
 
 
