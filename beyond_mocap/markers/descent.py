@@ -1,0 +1,191 @@
+"""From a pose near by to the one whose markers lie nearest to the seen ones: many frames at once, each by itself.
+
+Levenberg and Marquardt's method on the weighted squares of eq. 5.1 (Fredriksson §5.3.2), with the exact derivative of
+all markers (`chain`), steps solved from the tips to the root (`elimination`) and limits held exactly (`limits`). The
+paper gave the sum to a general solver (SLSQP, §5.3.4), which needed seconds a frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from . import elimination, limits
+from .chain import Chain, Placed, Poses, axes, logarithm, moved, multiply, place
+
+MOST_STEPS = 40
+_STILL = 1e-5  # radians (and metres): a frame whose step is smaller has arrived
+_NO_GAIN = 1e-7  # as has one whose cost falls by a smaller part
+_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-9, 1e3  # m2
+_BACK = np.array([1.0, -1.0, -1.0, -1.0])[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldPoint:
+    """A point of a joint's body that stands at a given distance from a seen point: a ball's centre in the hand, from a
+    marker on the ball.
+
+    joint: which body. place: (3,) m in its frame. radius: m. seen: (3, F) m. weight: (F,), 0 where it does not count.
+    """
+
+    joint: int
+    place: np.ndarray
+    radius: float
+    seen: np.ndarray
+    weight: np.ndarray
+
+    def frames(self, chosen) -> "HeldPoint":
+        """These frames only."""
+        return replace(self, seen=self.seen[:, chosen], weight=self.weight[chosen])
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What F poses are to come near to.
+
+    seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. lean: poses to be drawn to instead of the rest pose, or
+    None. point: a held point, or None. drawn: (J, 3) m per radian, how strongly (in place of the chain's stiffness).
+    """
+
+    chain: Chain
+    seen: np.ndarray
+    weights: np.ndarray
+    drawn: np.ndarray
+    lean: Poses | None = None
+    point: HeldPoint | None = None
+
+    def frames(self, chosen) -> "Task":
+        """These frames only."""
+        return replace(
+            self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
+            lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Arrived:
+    """Poses; cost: (F,) m2, half the weighted squares; steps: (F,) how many were taken; held: (J, F) whether a joint stands
+    at a limit against the markers."""
+
+    poses: Poses
+    cost: np.ndarray
+    steps: np.ndarray
+    held: np.ndarray
+
+
+@dataclass(eq=False)
+class _State:
+    """Poses with what follows from them, kept while they are the best known."""
+
+    poses: Poses
+    placed: Placed
+    away: np.ndarray
+    bend: np.ndarray
+    cost: np.ndarray
+
+    def take(self, other: "_State", where: np.ndarray) -> None:
+        """Take the other's frames where (F,) is true, in place."""
+        for mine, its in zip(self._arrays(), other._arrays()):
+            np.copyto(mine, its, where=where)
+
+    def frames(self, chosen) -> "_State":
+        """These frames only."""
+        at = self.poses.frames(chosen)
+        placed = Placed(at.root, *(a[..., chosen] for a in (self.placed.world, self.placed.joints, self.placed.markers)))
+        return _State(at, placed, self.away[..., chosen], self.bend[..., chosen], self.cost[chosen])
+
+    def _arrays(self):
+        at, put = self.poses, self.placed
+        return at.root, at.local, at.angles, put.world, put.joints, put.markers, self.away, self.bend, self.cost
+
+
+def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
+    """The poses nearest to the seen markers that lie downhill of `start`."""
+    total = start.root.shape[-1]
+    stops = limits.limited(task.chain)
+    best = _state(task, limits.held_back(task.chain, stops, start))
+    out = Arrived(best.poses.copy(), best.cost.copy(), np.zeros(total, int), np.zeros((len(task.chain.skeleton), total), bool))
+    live, done = np.arange(total), np.zeros(total, dtype=bool)
+    damping = np.full(total, _FIRST_DAMPING)
+    for _ in range(most_steps):
+        size, held, trial = _step(task, best, stops, damping)
+        better = trial.cost <= best.cost * (1.0 + 1e-12) + 1e-18
+        gain = best.cost - trial.cost
+        done |= better & ((size < _STILL) | (gain <= _NO_GAIN * best.cost)) | (damping > _MOST_DAMPING)
+        best.take(trial, better)
+        damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), np.maximum(10.0 * damping, 1e-5))
+        out.steps[live] += 1
+        if done.any() and (done.all() or done.mean() > 0.2):
+            _write(out, live[done], best.frames(done), held[:, done])
+            if done.all():
+                return out
+            task, best = task.frames(~done), best.frames(~done)
+            live, damping, held, done = live[~done], damping[~done], held[:, ~done], done[~done]
+    _write(out, live, best, held)
+    return out
+
+
+def _write(out: Arrived, frames: np.ndarray, state: _State, held: np.ndarray) -> None:
+    """Put finished frames into the result."""
+    out.poses.put(frames, state.poses)
+    out.cost[frames], out.held[:, frames] = state.cost, held
+
+
+def _state(task: Task, at: Poses) -> _State:
+    """Poses and what follows from them."""
+    placed = place(task.chain, at)
+    away = placed.markers + (at.root - task.seen)
+    bend = _bend(task, at)
+    cost = np.einsum("mf,maf,maf->f", task.weights, away, away)
+    cost += np.einsum("ja,jaf,jaf->f", task.drawn**2, bend, bend)
+    if task.point:
+        cost += task.point.weight * _distance(task.point, placed)[2] ** 2
+    return _State(at, placed, away, bend, 0.5 * cost)
+
+
+def _bend(task: Task, at: Poses) -> np.ndarray:
+    """How far (J, 3, F) rad each joint is turned from where it is drawn to: as a rotation vector, a hinge as angles."""
+    if task.lean is None:
+        bend = logarithm(at.local)
+    else:
+        bend = logarithm(multiply(at.local, task.lean.local * _BACK))
+    for joint in task.chain.hinges:
+        bend[joint] = at.angles[joint] - (0.0 if task.lean is None else task.lean.angles[joint])
+    return bend
+
+
+def _distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the held point is (3, F), the unit direction (3, F) from the seen point to it, how much too far it is (F,)."""
+    x = placed.joints[point.joint] + np.einsum("abf,b->af", placed.world[point.joint], point.place)
+    gap = x + placed.origin - point.seen
+    length = np.sqrt(np.einsum("af,af->f", gap, gap))
+    return x, gap / np.maximum(length, 1e-9), length - point.radius
+
+
+def _step(task: Task, best: _State, stops: list[int], damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, _State]:
+    """One damped step: its size (F,), what limits held still (J, F), and the state it leads to."""
+    about = axes(task.chain, best.poses, best.placed)
+    asked = elimination.bodies(task.chain, best.placed, best.away, task.weights)
+    if task.point:
+        x, along, far = _distance(task.point, best.placed)
+        elimination.add_distance(asked, task.point.joint, x, along, task.point.weight, far)
+    own = _drawn(task, best.bend)
+    slope = elimination.gradient(task.chain, best.placed, about, asked, own)
+    held = limits.hold(task.chain, stops, best.poses, slope, own.curvature)
+    shift, turns = elimination.step(task.chain, best.placed, about, asked, own, damping)
+    size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
+    further = moved(task.chain, best.poses, shift, turns)
+    return size, held, _state(task, limits.held_back(task.chain, stops, further))
+
+
+def _drawn(task: Task, bend: np.ndarray) -> elimination.Own:
+    """What the pull to the rest pose asks of each joint's turns.
+
+    The derivative of half the squared length of a rotation vector by a small turn is the vector itself.
+    """
+    strength = task.drawn**2
+    curvature = np.zeros((len(bend), 3, 3, bend.shape[-1]))
+    for axis in range(3):
+        curvature[:, axis, axis] = strength[:, axis, None]
+    return elimination.Own(curvature, strength[..., None] * bend)

@@ -1,0 +1,140 @@
+"""One Gauss-Newton step of a whole chain, from the tips to the root, without the big matrix.
+
+The markers of a body enter its equations only as a rigid body would: a turn w and a shift v of all space move a marker
+at x by w x x + v, so that what they ask of (w, v) is one 6x6 matrix and one vector, as the inertia and force of a body.
+A joint passes on to its parent what is left when its own turns are free to follow: the elimination of Featherstone's
+articulated bodies (Rigid Body Dynamics Algorithms, 2008, ch. 7), here with the second derivative of squared distances in
+the place of masses. The cost grows with the number of joints, not with its cube, and every operation is one on long
+runs of frames.
+
+"About the origin" is about each frame's own origin (`Placed.origin`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .chain import Chain, Placed, cross
+
+
+class Bodies(NamedTuple):
+    """What is asked of each joint's body. curvature: (J, 6, 6, F), pull: (J, 6, F), of turn and shift about the origin:
+    second and first derivative of half the weighted squared distances."""
+
+    curvature: np.ndarray
+    pull: np.ndarray
+
+
+class Own(NamedTuple):
+    """What is asked of each joint's own turns about its axes. curvature: (J, 3, 3, F), pull: (J, 3, F)."""
+
+    curvature: np.ndarray
+    pull: np.ndarray
+
+
+def bodies(chain: Chain, placed: Placed, away: np.ndarray, weights: np.ndarray) -> Bodies:
+    """What the markers ask: they lie `away` (M, 3, F) m from where they were seen and count (M, F), 0 where unseen."""
+    count, frames = len(chain.skeleton), weights.shape[-1]
+    curvature, pull = np.zeros((count, 6, 6, frames)), np.zeros((count, 6, frames))
+    for joint, own in chain.clusters:
+        _add_points(curvature[joint], pull[joint], placed.markers[own], weights[own], away[own])
+    return Bodies(curvature, pull)
+
+
+def _add_points(curvature, pull, x, w, r) -> None:
+    """Add points x (N, 3, F) of weights (N, F), each r (N, 3, F) away from where it should be."""
+    wx, wr = w[:, None] * x, w[:, None] * r
+    mass, first, force = w.sum(axis=0), wx.sum(axis=0), wr.sum(axis=0)
+    second = np.einsum("naf,nbf->abf", wx, x)
+    square = second[0, 0] + second[1, 1] + second[2, 2]
+    curvature[:3, :3] -= second
+    for axis in range(3):
+        curvature[axis, axis] += square
+        curvature[3 + axis, 3 + axis] += mass
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        # the matrix of the cross product with the weighted sum of places
+        curvature[a, 3 + b] -= first[c]
+        curvature[b, 3 + a] += first[c]
+        curvature[3 + b, a] -= first[c]
+        curvature[3 + a, b] += first[c]
+    pull[:3] += cross(np.moveaxis(x, 1, 0), np.moveaxis(wr, 1, 0)).sum(axis=1)
+    pull[3:] += force
+
+
+def add_distance(asked: Bodies, joint: int, x: np.ndarray, along: np.ndarray, weight: np.ndarray, away: np.ndarray):
+    """Add to what is asked, in place: a point x (3, F) of a joint's body is `away` (F,) m too far along unit directions
+    (3, F), of weight (F,)."""
+    lever = np.concatenate([cross(x, along), along])
+    asked.curvature[joint] += np.einsum("af,bf,f->abf", lever, lever, weight)
+    asked.pull[joint] += lever * (weight * away)
+
+
+def gradient(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own) -> np.ndarray:
+    """The derivative (J, 3, F) of half the cost by each joint's turns."""
+    total = asked.pull.copy()
+    for joint in range(len(chain.skeleton) - 1, 0, -1):
+        total[chain.skeleton.parents[joint]] += total[joint]
+    # a turn about axis a through p: a on the moment, p x a on the force
+    moment = total[:, :3] - np.moveaxis(cross(np.moveaxis(placed.joints, 1, 0), np.moveaxis(total[:, 3:], 1, 0)), 0, 1)
+    return own.pull + np.einsum("jacf,jaf->jcf", axes, moment)
+
+
+def step(
+    chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own, damping: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The damped step: the root's shift (3, F) m and all joints' turns (J, 3, F) rad about their axes (J, 3, 3, F).
+
+    damping: (F,) >= 0, added to the curvature of every turn (and of the root's shift). `asked` is used up.
+    """
+    parents = chain.skeleton.parents
+    passed, rest = {}, {}
+    for joint in range(len(parents) - 1, 0, -1):
+        lever = np.concatenate([axes[joint], cross(placed.joints[joint][:, None], axes[joint])])
+        share = np.einsum("abf,bcf->acf", asked.curvature[joint], lever)
+        inner = np.einsum("abf,acf->bcf", lever, share) + own.curvature[joint]
+        _add_diagonal(inner, damping, chain.free[joint])
+        right = own.pull[joint] + np.einsum("abf,af->bf", lever, asked.pull[joint])
+        inverse = inverse_of(inner)
+        passed[joint] = np.einsum("acf,cbf->abf", share, inverse)
+        rest[joint] = np.einsum("abf,bf->af", inverse, right)
+        asked.curvature[parents[joint]] += asked.curvature[joint] - np.einsum("acf,bcf->abf", passed[joint], share)
+        asked.pull[parents[joint]] += asked.pull[joint] - np.einsum("acf,cf->af", passed[joint], right)
+        rest[joint] = (rest[joint], lever)
+    motions = {0: _root_step(chain, asked, own, damping)}
+    turns = np.empty((len(parents), 3, damping.shape[-1]))
+    turns[0] = motions[0][:3]
+    for joint in range(1, len(parents)):
+        alone, lever = rest[joint]
+        above = motions[parents[joint]]
+        turns[joint] = -alone - np.einsum("abf,af->bf", passed[joint], above)
+        motions[joint] = above + np.einsum("abf,bf->af", lever, turns[joint])
+    return motions[0][3:], turns
+
+
+def _add_diagonal(inner: np.ndarray, damping: np.ndarray, free: np.ndarray) -> None:
+    """Damp (3, 3, F) in place; an axis that is not free gets 1, which makes its (zero) equation solvable."""
+    for axis in range(3):
+        inner[axis, axis] += damping if free[axis] else 1.0
+
+
+def _root_step(chain: Chain, asked: Bodies, own: Own, damping: np.ndarray) -> np.ndarray:
+    """Turn and shift (6, F) of the root."""
+    curvature, pull = asked.curvature[0], asked.pull[0]
+    curvature[:3, :3] += own.curvature[0]
+    pull[:3] += own.pull[0]
+    for axis in range(6):
+        curvature[axis, axis] += damping
+    return -np.linalg.solve(np.moveaxis(curvature, -1, 0), pull.T[..., None])[..., 0].T
+
+
+def inverse_of(m: np.ndarray) -> np.ndarray:
+    """Inverses of symmetric positive matrices (3, 3, F)."""
+    out = np.empty_like(m)
+    a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
+    out[0, 0], out[1, 1], out[2, 2] = d * f - e * e, a * f - c * c, a * d - b * b
+    out[0, 1] = out[1, 0] = c * e - b * f
+    out[0, 2] = out[2, 0] = b * e - c * d
+    out[1, 2] = out[2, 1] = b * c - a * e
+    return out / (a * out[0, 0] + b * out[0, 1] + c * out[0, 2])

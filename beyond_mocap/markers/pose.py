@@ -1,0 +1,253 @@
+"""The pose in every frame: the whole chain laid through all markers at once (Fredriksson §3.5.1, §5.3).
+
+Every frame is solved from the solution beside it (§5.3.3): some frames first, from their own markers and again from
+their solved neighbours, whichever comes out nearer; then those between, from both.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import Cancelled, InputError
+from ..motion import quaternion
+from ..motion.motion import Motion
+from . import weights as marker_weights
+from .chain import Chain, Poses, chain, place, poses
+from .descent import HeldPoint, Task, descend
+from .frames import placed as carried
+from .frames import rigid_fit
+from .start import first_poses
+
+_CHUNK = 512
+_COARSE_SECONDS = 1.0 / 60.0
+_ENOUGH = 0.3  # part of the markers that a frame must show to be solved
+_FEWEST = 4
+_DEAR, _FAR = 1.5, np.radians(40.0)  # a start is doubted that costs so many times its neighbour, or turns a joint so far
+_LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
+
+
+@dataclass(frozen=True)
+class HeldBall:
+    """A ball in the hand: its centre stands still in the hand, and a seen marker lies on its surface.
+
+    joint: the hand's name. centre: (3,) m in its frame. radius: m. seen: (T, 3) m, the marker, NaN where not seen.
+    held: (T,) bool. weight: what it counts beside a body's marker.
+    """
+
+    joint: str
+    centre: np.ndarray
+    radius: float
+    seen: np.ndarray
+    held: np.ndarray
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class PoseSettings:
+    """weights: count deformed clusters' markers less (eq. 5.2). limits: keep joints within them. smoothness: seconds; 0:
+    each frame by itself. ball: a held ball that takes part."""
+
+    weights: bool = True
+    limits: bool = True
+    smoothness: float = 0.0
+    ball: HeldBall | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What came out, for T frames of the model's M markers and J joints.
+
+    motion: the skeleton moving. residual: (T, M) m between the model's marker and the seen one, NaN where not seen.
+    weights: (T, M). single: (T, M) m, the same when each segment is laid through its own markers alone, NaN where it
+    has fewer than three. iterations: (T,) steps taken, 0 where a frame was not solved. at_limit: (T, J) bool. seconds:
+    the time it took. notes: lines for people.
+    """
+
+    motion: Motion
+    residual: np.ndarray
+    weights: np.ndarray
+    single: np.ndarray
+    iterations: np.ndarray
+    at_limit: np.ndarray
+    seconds: float
+    notes: tuple[str, ...] = ()
+
+
+def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, cancelled=None) -> Solved:
+    """The model's motion through a trial's markers.
+
+    model: a `MarkerModel`; trial: a `MarkerTrial` with its labels. progress(fraction, text) and cancelled() as
+    everywhere. InputError where the trial has hardly any of the model's markers.
+    """
+    began = time.perf_counter()
+    seen = _positions(model, trial)
+    solving = _Solving(_chain(model, settings.limits), seen, settings, trial.fps, _usual(model), progress, cancelled)
+    solving.run()
+    return solving.result(time.perf_counter() - began)
+
+
+def _chain(model, limited: bool) -> Chain:
+    """The chain of a model."""
+    freedom = model.freedom
+    made = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free, freedom.low, freedom.high,
+                 model.stiffness)
+    return made if limited else made.without_limits()
+
+
+def _usual(model) -> np.ndarray | None:
+    """sigma_s of every marker where the model knows it."""
+    known = getattr(model, "edge_sigma", None)
+    return None if known is None or np.shape(known) != np.shape(model.joint) else np.asarray(known, dtype=float)
+
+
+def _positions(model, trial) -> np.ndarray:
+    """The model's markers as seen: (T, M, 3) m, NaN where the trial does not have them."""
+    at = {label: index for index, label in enumerate(trial.labels)}
+    out = np.full((len(trial.positions), len(model.markers), 3), np.nan)
+    known = [(own, at[label]) for own, label in enumerate(model.markers) if label in at]
+    seen = sum(bool(np.isfinite(trial.positions[:, theirs]).any()) for _, theirs in known)
+    if seen < _FEWEST:
+        raise InputError(
+            trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
+            "choose the model or marker set of this recording",
+        )
+    for own, theirs in known:
+        out[:, own] = trial.positions[:, theirs]
+    return out
+
+
+class _Solving:
+    """One run: the arrays (frames last) and what is known so far."""
+
+    def __init__(self, chain, seen, settings, fps, usual, progress, cancelled):
+        self.chain, self.settings, self.fps = chain, settings, fps
+        self.positions = seen
+        self.there = np.isfinite(seen).all(axis=-1)
+        self.weights = self._weights(usual)
+        self.seen = np.ascontiguousarray(np.where(self.there[..., None], seen, 0.0).transpose(1, 2, 0))
+        self.progress, self.cancelled = progress or (lambda part, text: None), cancelled or (lambda: False)
+        count = len(chain.skeleton)
+        self.poses = Poses(np.zeros((3, len(seen))), np.zeros((count, 4, len(seen))), np.zeros((count, 3, len(seen))))
+        self.poses.local[:, 0] = 1.0
+        self.cost, self.steps = np.full(len(seen), np.inf), np.zeros(len(seen), dtype=int)
+        self.held = np.zeros((count, len(seen)), dtype=bool)
+        self.drawn = np.maximum(chain.stiffness, _LEAST_STIFFNESS)
+        self.drawn[0] = 0.0
+        self.notes: list[str] = []
+        self.work_done, self.work = 0, 1
+
+    def _weights(self, usual) -> np.ndarray:
+        if not self.settings.weights:
+            return self.there.astype(float)
+        return marker_weights.weights(self.chain.joint, self.chain.places, self.positions, usual)
+
+    def run(self) -> None:
+        """Solve the frames that show enough, fill in the others."""
+        ever = self.there.any(axis=0).sum()
+        known = np.flatnonzero(self.there.sum(axis=1) >= max(_FEWEST, int(np.ceil(_ENOUGH * ever))))
+        if not len(known):
+            raise InputError("trial", "no frame shows enough markers", f"{_ENOUGH:.0%} of {ever}", "clean it first")
+        spacing = max(1, int(round(self.fps * _COARSE_SECONDS)))
+        coarse = np.unique(np.append(known[::spacing], known[-1]))
+        self.work = len(known)
+        self._solve(coarse, self._first(coarse))
+        for source, frames in ((coarse[:-1], coarse[1:]), (coarse[1:], coarse[:-1])):
+            doubtful = self._doubtful(frames, source)
+            self._better_from(source[doubtful], frames[doubtful])
+        between = np.setdiff1d(known, coarse)
+        if len(between):
+            self._solve(between, self._interpolated(between, coarse))
+        self._fill(known)
+
+    def _task(self, frames: np.ndarray, lean: Poses | None = None) -> Task:
+        """What these frames are to come near to."""
+        point, ball = None, self.settings.ball
+        if ball is not None:
+            there = np.isfinite(ball.seen).all(axis=-1) & ball.held
+            point = HeldPoint(self.chain.skeleton.index(ball.joint), np.asarray(ball.centre, dtype=float), ball.radius,
+                              np.where(there[:, None], ball.seen, 0.0)[frames].T, ball.weight * there[frames])
+        return Task(self.chain, self.seen[..., frames], self.weights[frames].T, self.drawn, lean, point)
+
+    def _chunks(self, frames: np.ndarray):
+        """Slices of a list of frames, with a look at the clock between."""
+        for first in range(0, len(frames), _CHUNK):
+            if self.cancelled():
+                raise Cancelled("reconstruction cancelled")
+            self.progress(min(self.work_done / self.work, 1.0), "solving poses")
+            yield slice(first, first + _CHUNK)
+            self.work_done += min(_CHUNK, len(frames) - first)
+
+    def _first(self, frames: np.ndarray) -> Poses:
+        """Poses from each frame's own markers."""
+        return first_poses(self.chain, self.seen[..., frames], self.weights[frames].T)
+
+    def _solve(self, frames: np.ndarray, start: Poses) -> None:
+        """Solve these frames from there, and keep what comes out."""
+        for part in self._chunks(frames):
+            self._keep(frames[part], descend(self._task(frames[part]), start.frames(part)))
+
+    def _keep(self, frames: np.ndarray, arrived) -> None:
+        self.poses.put(frames, arrived.poses)
+        self.cost[frames], self.steps[frames] = arrived.cost, arrived.steps
+        self.held[:, frames] = arrived.held
+
+    def _doubtful(self, frames: np.ndarray, source: np.ndarray) -> np.ndarray:
+        """Which frames may have come out in another valley than those beside them: dearer, or far turned."""
+        turned = np.abs(np.einsum("jaf,jaf->jf", self.poses.local[..., frames], self.poses.local[..., source]))
+        dear = self.cost[frames] > _DEAR * self.cost[source] + 1e-6
+        return np.flatnonzero(dear | np.any(turned < np.cos(0.5 * _FAR), axis=0))
+
+    def _better_from(self, source: np.ndarray, frames: np.ndarray) -> None:
+        """Solve frames again from other frames' solutions, and keep what comes out clearly nearer."""
+        for part in self._chunks(frames):
+            arrived = descend(self._task(frames[part]), self.poses.frames(source[part]))
+            better = arrived.cost < 0.999 * self.cost[frames[part]] - 1e-9
+            if better.any():
+                chosen = frames[part][better]
+                self.poses.put(chosen, arrived.poses.frames(better))
+                self.cost[chosen], self.held[:, chosen] = arrived.cost[better], arrived.held[:, better]
+            self.steps[frames[part]] += arrived.steps
+
+    def _interpolated(self, frames: np.ndarray, known: np.ndarray) -> Poses:
+        """Poses between the known frames; before the first and after the last, theirs."""
+        after = np.clip(np.searchsorted(known, frames), 1, max(len(known) - 1, 1)) if len(known) > 1 else np.zeros(len(frames), int)
+        before = np.maximum(after - 1, 0)
+        low, high = known[before], known[after]
+        part = np.clip((frames - low) / np.maximum(high - low, 1), 0.0, 1.0)
+        a, b = self.poses.frames(low), self.poses.frames(high)
+        local = quaternion.slerp(np.moveaxis(a.local, 1, -1), np.moveaxis(b.local, 1, -1), part)
+        root = a.root + part * (b.root - a.root)
+        return poses(self.chain, root.T, np.moveaxis(local, 1, 0))
+
+    def _fill(self, known: np.ndarray) -> None:
+        """Frames with hardly any markers lie between those beside them."""
+        blind = np.setdiff1d(np.arange(len(self.cost)), known)
+        if len(blind):
+            self.poses.put(blind, self._interpolated(blind, known))
+            self.notes.append(f"{len(blind)} of {len(self.cost)} frames show too few markers and are interpolated")
+
+    def result(self, seconds: float) -> Solved:
+        """What came out."""
+        motion = Motion(self.chain.skeleton, self.poses.root.T, np.moveaxis(self.poses.local, -1, 0), self.fps)
+        put = place(self.chain, self.poses)
+        away = (put.markers + put.origin).transpose(2, 0, 1) - self.positions
+        residual = np.sqrt(np.sum(away**2, axis=-1))
+        return Solved(motion, residual, self.weights, single_residual(self.chain, self.positions), self.steps,
+                      self.held.T.copy(), seconds, tuple(self.notes))
+
+
+def single_residual(chain: Chain, seen: np.ndarray) -> np.ndarray:
+    """Residuals (T, M) m when every segment is laid through its own markers alone (§3.4.2); NaN where it has fewer than
+    three seen. seen: (T, M, 3) m."""
+    out = np.full(seen.shape[:2], np.nan)
+    for joint in np.unique(chain.joint):
+        own = np.flatnonzero(chain.joint == joint)
+        enough = np.isfinite(seen[:, own]).all(axis=-1).sum(axis=1) > 2
+        if enough.any():
+            fit = rigid_fit(chain.places[own], seen[np.ix_(enough, own)])
+            away = carried(fit, chain.places[own]) - seen[np.ix_(enough, own)]
+            out[np.ix_(enough, own)] = np.sqrt(np.sum(away**2, axis=-1))
+    return out
