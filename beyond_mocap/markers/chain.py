@@ -34,8 +34,8 @@ class Chain:
     """J joints, M markers on them, and what each joint may do.
 
     joint: (M,) which joint carries the marker. places: (M, 3) m in its frame. order: J orders of intrinsic angles,
-    permutations of XYZ. free: (J, 3) bool by place in the order; an angle that is not free stays 0 (or the limit next
-    to it). low, high: (J, 3) rad, -inf and inf where there is no limit. stiffness: (J, 3) m per radian, how strongly a
+    permutations of XYZ. free: (J, 3) bool by place in the order; an angle that is not free stays 0. low, high: (J, 3) rad,
+    -inf and inf where there is no limit, 0 where not free. stiffness: (J, 3) m per radian, how strongly a
     joint is drawn to its rest pose: a radian away counts as much as a marker so many metres off.
     """
 
@@ -65,7 +65,7 @@ class Chain:
 
     def without_limits(self) -> "Chain":
         """The same chain with joints that turn as far as they like."""
-        return replace(self, low=np.full_like(self.low, -np.inf), high=np.full_like(self.high, np.inf))
+        return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))
 
     def with_markers(self, chosen: np.ndarray) -> "Chain":
         """The same chain with these markers (indices or a mask) only."""
@@ -84,12 +84,11 @@ def chain(
     order = ("XYZ",) * count if order is None else tuple(order)
     if len(order) != count or any(sorted(one) != ["X", "Y", "Z"] for one in order):
         raise InputError("marker model", f"axis orders {order}", f"{count} permutations of XYZ")
+    free = np.broadcast_to(True if free is None else np.asarray(free, dtype=bool), (count, 3))
     stiff = np.zeros(count) if stiffness is None else np.asarray(stiffness, dtype=float)
     return Chain(
-        skeleton, joint, places, order,
-        np.broadcast_to(True if free is None else np.asarray(free, dtype=bool), (count, 3)),
-        np.broadcast_to(-np.inf if low is None else np.asarray(low, dtype=float), (count, 3)),
-        np.broadcast_to(np.inf if high is None else np.asarray(high, dtype=float), (count, 3)),
+        skeleton, joint, places, order, free,
+        np.where(free, -np.inf if low is None else low, 0.0), np.where(free, np.inf if high is None else high, 0.0),
         np.broadcast_to(stiff[:, None] if stiff.ndim == 1 else stiff, (count, 3)),
     )
 
@@ -133,16 +132,36 @@ def poses(chain: Chain, root: np.ndarray, local: np.ndarray) -> Poses:
     rotations = np.ascontiguousarray(np.moveaxis(quaternion.normalized(local), 0, -1))
     angles = np.zeros((len(chain.skeleton), 3, len(root)))
     for joint in chain.hinges:
-        found = quaternion.to_euler(rotations[joint].T, chain.order[joint]).T
-        angles[joint] = kept_angles(chain, joint, found)
+        angles[joint] = within(chain, joint, angles_of(chain, joint, rotations[joint]))
         rotations[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T
     return Poses(np.ascontiguousarray(np.asarray(root, dtype=float).T), rotations, angles)
 
 
-def kept_angles(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
-    """A hinge's angles (3, F) rad without those that are not free, within its limits."""
-    free = np.where(chain.free[joint][:, None], angles, 0.0)
-    return np.clip(free, chain.low[joint][:, None], chain.high[joint][:, None])
+def within(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
+    """A joint's angles (3, F) rad brought within its limits."""
+    return np.clip(angles, chain.low[joint][:, None], chain.high[joint][:, None])
+
+
+def angles_of(chain: Chain, joint: int, local: np.ndarray) -> np.ndarray:
+    """Angles (3, F) rad of a joint's rotations (4, F): of both triples the one within the limits, or nearer to them."""
+    one = quaternion.to_euler(local.T, chain.order[joint]).T
+    other = np.stack([one[0] + np.pi, np.pi - one[1], one[2] + np.pi])
+    one, other = (_near_the_middle(chain, joint, angles) for angles in (one, other))
+    better = _offence(chain, joint, other) < _offence(chain, joint, one) - 1e-9
+    return np.where(better, other, one)
+
+
+def _near_the_middle(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
+    """Angles without the full turns that separate them from the middle of their limits."""
+    low, high = chain.low[joint], chain.high[joint]
+    bound = np.isfinite(low) & np.isfinite(high)
+    middle = np.where(bound, 0.5 * (np.where(bound, low, 0.0) + np.where(bound, high, 0.0)), 0.0)[:, None]
+    return middle + quaternion.wrapped(angles - middle)
+
+
+def _offence(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
+    """By how many radians (F,) angles (3, F) leave the limits, all together."""
+    return np.abs(angles - within(chain, joint, angles)).sum(axis=0)
 
 
 def matrices(q: np.ndarray) -> np.ndarray:
@@ -204,7 +223,7 @@ def moved(chain: Chain, at: Poses, shift: np.ndarray, turns: np.ndarray) -> Pose
     local = multiply(exponential(turns), at.local)
     angles = at.angles.copy()
     for joint in chain.hinges:
-        angles[joint] = kept_angles(chain, joint, at.angles[joint] + turns[joint])
+        angles[joint] = within(chain, joint, at.angles[joint] + turns[joint])
         local[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T
     return Poses(at.root + shift, local, angles)
 

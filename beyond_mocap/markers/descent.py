@@ -17,6 +17,7 @@ from .chain import Chain, Placed, Poses, axes, logarithm, moved, multiply, place
 MOST_STEPS = 40
 _STILL = 1e-5  # radians (and metres): a frame whose step is smaller has arrived
 _NO_GAIN = 1e-7  # as has one whose cost falls by a smaller part
+_TRUSTED = 1e-3  # m2: with more damping a small step says nothing
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-9, 1e3  # m2
 _BACK = np.array([1.0, -1.0, -1.0, -1.0])[:, None]
 
@@ -104,7 +105,7 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
     """The poses nearest to the seen markers that lie downhill of `start`."""
     total = start.root.shape[-1]
     stops = limits.limited(task.chain)
-    best = _state(task, limits.held_back(task.chain, stops, start))
+    best = _state(task, limits.held_back(task.chain, stops, start)[0])
     out = Arrived(best.poses.copy(), best.cost.copy(), np.zeros(total, int), np.zeros((len(task.chain.skeleton), total), bool))
     live, done = np.arange(total), np.zeros(total, dtype=bool)
     damping = np.full(total, _FIRST_DAMPING)
@@ -112,7 +113,8 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
         size, held, trial = _step(task, best, stops, damping)
         better = trial.cost <= best.cost * (1.0 + 1e-12) + 1e-18
         gain = best.cost - trial.cost
-        done |= better & ((size < _STILL) | (gain <= _NO_GAIN * best.cost)) | (damping > _MOST_DAMPING)
+        arrived = (size < _STILL) | (gain <= _NO_GAIN * best.cost)
+        done |= better & arrived & (damping < _TRUSTED) | (damping > _MOST_DAMPING)
         best.take(trial, better)
         damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), np.maximum(10.0 * damping, 1e-5))
         out.steps[live] += 1
@@ -163,8 +165,25 @@ def _distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray,
     return x, gap / np.maximum(length, 1e-9), length - point.radius
 
 
-def _step(task: Task, best: _State, stops: list[int], damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, _State]:
+def _step(task: Task, best: _State, stops: dict, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, _State]:
     """One damped step: its size (F,), what limits held still (J, F), and the state it leads to."""
+    shift, turns, held = _solved(task, best, stops, damping)
+    further = moved(task.chain, best.poses, shift, turns)
+    further, ahead = limits.held_back(task.chain, stops, further)
+    for joint in task.chain.hinges:
+        ahead[joint] = best.poses.angles[joint] + turns[joint]
+    over = np.flatnonzero(np.any((ahead > task.chain.high[..., None]) | (ahead < task.chain.low[..., None]), axis=(0, 1)))
+    if len(over):
+        part = best.frames(over)
+        again = _solved(task.frames(over), part, stops, damping[over], ahead[..., over])
+        shift[:, over], turns[..., over], held[:, over] = again
+        further.put(over, limits.held_back(task.chain, stops, moved(task.chain, part.poses, *again[:2]))[0])
+    size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
+    return size, held, _state(task, further)
+
+
+def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, ahead: np.ndarray | None = None):
+    """The root's shift (3, F), all turns (J, 3, F), and what limits held still (J, F); `ahead` as in `limits.hold`."""
     about = axes(task.chain, best.poses, best.placed)
     asked = elimination.bodies(task.chain, best.placed, best.away, task.weights)
     if task.point:
@@ -172,11 +191,8 @@ def _step(task: Task, best: _State, stops: list[int], damping: np.ndarray) -> tu
         elimination.add_distance(asked, task.point.joint, x, along, task.point.weight, far)
     own = _drawn(task, best.bend)
     slope = elimination.gradient(task.chain, best.placed, about, asked, own)
-    held = limits.hold(task.chain, stops, best.poses, slope, own.curvature)
-    shift, turns = elimination.step(task.chain, best.placed, about, asked, own, damping)
-    size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
-    further = moved(task.chain, best.poses, shift, turns)
-    return size, held, _state(task, limits.held_back(task.chain, stops, further))
+    held = limits.hold(task.chain, stops, best.poses, slope, own, ahead)
+    return *elimination.step(task.chain, best.placed, about, asked, own, damping), held
 
 
 def _drawn(task: Task, bend: np.ndarray) -> elimination.Own:

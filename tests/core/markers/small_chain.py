@@ -1,0 +1,33 @@
+"""A small chain for tests: a trunk with two limbs, a hinge and a joint of two angles in them, markers at random."""
+
+import numpy as np
+
+from beyond_mocap.markers.chain import Chain, chain, poses
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.skeleton import Skeleton
+
+SKELETON = Skeleton(
+    ("Hips", "Chest", "LeftArm", "LeftForeArm", "LeftHand", "LeftUpLeg", "LeftLeg"),
+    (-1, 0, 1, 2, 3, 0, 5),
+    [[0, 0, 0], [0, 0, 0.3], [0, 0.2, 0.2], [0, 0.3, 0], [0, 0.25, 0], [0, 0.1, 0], [0, 0, -0.4]],
+)
+HINGE, SADDLE = 3, 6
+
+
+def small_chain(seed=0, per_joint=3, stiffness=0.0, **limits) -> Chain:
+    """The chain; joint 3 turns about one axis, joint 6 about two."""
+    rng = np.random.default_rng(seed)
+    joint = np.repeat(np.arange(len(SKELETON)), per_joint)
+    free = np.ones((len(SKELETON), 3), dtype=bool)
+    free[HINGE, 1:], free[SADDLE, 2] = False, False
+    return chain(
+        SKELETON, joint, rng.normal(0.0, 0.08, (len(joint), 3)), ("XZY", "YXZ", "ZXY", "ZXY", "XYZ", "YXZ", "YXZ"), free,
+        stiffness=np.full(len(SKELETON), stiffness), **limits,
+    )
+
+
+def random_poses(made: Chain, count: int, seed=1, size=0.7):
+    """Poses within the limits, about `size` radians from rest."""
+    rng = np.random.default_rng(seed)
+    turns = quaternion.from_rotation_vector(rng.normal(0.0, size, (count, len(made.skeleton), 3)))
+    return poses(made, rng.normal(0.0, 1.0, (count, 3)), turns)
