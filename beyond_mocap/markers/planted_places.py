@@ -79,7 +79,7 @@ MIDDLE = {
 SIDED = {
     "FHD": _head(95, 62, 95), "BHD": _head(-85, 62, 80), "EAR": _head(5, 80, 50),
     "SHO": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
-    "SH": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
+    "ACR": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4), "SH": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
     "UPA": _arm(0.5, 8, 50), "UPB": _arm(0.35, -38, 22), "ARM": _arm(0.55, -8, 48),
     "ELB": _arm(1.0, 0, 43, 5.0), "MELB": _arm(1.0, 0, -43, 5.0), "ELBM": _arm(1.0, 0, -43, 5.0),
     "FRM": _fore(0.45, 12, 0, 40), "FOREARM": _fore(0.5, 8, 0, 38),
@@ -95,10 +95,11 @@ SIDED = {
     "LMAL": _shank(1.0, 0, 43, 1.5, 0.1), "MMAL": _shank(1.0, 0, -43, 1.5, 0.1),
     "HEE": _foot(None, -52, 0, 24), "HEEL": _foot(None, -52, 0, 24), "MFS": _foot("ToeBase", -62, 6, 42),
     "MFL": _foot("ToeBase", -50, 46, 14), "TOE": _foot("ToeBase", 0, 2, 24), "P1MT": _foot("ToeBase", 4, -38, 12),
-    "P5MT": _foot("ToeBase", -18, 44, 10), "MT5": _foot("ToeBase", -18, 44, 10),
+    "MT1": _foot("ToeBase", 4, -38, 12), "P5MT": _foot("ToeBase", -18, 44, 10), "MT5": _foot("ToeBase", -18, 44, 10),
     "HLX": Place("ToeBase", None, 0.0, (55, -12, 14), 1.5, 0.1),
     "ASI": Place("Hips", None, 0.0, (0, 0, 0), 6.0, 0.4), "PSI": Place("Hips", None, 0.0, (0, 0, 0), 4.0, 0.4),
 }  # fmt: skip
+_ON_BLADE = Place("Shoulder", "Arm", 1.0, (-98, -78, -85), 9.0, 0.4)  # where shoulder blades are tracked apart
 _PIG = (
     "LFHD RFHD LBHD RBHD C7 T10 CLAV STRN RBAK LSHO LUPA LELB LFRM LWRA LWRB LFIN RSHO RUPA RELB RFRM RWRA RWRB RFIN "
     "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE"
@@ -114,6 +115,13 @@ SETS = {
         (
             "C7 RSH LSH MAN T7 LARM LELB LFOREARM LWR RARM RELB RFOREARM RWR RASI LASI SACR P1 P2 P3 "
             + _LEG_OF_SPRINTER.format("L") + " " + _LEG_OF_SPRINTER.format("R")
+        ).split()
+    ),
+    "full": tuple(
+        (
+            "LASI RASI LPSI RPSI LFHD RFHD LBHD RBHD C7 T10 CLAV STRN LACR LBAK RACR RBAK LUPA LELB LMELB RUPA RELB "
+            "RMELB LFRM LWRA LWRB RFRM RWRA RWRB LFIN RFIN LTHI LKNE LMKNE RTHI RKNE RMKNE LTIB LANK LMANK RTIB RANK "
+            "RMANK LHEE LMT1 LMT5 RHEE RMT1 RMT5 LHLX RHLX"
         ).split()
     ),
     "lower_body": tuple(
@@ -143,7 +151,7 @@ def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: floa
     size = adult_share(skeleton)
     rows = []
     for label in labels:
-        found = _place(label)
+        found = _place(label, "LACR" in labels)
         shift = rng.normal(0.0, scatter, 3)
         if found is None or found[1] + found[0].on not in skeleton.names:
             continue
@@ -155,8 +163,10 @@ def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: floa
     )
 
 
-def _place(label: str) -> tuple[Place, str] | None:
-    """Where a label lies, and the side's prefix of its joint."""
+def _place(label: str, blades: bool) -> tuple[Place, str] | None:
+    """Where a label lies, and the side's prefix of its joint. blades: whether shoulder blades are tracked apart."""
+    if blades and label in ("LBAK", "RBAK"):
+        return _ON_BLADE, {"L": "Left", "R": "Right"}[label[0]]
     if label in MIDDLE:
         return MIDDLE[label], ""
     place = SIDED.get(label[1:])
@@ -167,7 +177,7 @@ def _place(label: str) -> tuple[Place, str] | None:
 
 
 def _at(skeleton: Skeleton, label: str, place: Place, side: str, size: float) -> np.ndarray:
-    mirrored = -1.0 if label[0] == "R" and label not in MIDDLE else 1.0
+    mirrored = -1.0 if side == "Right" or (label[0] == "R" and label not in MIDDLE) else 1.0
     offset = np.array(place.offset) * [1.0, mirrored, 1.0] * 1e-3 * size
     if place.on == "Hips":
         return _on_pelvis(skeleton, label) + offset

@@ -1,0 +1,80 @@
+"""Makes the sample's optical recordings: a body that is made, with markers as a laboratory puts them on.
+
+    python sample_blend/make_markers.py [FOLDER]
+
+`static.trc` somebody who stands still, `throw.c3d` the same body and a ball with one marker thrown at 28 m/s,
+`walk.trc` another body walking, without a static trial, with gaps, a swap and an unlabeled stretch. Whatever is found
+in them can be compared with what was made (`beyond_mocap.markers.planted`). The same code gives the same bytes. Needs
+the core and the C3D package."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+if __name__ == "__main__":
+    sys.path.insert(0, str(HERE.parent))
+
+from beyond_mocap.files.trc_write import write_trc  # noqa: E402
+from beyond_mocap.markers.planted import Planted, planted  # noqa: E402
+from beyond_mocap.markers.planted_ball import PlantedBall  # noqa: E402
+from beyond_mocap.markers.trial import MarkerTrial  # noqa: E402
+from beyond_mocap.motion.adult import adult_skeleton  # noqa: E402
+from beyond_mocap.motion.gait import gait  # noqa: E402
+from beyond_mocap.motion.throws import throw  # noqa: E402
+
+SPEED, TARGET = 28.0, (18.0, 0.0, 1.0)
+"""The throw: metres a second, and the place that it hits without air."""
+_THROW_FPS, _WALK_FPS = 240.0, 100.0
+_STATIC_FRAMES = 60
+
+
+def thrown() -> Planted:
+    """The throw, its static trial and the truth of both; the second around the ball's release."""
+    made = throw(TARGET, SPEED, fps=_THROW_FPS)
+    return planted(
+        made.motion, "driveline", seed=11, ball=PlantedBall(made.release, turns=18.0, seen=0.12), occlusion=0.01
+    )
+
+
+def walked() -> Planted:
+    """The walk of somebody smaller, with what goes wrong."""
+    motion = gait(1.4, 1.8, fps=_WALK_FPS, skeleton=adult_skeleton(1.68), seed=4)
+    return planted(motion, "plug_in_gait", seed=12, occlusion=0.03, swaps=1, jumps=2, unlabeled=1)
+
+
+def make(folder: Path = HERE / "markers") -> None:
+    """The recordings in `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    throwing, walking = thrown(), walked()
+    write_trc(throwing.static.frames(0, _STATIC_FRAMES), folder / "static.trc")
+    release = int(throwing.ball.asked.release * _THROW_FPS)
+    write_c3d(throwing.trial.frames(release - 230, release + 110), folder / "throw.c3d")
+    write_trc(walking.trial, folder / "walk.trc")
+
+
+def write_c3d(trial: MarkerTrial, path: Path) -> None:
+    """The trial as a C3D file in millimetres, Z up; markers that are not seen have the residual -1."""
+    import c3d
+
+    writer = c3d.Writer(point_rate=trial.fps, analog_rate=0, point_scale=-1.0)
+    writer.set_point_labels(list(trial.labels))
+    for places in trial.positions:
+        seen = np.isfinite(places).all(axis=1)
+        points = np.zeros((len(places), 5), np.float32)
+        points[:, :3] = np.where(seen[:, None], 1000.0 * places, 0.0)
+        points[:, 3] = np.where(seen, 0.0, -1.0)
+        points[:, 4] = np.where(seen, 0.0, -1.0)
+        writer.add_frames([(points, np.zeros((0, 0)))])
+    writer.set_screen_axis("+X", "+Z")
+    out = io.BytesIO()
+    writer.write(out)
+    path.write_bytes(out.getvalue())
+
+
+if __name__ == "__main__":
+    make(*(Path(argument) for argument in sys.argv[1:2]))
