@@ -15,6 +15,7 @@ from . import elimination, limits
 from .chain import Chain, Placed, Poses, axes, logarithm, moved, multiply, place
 
 MOST_STEPS = 40
+_NEAR = 0.1  # a step that gains a smaller part of the cost is near enough for second derivatives to help
 _STILL = 1e-5  # radians (and metres): a frame whose step is smaller has arrived
 _NO_GAIN = 1e-7  # as has one whose cost falls by a smaller part
 _TRUSTED = 1e-3  # m2: with more damping a small step says nothing
@@ -108,22 +109,25 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
     best = _state(task, limits.held_back(task.chain, stops, start)[0])
     out = Arrived(best.poses.copy(), best.cost.copy(), np.zeros(total, int), np.zeros((len(task.chain.skeleton), total), bool))
     live, done = np.arange(total), np.zeros(total, dtype=bool)
-    damping = np.full(total, _FIRST_DAMPING)
+    damping, curved = np.full(total, _FIRST_DAMPING), np.zeros(total, dtype=bool)
     for _ in range(most_steps):
-        size, held, trial = _step(task, best, stops, damping)
+        size, held, trial = _step(task, best, stops, damping, curved)
         better = trial.cost <= best.cost * (1.0 + 1e-12) + 1e-18
         gain = best.cost - trial.cost
         arrived = (size < _STILL) | (gain <= _NO_GAIN * best.cost)
         done |= better & arrived & (damping < _TRUSTED) | (damping > _MOST_DAMPING)
         best.take(trial, better)
-        damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), np.maximum(10.0 * damping, 1e-5))
+        harder = np.where(curved, damping, np.maximum(10.0 * damping, _FIRST_DAMPING))
+        damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), harder)
+        curved = better & (gain < _NEAR * (best.cost + gain))
         out.steps[live] += 1
         if done.any() and (done.all() or done.mean() > 0.2):
             _write(out, live[done], best.frames(done), held[:, done])
             if done.all():
                 return out
             task, best = task.frames(~done), best.frames(~done)
-            live, damping, held, done = live[~done], damping[~done], held[:, ~done], done[~done]
+            live, damping, held, curved = live[~done], damping[~done], held[:, ~done], curved[~done]
+            done = done[~done]
     _write(out, live, best, held)
     return out
 
@@ -165,9 +169,10 @@ def _distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray,
     return x, gap / np.maximum(length, 1e-9), length - point.radius
 
 
-def _step(task: Task, best: _State, stops: dict, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, _State]:
-    """One damped step: its size (F,), what limits held still (J, F), and the state it leads to."""
-    shift, turns, held = _solved(task, best, stops, damping)
+def _step(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, _State]:
+    """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and the
+    state it leads to."""
+    shift, turns, held = _solved(task, best, stops, damping, curved)
     further = moved(task.chain, best.poses, shift, turns)
     further, ahead = limits.held_back(task.chain, stops, further)
     for joint in task.chain.hinges:
@@ -175,14 +180,14 @@ def _step(task: Task, best: _State, stops: dict, damping: np.ndarray) -> tuple[n
     over = np.flatnonzero(np.any((ahead > task.chain.high[..., None]) | (ahead < task.chain.low[..., None]), axis=(0, 1)))
     if len(over):
         part = best.frames(over)
-        again = _solved(task.frames(over), part, stops, damping[over], ahead[..., over])
+        again = _solved(task.frames(over), part, stops, damping[over], curved[over], ahead[..., over])
         shift[:, over], turns[..., over], held[:, over] = again
         further.put(over, limits.held_back(task.chain, stops, moved(task.chain, part.poses, *again[:2]))[0])
     size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
     return size, held, _state(task, further)
 
 
-def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, ahead: np.ndarray | None = None):
+def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: np.ndarray, ahead=None):
     """The root's shift (3, F), all turns (J, 3, F), and what limits held still (J, F); `ahead` as in `limits.hold`."""
     about = axes(task.chain, best.poses, best.placed)
     asked = elimination.bodies(task.chain, best.placed, best.away, task.weights)
@@ -192,7 +197,10 @@ def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, ahead: n
     own = _drawn(task, best.bend)
     slope = elimination.gradient(task.chain, best.placed, about, asked, own)
     held = limits.hold(task.chain, stops, best.poses, slope, own, ahead)
-    return *elimination.step(task.chain, best.placed, about, asked, own, damping), held
+    bent = None
+    if curved.any():
+        bent = elimination.bends(task.chain, best.placed, about, best.away, task.weights, curved)
+    return *elimination.step(task.chain, best.placed, about, asked, own, damping, bent), held
 
 
 def _drawn(task: Task, bend: np.ndarray) -> elimination.Own:

@@ -7,6 +7,10 @@ articulated bodies (Rigid Body Dynamics Algorithms, 2008, ch. 7), here with the 
 the place of masses. The cost grows with the number of joints, not with its cube, and every operation is one on long
 runs of frames.
 
+Beside the products of first derivatives (Gauss and Newton) there are the second derivatives: a turn about a carries on
+what a turn further out has moved, a x (b x y). Summed over all markers below a joint they are one 3x3 matrix (`Bends`).
+They matter where a chain is stretched or pressed along itself, as a nearly straight spine is.
+
 "About the origin" is about each frame's own origin (`Placed.origin`).
 """
 
@@ -25,6 +29,14 @@ class Bodies(NamedTuple):
 
     curvature: np.ndarray
     pull: np.ndarray
+
+
+class Bends(NamedTuple):
+    """The second derivatives. inner: (J, 3, 3, F), between a joint's own turns; above: (J, 3, 3, F), between a turn of all
+    that is above it (rows) and its own turns."""
+
+    inner: np.ndarray
+    above: np.ndarray
 
 
 class Own(NamedTuple):
@@ -81,12 +93,39 @@ def gradient(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own:
     return own.pull + np.einsum("jacf,jaf->jcf", axes, moment)
 
 
+def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weights: np.ndarray, share) -> Bends:
+    """The second derivatives of half the weighted squared distances, times `share` (F,); arrays as for `bodies`."""
+    count, frames = len(chain.skeleton), weights.shape[-1]
+    moment, force = np.zeros((count, 3, 3, frames)), np.zeros((count, 3, frames))
+    pulled = (weights * share)[:, None] * away
+    for joint, own in chain.clusters:
+        np.einsum("naf,nbf->abf", placed.markers[own], pulled[own], out=moment[joint])
+        np.sum(pulled[own], axis=0, out=force[joint])
+    for joint in range(count - 1, 0, -1):
+        moment[chain.skeleton.parents[joint]] += moment[joint]
+        force[chain.skeleton.parents[joint]] += force[joint]
+    # f . (a x (b x y)) = a . (y f' - (y . f) 1) b, with y from the joint
+    moment -= placed.joints[:, :, None] * force[:, None]
+    moment -= np.einsum("jaaf->jf", moment)[:, None, None] * np.eye(3)[:, :, None]
+    above = np.einsum("jabf,jbcf->jacf", moment, axes)
+    inner = np.einsum("jabf,jacf->jbcf", axes, above)
+    for joint, all_ways in enumerate(chain.turning):
+        if all_ways:
+            inner[joint] = 0.5 * (inner[joint] + inner[joint].swapaxes(0, 1))
+        else:  # of two angles of a hinge the earlier carries on the later
+            for a, b in ((1, 0), (2, 0), (2, 1)):
+                inner[joint, a, b] = inner[joint, b, a]
+    return Bends(inner, above)
+
+
 def step(
-    chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own, damping: np.ndarray
+    chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own, damping: np.ndarray,
+    bent: Bends | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The damped step: the root's shift (3, F) m and all joints' turns (J, 3, F) rad about their axes (J, 3, 3, F).
 
-    damping: (F,) >= 0, added to the curvature of every turn (and of the root's shift). `asked` is used up.
+    damping: (F,) >= 0, added to the curvature of every turn (and of the root's shift). bent: second derivatives to go
+    with; None: without. `asked` is used up.
     """
     parents = chain.skeleton.parents
     passed, rest = {}, {}
@@ -94,6 +133,9 @@ def step(
         lever = np.concatenate([axes[joint], cross(placed.joints[joint][:, None], axes[joint])])
         share = np.einsum("abf,bcf->acf", asked.curvature[joint], lever)
         inner = np.einsum("abf,acf->bcf", lever, share) + own.curvature[joint]
+        if bent is not None:
+            inner += bent.inner[joint]
+            share[:3] += bent.above[joint]
         _add_diagonal(inner, damping, chain.free[joint])
         right = own.pull[joint] + np.einsum("abf,af->bf", lever, asked.pull[joint])
         inverse = inverse_of(inner)
@@ -102,7 +144,9 @@ def step(
         asked.curvature[parents[joint]] += asked.curvature[joint] - np.einsum("acf,bcf->abf", passed[joint], share)
         asked.pull[parents[joint]] += asked.pull[joint] - np.einsum("acf,cf->af", passed[joint], right)
         rest[joint] = (rest[joint], lever)
-    motions = {0: _root_step(chain, asked, own, damping)}
+    if bent is not None:
+        asked.curvature[0][:3, :3] += bent.inner[0]
+    motions = {0: _root_step(asked, own, damping)}
     turns = np.empty((len(parents), 3, damping.shape[-1]))
     turns[0] = motions[0][:3]
     for joint in range(1, len(parents)):
@@ -119,7 +163,7 @@ def _add_diagonal(inner: np.ndarray, damping: np.ndarray, free: np.ndarray) -> N
         inner[axis, axis] += damping if free[axis] else 1.0
 
 
-def _root_step(chain: Chain, asked: Bodies, own: Own, damping: np.ndarray) -> np.ndarray:
+def _root_step(asked: Bodies, own: Own, damping: np.ndarray) -> np.ndarray:
     """Turn and shift (6, F) of the root."""
     curvature, pull = asked.curvature[0], asked.pull[0]
     curvature[:3, :3] += own.curvature[0]

@@ -90,6 +90,39 @@ def test_a_step_solves_the_whole_system():
         assert np.abs(slope[..., frame].ravel()[used[3:]] - right[3:]).max() < 1e-12
 
 
+def test_with_second_derivatives_a_step_is_newtons():
+    made = small_chain()
+    at = random_poses(made, 1)
+    placed, rng = place(made, at), np.random.default_rng(6)
+    seen = placed.markers + placed.origin + rng.normal(0.0, 0.01, placed.markers.shape)
+    weights = rng.uniform(0.5, 1.0, (len(made.joint), 1))
+    used = np.flatnonzero(np.concatenate([np.ones(3, dtype=bool), made.free.ravel()]))
+
+    def half_cost(steps):
+        """At steps (N, columns) from there."""
+        shift, turns = steps[:, :3].T, np.moveaxis(steps[:, 3:].reshape(len(steps), -1, 3), 0, -1)
+        start = poses(made, np.repeat(at.root.T, len(steps), axis=0), np.repeat(np.moveaxis(at.local, -1, 0), len(steps), 0))
+        away = markers_at(made, moved(made, start, shift, turns)) - seen
+        return 0.5 * np.einsum("mf,maf,maf->f", np.repeat(weights, len(steps), axis=1), away, away)
+
+    unit = 1e-3 * np.eye(3 + 3 * len(SKELETON))[used]
+    slope = (half_cost(unit) - half_cost(-unit)) / 2e-3
+    pairs = np.concatenate([a * unit[:, None] + b * unit for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))])
+    both = half_cost(pairs.reshape(-1, unit.shape[1])).reshape(4, len(used), len(used))
+    curvature = (both[0] - both[1] - both[2] + both[3]) / 4e-6
+    about, none = axes(made, at, placed), np.zeros(1)
+    away = markers_at(made, at) - seen
+    own = elimination.Own(np.zeros_like(placed.world), np.zeros_like(placed.joints))
+    bent = elimination.bends(made, placed, about, away, weights, np.ones(1))
+    asked = elimination.bodies(made, placed, away, weights)
+    shift, turns = elimination.step(made, placed, about, asked, own, none, bent)
+    found = np.concatenate([shift[:, 0], turns[..., 0].ravel()])[used]
+    wanted = np.linalg.solve(curvature, -slope)
+    plain = np.concatenate([x.reshape(-1) for x in elimination.step(
+        made, placed, about, elimination.bodies(made, placed, away, weights), own, none)])[used]
+    assert np.abs(found - wanted).max() < 1e-3 * np.abs(wanted).max() < 0.1 * np.abs(plain - wanted).max()
+
+
 def test_a_distance_pulls_along_its_line_only():
     made = small_chain()
     at = random_poses(made, 2)
