@@ -110,7 +110,8 @@ def _text(data: bytes) -> str:
 def _floats(data: bytes, parameters: _Parameters) -> np.ndarray:
     """(N,) float of single precision numbers as this file writes them."""
     if not parameters.dec:
-        return np.frombuffer(data, f"{parameters.order}f4").astype(float)
+        with np.errstate(invalid="ignore"):  # some kinds of NaN
+            return np.frombuffer(data, f"{parameters.order}f4").astype(float)
     # VAX F floating (DEC): the 16-bit halves are exchanged, the exponent's bias is two greater, and no number is NaN.
     halves = np.frombuffer(data, "<u2").astype(np.uint32)
     bits = (halves[0::2] << 16) | halves[1::2]

@@ -48,13 +48,13 @@ def decided(path: str | os.PathLike, said: str, positions: np.ndarray) -> tuple[
     span = body_span(positions)
     if known is not None:
         if span > 0 and not _BODY_RANGE[0] <= span * known <= _BODY_RANGE[1]:
-            raise InputError(path, f"markers that span {span * known:.3g} m in the header's unit {said.strip()!r}",
+            raise InputError(path, f"markers that span {span * known:.4g} m in the header's unit {said.strip()!r}",
                              "a body", _SAY)  # fmt: skip
         return known, f"unit {said.strip()}"
     fitting = [name for name in _GUESSED if _GUESS_RANGE[0] <= span * NAMES[name] <= _GUESS_RANGE[1]]
     found = f"unit {said.strip()[:20]!r}" if said.strip() else "no unit"
     if not fitting:
-        raise InputError(path, f"{found}, and markers that span {span:.3g} of it", "mm, cm, m or in", _SAY)
+        raise InputError(path, f"{found}, and markers that span {span:.4g} of it", "mm, cm, m or in", _SAY)
     best = min(fitting, key=lambda name: abs(math.log(span * NAMES[name] / _USUAL)))
     return NAMES[best], f"{found} in the header: taken as {best}, since the markers span {span:.4g}"
 
