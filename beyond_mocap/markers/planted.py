@@ -51,6 +51,11 @@ class Planted:
         return self.centres[:, self.motion.skeleton.index(joint)]
 
     @property
+    def markers_of_trial(self) -> tuple[str, ...]:
+        """The trial's labels but for what goes on unlabeled: the columns of `clean`."""
+        return self.trial.labels[: self.clean.shape[1]]
+
+    @property
     def segments(self) -> dict[str, str]:
         """Which joint carries each marker."""
         names = self.motion.skeleton.names
@@ -74,8 +79,8 @@ def planted(
 
     marker_set: one of `planted_places.SETS`, or labels. noise: metres of the cameras' scatter in each coordinate (sd).
     softness: factor on what skin does (1: 10 to 15 mm on a moving thigh, 0: markers on bone). occlusion: share of the
-    samples that are hidden. swaps, jumps, unlabeled: how many of each. ball: one in a hand, thrown. InputError for an unknown set,
-    or a body without legs.
+    samples that are hidden. swaps, jumps, unlabeled: how many of each. ball: one in a hand, thrown. InputError for an
+    unknown set, or a body without legs.
     """
     truth = in_marker_axes(motion)
     labels = _labels(marker_set)

@@ -1,8 +1,8 @@
 """Where markers lie on a body: the places of real marker sets, for bodies in the axes of marker models.
 
 Places follow the palpation points of Plug-in Gait (Vicon), the sets of baseball pitching and sprinting laboratories,
-and the widths of an adult's joints with the marker's own radius of 7 mm. The pelvis's four follow from its hip joints by
-Harrington et al. 2007 (J. Biomech. 40, 595-602: centres 0.24 depth + 9.9 mm behind, 0.30 width + 10.9 mm below and
+and the widths of an adult's joints with the marker's own radius of 7 mm. The pelvis's four follow from its hip joints
+by Harrington et al. 2007 (J. Biomech. 40, 595-602: centres 0.24 depth + 9.9 mm behind, 0.30 width + 10.9 mm below and
 0.33 width + 7.3 mm beside the middle of the front spines) turned round. Each place scatters by some millimetres, as
 hands do that put markers on.
 """
@@ -24,8 +24,8 @@ class Place:
     """One marker on the left side or in the middle.
 
     on: the joint that carries it. to, share: begins at this share of the bone to the joint `to` ("shoulders": to the
-    middle between both). offset: millimetres from there (forward, left, up in a T-pose) on an adult. soft: millimetres by which the skin under it shifts when a
-    joint beside it bends by one radian. wobble: how much it lags behind shocks, from 0 (bone) to 1 (a thigh's flesh).
+    middle between both). offset: millimetres from there (forward, left, up in a T-pose) on an adult. soft: millimetres
+    by which the skin under it shifts when a joint beside it bends by one radian. wobble: how much it lags behind shocks, from 0 (bone) to 1 (a thigh's flesh).
     """
 
     on: str
@@ -79,7 +79,8 @@ MIDDLE = {
 SIDED = {
     "FHD": _head(95, 62, 95), "BHD": _head(-85, 62, 80), "EAR": _head(5, 80, 50),
     "SHO": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
-    "ACR": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4), "SH": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
+    "ACR": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
+    "SH": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
     "UPA": _arm(0.5, 8, 50), "UPB": _arm(0.35, -38, 22), "ARM": _arm(0.55, -8, 48),
     "ELB": _arm(1.0, 0, 43, 5.0), "MELB": _arm(1.0, 0, -43, 5.0), "ELBM": _arm(1.0, 0, -43, 5.0),
     "FRM": _fore(0.45, 12, 0, 40), "FOREARM": _fore(0.5, 8, 0, 38),
@@ -146,7 +147,7 @@ class Placed:
 
 
 def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: float = 0.003) -> Placed:
-    """Those of `labels` for which the skeleton (`planted_body.in_marker_axes`) has a joint, scattered by `scatter` m."""
+    """Those of `labels` that the skeleton (`planted_body.in_marker_axes`) has a joint for, scattered by `scatter` m."""
     rng = np.random.default_rng(seed)
     size = adult_share(skeleton)
     rows = []

@@ -42,8 +42,8 @@ class ThrowStyle:
     """How a right arm throws towards +X; seconds from release, degrees, metres of an adult.
 
     pelvis, spine: rows (time, list, tilt, turn), the pelvis against the throwing direction, the chest against the
-    pelvis. right_arm, left_arm: rows (time, brought forward across, abduction, inward turn, elbow). forearm: rows (time,
-    turn, flexion of the wrist). hips: rows (time, ahead, lowered). left_foot, right_foot: rows (time, ahead, left,
+    pelvis. right_arm, left_arm: rows (time, brought forward across, abduction, inward turn, elbow). forearm: rows
+    (time, turn, flexion of the wrist). hips: rows (time, ahead, lowered). left_foot, right_foot: rows (time, ahead, left,
     raised, pitch, yaw).
     """
 

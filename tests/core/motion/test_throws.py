@@ -19,7 +19,9 @@ def landed(made, target):
 
 @pytest.mark.parametrize("arm", ["left", "right"])
 @pytest.mark.parametrize("style", sorted(STYLES))
-@pytest.mark.parametrize("target, speed", [((18.0, 0.0, 1.0), 32.0), ((12.0, -5.0, 1.6), 18.0), ((6.0, 2.0, 0.6), 12.0)])
+@pytest.mark.parametrize(
+    "target, speed", [((18.0, 0.0, 1.0), 32.0), ((12.0, -5.0, 1.6), 18.0), ((6.0, 2.0, 0.6), 12.0)]
+)
 def test_hits_what_it_is_aimed_at(arm, style, target, speed):
     made = throw(target, speed, arm, style)
     assert np.linalg.norm(landed(made, target) - target) < 0.05
