@@ -66,7 +66,20 @@ TENNIS = Ball("tennis", 0.0335, 0.0577, 9.81, drag=0.0202, lift=(0.0367, 2.022, 
 aerodynamics of tennis balls: the topspin lob", Am. J. Phys. 56 (1988); bounce: the rules ask for 1.35 to 1.47 m from
 2.54 m; inertia: Cross (2002)."""
 
+BASEBALL = Ball("baseball", 0.0366, 0.145, 9.81, drag=0.0061, lift=(0.0174, 2.32, 0.4), restitution=0.5, friction=0.5,
+                rolling=1.0, spin_decay=0.02, inertia=0.4)
+"""C_D 0.35 at 30 to 40 m/s (Kagan & Nathan, "Simplified models for the drag coefficient of a pitched baseball", Phys.
+Teach. 52 (2014)); lift: Nathan, "The effect of spin on the flight of a baseball", Am. J. Phys. 76 (2008); size and
+weight: the rules' 9 to 9 1/4 in round and 5 to 5 1/4 oz."""
+
+HANDBALL = Ball("handball", 0.094, 0.45, 9.81, drag=0.0093, lift=(0.0370, 2.0, 0.4), restitution=0.7, friction=0.6,
+                rolling=0.6, spin_decay=0.05)
+"""Size 3: 58 to 60 cm round, 425 to 475 g; C_D 0.25 as for other large balls above the drag crisis."""
+
 BALLS: dict[str, Ball] = {ball.name: ball for ball in (PAPER, FOOTBALL, VOLLEYBALL, TENNIS)}
+
+THROWN: dict[str, Ball] = {ball.name: ball for ball in (BASEBALL, TENNIS, HANDBALL, VOLLEYBALL, FOOTBALL)}
+"""Balls that a hand throws."""
 
 FASTEST: dict[str, float] = {"foot": 38.0, "head": 23.0, "chest": 10.0, "hand": 38.0, "tool": 73.0}
 """m/s that a human gives a ball with a part. Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis,
