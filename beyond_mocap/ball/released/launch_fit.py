@@ -27,7 +27,6 @@ _FIRST = 0.11  # s of flight with which release and spin are searched; the rest 
 _MORE = (0.17, 0.25, 0.35)  # s of flight that are taken as long as the ball flies on
 _FURTHER = 0.03  # m by which a flight may be elsewhere a moment later, before air and turning are known
 _HELD = 0.12  # s before the release in which the marker stands still in the hand
-_LEAVES = 0.004  # m, where the flight begins against where the marker is in the hand
 _HAND_SPEED = 0.2  # of the hand's speed, how uncertain it is as the ball's
 _NOISE = 0.0015  # m, of a marker
 _FAR = 5.0  # noise beyond which a marker counts less
@@ -36,12 +35,16 @@ _FINE = 0.125  # frames, the last steps of the release time
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What the hand says, T frames. marker: (T, 3) m, where the ball's marker would be, were it held on and on. velocity:
-    (T, 3) m/s of the ball's centre in the hand. centre: (T, 3) m of it."""
+    """What the hand says, T frames.
+
+    marker: (T, 3) m, where the ball's marker would be, were it held on and on. centre: (T, 3) m of the ball and
+    velocity: (T, 3) m/s, likewise. sigma: m, how sure the marker's place is.
+    """
 
     marker: np.ndarray
     centre: np.ndarray
     velocity: np.ndarray
+    sigma: float = 0.006
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +75,14 @@ def fit_launch(
     """The launch that explains the ball's marker (T, 3) m, NaN where it is not seen.
 
     guess: s, the first guess; release times up to `window` s before and after it are tried. ball: what acts on it in
-    the air. None where fewer than two frames of flight are seen.
+    the air. None where the marker is not seen away from the hand in at least two frames.
     """
     search = _Search(marker, held, fps, ball, radius)
     first, last = max(guess - window, search.times[1]), min(guess + window, search.times[-2])
     tried = np.arange(np.ceil(first * fps), np.floor(last * fps) + 1) / fps
     rates = np.arange(1, _RATES + 1) * (min(FASTEST_SPIN, 0.9 * np.pi * fps) / _RATES)
     flights = [(flight, t) for t in tried if (flight := search.flight(t, t + _FIRST, rates)) is not None]
-    if not flights:
+    if not flights or not search.leaves(last):
         return None
     best, at = min(flights, key=lambda found: found[0].cost + search.further_on(*found))
     best, at = search.refined(best, at, rates[1] - rates[0], _FIRST)
@@ -143,6 +146,12 @@ class _Search:
         total = float(cost[k]) + self._held_cost(t0)
         return _Flight(total, velocity, place, (a, b), float(rates[k]), residual, sigma, count)
 
+    def leaves(self, last: float) -> bool:
+        """Whether the marker is seen away from where the hand would have it, up to a first flight after `last`."""
+        used = self.seen & (self.times <= last + _FIRST)
+        away = np.linalg.norm(self.marker[used] - self.held.marker[used], axis=-1)
+        return np.count_nonzero(away[-_LEAST:] > 3.0 * self.held.sigma) >= _LEAST
+
     def further_on(self, flight: _Flight, t0: float) -> float:
         """What it costs that the marker is elsewhere in the next stretch than where this flight would be: a hand that
         hardly moves yet also looks like a flight, but does not fly on."""
@@ -158,14 +167,15 @@ class _Search:
         can be."""
         there, velocity = _at(self.held.marker, self.fps, t0), _at(self.held.velocity, self.fps, t0)
         hand = max(_HAND_SPEED * float(np.linalg.norm(velocity)), 1.0)
-        known = np.diag([1.0 / _LEAVES, 1.0 / hand, 1.0 / self.radius, 1.0 / self.radius])
-        known[0, 2] = 1.0 / _LEAVES
-        return known, np.stack([there / _LEAVES, velocity / hand, np.zeros(3), np.zeros(3)])
+        sure = 1.0 / self.held.sigma
+        known = np.diag([sure, 1.0 / hand, 1.0 / self.radius, 1.0 / self.radius])
+        known[0, 2] = sure
+        return known, np.stack([there * sure, velocity / hand, np.zeros(3), np.zeros(3)])
 
     def _held_cost(self, t0: float) -> float:
         """What it costs that the marker is not where the hand would have it, up to `t0`."""
         used = self.seen & (self.times > t0 - _HELD) & (self.times <= t0)
-        away = np.sum((self.marker[used] - self.held.marker[used]) ** 2, axis=-1) / (0.7 * _LEAVES) ** 2
+        away = np.sum((self.marker[used] - self.held.marker[used]) ** 2, axis=-1) / (0.5 * self.held.sigma) ** 2
         return float(np.sum(_robust(away)))
 
     def refined(self, flight: _Flight, t0: float, width: float, seconds: float) -> tuple[_Flight, float]:

@@ -59,8 +59,7 @@ class HandRelease:
 def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None) -> HandRelease:
     """The release of a ball of `radius` m that nobody sees.
 
-    stride: (T, 2) m, level, from the foot behind to the one in front, as the body steps into the throw; None where
-    nobody knows.
+    stride: (T, 2) m, level, from one foot to the other, as the body stands in its step; None where nobody knows.
     """
     course = _Course(hand)
     times, tips, grip = course.times, course.velocity(PAD), course.velocity(HOLD)
@@ -134,8 +133,9 @@ def _aim(course: _Course, tips: np.ndarray, wrist: int, stride: np.ndarray | Non
         return way
     heading = way[:2] / level
     at = np.zeros(2) if stride is None else stride[course.frame(wrist)]
-    if np.linalg.norm(at) > _LEAST_STEP and at @ heading > 0.0:
-        heading = heading + at / np.linalg.norm(at)
+    size = float(np.linalg.norm(at))
+    if size > _LEAST_STEP and abs(at @ heading) > 0.5 * size:
+        heading = heading + at * (np.sign(at @ heading) / size)
         heading = heading / np.linalg.norm(heading)
     return np.append(heading * np.cos(rise), np.sin(rise))
 

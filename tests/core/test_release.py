@@ -1,0 +1,102 @@
+"""The recipe `release` on planted throws, with and without a marker on the ball, and what it says of bad input."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from beyond_mocap.__main__ import main
+from beyond_mocap.errors import InputError
+from beyond_mocap.files import bvh
+from beyond_mocap.files.trc_write import write_trc
+from beyond_mocap.markers.planted import planted
+from beyond_mocap.markers.planted_ball import PlantedBall
+from beyond_mocap.motion.motion import resample
+from beyond_mocap.motion.throws import throw
+from beyond_mocap.release import ReleaseSettings, release
+
+MARKERS = Path(__file__).resolve().parents[3] / "shared" / "data" / "markers"
+
+
+@pytest.fixture(scope="module")
+def known():
+    made = throw((18.0, 0.0, 1.0), 25.0, fps=200.0)
+    return planted(made.motion, "driveline", ball=PlantedBall(made.release))
+
+
+@pytest.mark.parametrize("arm, fps, speed, drag", [("right", 240.0, 28.0, 0.0), ("left", 120.0, 20.0, 0.0061)])
+def test_planted_throws_come_back(arm, fps, speed, drag):
+    made = throw((18.0, 0.0, 1.0), speed, arm=arm, fps=fps)
+    known = planted(made.motion, "driveline", ball=PlantedBall(made.release, side=arm.capitalize(), drag=drag))
+    found = release(known.trial, known.motion)
+    assert (found.side, found.how) == (arm, "ball")
+    assert abs(found.time - made.release) < 1.0 / fps
+    assert abs(found.speed / known.ball.speed - 1.0) < 0.02
+    assert np.degrees(np.arccos(found.direction @ known.ball.velocity / known.ball.speed)) < 1.0
+    flying = slice(found.frame + 2, found.frame + int(0.25 * fps))
+    assert np.nanmax(np.linalg.norm(found.path.positions - known.ball.places, axis=-1)[flying]) < 0.05
+
+
+def test_without_a_marker_the_hand_tells(known):
+    found = release(known.trial, known.motion, ReleaseSettings(ball_marker=""))
+    assert (found.side, found.how) == ("right", "hand")
+    assert abs(found.time - known.ball.asked.release) < 3.0 * max(found.time_sigma, 0.01)
+    assert abs(found.speed / known.ball.speed - 1.0) < 0.1
+    assert found.speed_sigma > 0.5 and np.isnan(found.residual)
+    assert found.report()["residual_m"] is None
+
+
+def test_the_ball_of_the_path_does_not_jump(known):
+    found = release(known.trial, known.motion)
+    steps = np.linalg.norm(np.diff(found.path.positions, axis=0), axis=-1) * 200.0
+    near = steps[found.frame - 6 : found.frame + 6]
+    assert near.max() < 1.5 * found.speed and near.min() > 0.3 * found.speed
+
+
+def test_a_motion_at_another_rate_serves(known):
+    found = release(known.trial, resample(known.motion, 100.0))
+    assert abs(found.time - known.ball.asked.release) < 0.01
+
+
+def test_a_moved_motion_serves(known):
+    """Feet that were set on the floor move the motion against the markers."""
+    lifted = replace(known.motion, root_positions=known.motion.root_positions + [0.0, 0.0, 0.03])
+    found, straight = release(known.trial, lifted), release(known.trial, known.motion)
+    assert abs(found.time - straight.time) < 0.005
+    assert np.linalg.norm(found.position - straight.position) < 0.06
+
+
+@pytest.mark.parametrize("settings, said", [
+    (ReleaseSettings(ball_marker="PUCK"), "no marker 'PUCK'"),
+    (ReleaseSettings(ball="melon"), "ball 'melon'"),
+])
+def test_bad_settings_are_said(known, settings, said):
+    with pytest.raises(InputError, match=said):
+        release(known.trial, known.motion, settings)
+
+
+def test_another_trials_motion_is_said(known):
+    with pytest.raises(InputError, match="the motion that was made from this trial"):
+        release(known.trial, known.motion.frames(0, 40))
+
+
+def test_the_verb_writes_what_the_recipe_finds(known, tmp_path, capsys):
+    trial, motion, report = tmp_path / "throw_25mps.trc", tmp_path / "m.bvh", tmp_path / "r.json"
+    write_trc(known.trial, trial)
+    bvh.write(motion, known.motion)
+    ball = tmp_path / "b.csv"
+    assert main(["release", str(trial), "--motion", str(motion), "--report", str(report), "--ball-csv", str(ball)]) == 0
+    told = json.loads(report.read_text("utf-8"))
+    assert told["radar_speed_m_s"] == 25.0
+    assert told["speed_m_s"] == pytest.approx(known.ball.speed, rel=0.02)
+    assert abs(told["release_time_s"] - known.ball.asked.release) < 0.005
+    assert {"release_frame", "direction", "uncertainty_s"} <= set(told)
+    assert len(ball.read_text("utf-8").splitlines()) == len(known.trial) + 1
+    assert "right hand" in capsys.readouterr().out
+
+
+def test_the_verb_says_what_is_missing(tmp_path, capsys):
+    assert main(["release", str(tmp_path / "no.trc"), "--motion", "m.bvh", "--report", str(tmp_path / "r.json")]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
