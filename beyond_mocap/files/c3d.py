@@ -140,7 +140,11 @@ def _parameters(path: Path, handle, size: int) -> _Parameters:
 
 def _parsed(path: Path, section: bytes):
     """The package's reader on header and parameters alone, so that what they promise cannot lead it into the data."""
-    import c3d
+    try:
+        import c3d
+    except ImportError as error:
+        found = f"the package c3d cannot be imported ({error})"
+        raise InputError(path, found, "c3d 0.6 or newer", "pip install 'beyond-mocap[markers]'") from None
 
     class Reader(c3d.Reader):
         def _check_metadata(self):  # asserts that header and parameters agree: looked at in `_layout`

@@ -172,31 +172,29 @@ def _values(lines: list[str], at: int, tabs: bool) -> dict[str, str]:
 def _rows(path: Path, lines: list[str], head: _Head) -> tuple[list[str], np.ndarray]:
     """(T texts of Time, (T, M, 3) places, NaN where a cell is empty)."""
     width = int(head.columns.max()) + 1
-    times, table, at = [], [], []
+    times, rows = [], []
     for i in range(head.first_row, len(lines)):
-        if not lines[i].strip():
+        if not lines[i] or lines[i].isspace():
             continue
         cells = _row(path, i, lines[i], head, width)
-        times.append(cells[1])
-        table.append(cells[2:width])
-        at.append(i + 1)
-    if not table:
+        times.append(cells[1].strip())
+        rows.append(_numbers(path, i, cells[2:]))
+    if not rows:
         raise InputError(path, "no rows below the head", "a row for each frame", _EXPORT_AGAIN)
-    values = _numbers(path, table, at)
-    return times, values[:, head.columns - 2]
+    return times, np.array(rows)[:, head.columns - 2]
 
 
 def _row(path: Path, index: int, line: str, head: _Head, width: int) -> list[str]:
     """The cells of a row, filled up where empty ones at its end are left out. InputError where there are more than
     markers, or a place is cut in two."""
-    cells = _cells(line, head.tabs)
-    while len(cells) > width and not cells[-1]:
+    cells = line.split("\t") if head.tabs else line.split()
+    while len(cells) > width and not cells[-1].strip():
         cells.pop()
     place = f"{path}:{index + 1}"
     if len(cells) > width:
         found = f"{len(cells) - 2} coordinates"
         raise InputError(place, found, f"{width - 2} for {len(head.labels)} markers", "one recording a file")
-    while head.tabs and cells and not cells[-1]:
+    while head.tabs and cells and not cells[-1].strip():
         cells.pop()
     short = width - len(cells)
     if short and (not head.tabs or len(cells) < 2 or (len(cells) - 2) % 3):
@@ -206,13 +204,12 @@ def _row(path: Path, index: int, line: str, head: _Head, width: int) -> list[str
     return cells + [""] * short
 
 
-def _numbers(path: Path, table: list[list[str]], at: list[int]) -> np.ndarray:
-    """(T, 3 M) float."""
+def _numbers(path: Path, index: int, cells: list[str]) -> np.ndarray:
+    """(3 M,) float of one row's cells, NaN where there is nothing."""
     try:
-        return np.array([[float(cell) if cell else math.nan for cell in row] for row in table])
+        return np.array(list(map(float, cells)))
     except ValueError:
-        return np.array([[_number(path, cell, line, column) for column, cell in enumerate(row, 3)]
-                         for row, line in zip(table, at)])  # fmt: skip
+        return np.array([_number(path, cell.strip(), index + 1, column) for column, cell in enumerate(cells, 3)])
 
 
 def _number(path: Path, cell: str, line: int, column: int) -> float:

@@ -2,6 +2,7 @@
 
 import io
 import struct
+import sys
 import tracemalloc
 
 import numpy as np
@@ -305,3 +306,9 @@ def test_any_damage_is_read_or_told(body, read, changes, kind):
         assert "\n" not in str(error) and len(str(error)) < 600
     else:
         assert np.isfinite(trial.positions[trial.seen]).all()
+
+
+def test_without_the_package_one_line_is_said(body, read, monkeypatch):
+    monkeypatch.setitem(sys.modules, "c3d", None)
+    with pytest.raises(InputError, match="c3d cannot be imported.*pip install"):
+        read(body.c3d(body.positions, body.labels))
