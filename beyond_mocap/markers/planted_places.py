@@ -16,6 +16,7 @@ import numpy as np
 from ..motion.skeleton import Skeleton
 from .planted_body import adult_share
 
+_HEEL = 0.034  # m by which a heel's marker lies below the ankle, at least
 _DEPTH, _TILT = 0.62, np.radians(9.0)  # of a pelvis: depth in widths; how much lower its front spines lie
 
 
@@ -94,8 +95,8 @@ SIDED = {
     "TIB": _shank(0.5, 8, 58), "TIBB": _shank(0.35, 48, 22), "TIAP": _shank(0.2, 52, 6), "TIAD": _shank(0.6, 45, 4),
     "TILAT": _shank(0.45, 6, 58), "ANK": _shank(1.0, 0, 43, 1.5, 0.1), "MANK": _shank(1.0, 0, -43, 1.5, 0.1),
     "LMAL": _shank(1.0, 0, 43, 1.5, 0.1), "MMAL": _shank(1.0, 0, -43, 1.5, 0.1),
-    "HEE": _foot(None, -52, 0, 24), "HEEL": _foot(None, -52, 0, 24), "MFS": _foot("ToeBase", -62, 6, 42),
-    "MFL": _foot("ToeBase", -50, 46, 14), "TOE": _foot("ToeBase", 0, 2, 24), "P1MT": _foot("ToeBase", 4, -38, 12),
+    "HEE": _foot(None, -52, 0, 12), "HEEL": _foot(None, -52, 0, 12), "MFS": _foot("ToeBase", -62, 6, 34),
+    "MFL": _foot("ToeBase", -50, 46, 14), "TOE": _foot("ToeBase", 0, 2, 14), "P1MT": _foot("ToeBase", 4, -38, 12),
     "MT1": _foot("ToeBase", 4, -38, 12), "P5MT": _foot("ToeBase", -18, 44, 10), "MT5": _foot("ToeBase", -18, 44, 10),
     "HLX": Place("ToeBase", None, 0.0, (55, -12, 14), 1.5, 0.1),
     "ASI": Place("Hips", None, 0.0, (0, 0, 0), 6.0, 0.4), "PSI": Place("Hips", None, 0.0, (0, 0, 0), 4.0, 0.4),
@@ -184,8 +185,9 @@ def _at(skeleton: Skeleton, label: str, place: Place, side: str, size: float) ->
         return _on_pelvis(skeleton, label) + offset
     if place.to == "shoulders":
         return _shoulders(skeleton) + offset
-    if label[1:] in ("HEE", "HEEL"):  # a heel's marker lies as high as the toes'
-        return _bone(skeleton, side + "ToeBase") * [0.0, 0.0, 1.0] + offset
+    if label[1:] in ("HEE", "HEEL"):  # as high as the toes', and some centimetres below the ankle on any rig
+        toes = _bone(skeleton, side + "ToeBase")[2]
+        return offset * [1.0, 1.0, 0.0] + [0.0, 0.0, min(toes + offset[2], -_HEEL * size)]
     return place.share * _bone(skeleton, side + place.to) + offset if place.to else offset
 
 
