@@ -21,6 +21,11 @@ NEAR = 0.14
 """m from the wrist within which a marker belongs to the hand."""
 _HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
 _PASSES = 4
+_LIFTS = sorted(np.arange(-40, 41) / 100.0, key=abs)  # m
+_BEHIND = 0.04  # m behind the wrist, where the forearm's markers begin
+_KNUCKLES = (0.055, 0.115)  # m from the wrist: a marker there sits on the metacarpals' heads
+_REACH_OF_KNUCKLES = 2.22  # fingers are 1.22 times the third metacarpal, Buchholz et al. 1992 (see `without_ball`)
+_TORN = 4.0  # times the usual misfit of the hand's markers, above which one of them is not where it should be
 _STEADY = 0.012  # m, spread in the hand's frame below which a marker is the hand's
 
 
@@ -79,22 +84,24 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
     trial: as many frames, at even times. never: labels that are no part of the hand (the ball's). A constant shift of
     the motion against the markers, as setting feet on the floor makes, is found and taken off.
     """
-    names, seen = _near(hand, trial, never)
+    lift = _lift(hand, trial, never)
+    names, seen = _near(replace(hand, origin=hand.origin + lift), trial, never)
     if not names:
         return hand
-    shift = np.zeros(3)
+    shift = lift
     for _ in range(_PASSES):
         local = np.einsum("tji,tmj->tmi", hand.rotation, seen - (hand.origin + shift)[:, None, :])
         places = np.nanmedian(local, axis=0)
         shift = shift + np.nanmedian(seen - _placed(hand, shift, places), axis=(0, 1))
     moved = replace(hand, origin=hand.origin + shift, elbow=hand.elbow + shift)
     fit = rigid_fit(places, seen)
-    tells = fit.sound & np.isfinite(fit.rms)
-    known = np.isfinite(seen).all(axis=-1)
+    tells = fit.sound & (fit.rms < np.fmax(_TORN * np.nanmedian(fit.rms), _STEADY))
+    known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
     off = np.where(known[..., None], seen - _placed(hand, shift, places), 0.0).sum(axis=1)
     off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers move it, and cannot turn it
     return replace(
         moved,
+        reach=_reach(hand, places),
         origin=np.where(tells[:, None], fit.shift, moved.origin + off),
         rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation),
         markers=names,
@@ -102,8 +109,31 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
     )
 
 
+def _reach(hand: Hand, places: np.ndarray) -> float:
+    """m from wrist to fingertip: the skeleton's, and what a marker on the knuckles tells, each as good as the other."""
+    along = places @ hand.finger
+    knuckles = along[(along > _KNUCKLES[0]) & (along < _KNUCKLES[1])]
+    return hand.reach if not len(knuckles) else 0.5 * (hand.reach + _REACH_OF_KNUCKLES * float(np.median(knuckles)))
+
+
 def _placed(hand: Hand, shift: np.ndarray, places: np.ndarray) -> np.ndarray:
     return (hand.origin + shift)[:, None, :] + np.einsum("tij,mj->tmi", hand.rotation, places)
+
+
+def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
+    """(3,) m, upwards: by what the motion stands too low for the markers, as far as their distances from the wrist tell:
+    those of the hand's own markers do not change."""
+    kept = [number for number, label in enumerate(trial.labels) if label not in never]
+    few = trial.positions[:: max(len(trial) // 300, 1), kept]
+    origin = hand.origin[:: max(len(trial) // 300, 1), None, :]
+    near = np.flatnonzero(np.nanmedian(np.linalg.norm(few[..., :2] - origin[..., :2], axis=-1), axis=0) < NEAR)
+    best, found = np.inf, 0.0
+    for height in _LIFTS if len(near) >= 3 else ():
+        away = np.linalg.norm(few[:, near] - origin - [0.0, 0.0, height], axis=-1)
+        spread = np.sort(np.nanstd(away, axis=0))[:3].sum()
+        if spread < best:
+            best, found = spread, height
+    return np.array([0.0, 0.0, found])
 
 
 def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
@@ -116,7 +146,8 @@ def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple
             continue
         distance = away[known, number]
         spread = np.subtract(*np.percentile(distance, [90, 10]))
-        if np.median(distance) < NEAR and spread < 3.0 * _STEADY:
+        along = np.nanmedian(hand.taken_back(trial.positions[:, number]) @ hand.finger)
+        if np.median(distance) < NEAR and spread < 3.0 * _STEADY and along > -_BEHIND:
             kept.append(number)
     return tuple(trial.labels[number] for number in kept), trial.positions[:, kept]
 
