@@ -14,8 +14,8 @@ from .marker_set import MarkerSet
 from .model import MarkerModel
 from .template import JOINTS, PARENTS, SCAPULAE
 
-SIGMA, EDGE_SIGMA = 0.008, 0.03
-"""What one frame leaves unknown: how far skin markers stray (metres), and edges between them (share of length)."""
+SIGMA = 0.008
+"""How far skin markers stray, metres, until a motion tells; how far edges stray is left open (NaN)."""
 
 
 def landmark_places(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> dict[str, np.ndarray]:
@@ -67,7 +67,7 @@ def model_from_centres(
     freedom, stiffness = freedom_of(names, skeleton.parents, counts)
     return MarkerModel(
         skeleton=skeleton, markers=tuple(labels), joint=np.array(joints), places=np.array(on),
-        sigma=np.full(len(labels), SIGMA), edge_sigma=np.full(len(labels), EDGE_SIGMA), freedom=freedom,
+        sigma=np.full(len(labels), SIGMA), edge_sigma=np.full(len(labels), np.nan), freedom=freedom,
         stiffness=stiffness, centre_sigma=np.array([centres.sigma[name] for name in names]), subject=subject,
         sessions=(session,) if session else (), set_name=marker_set.name, notes=tuple(notes),
     )

@@ -3,8 +3,8 @@
 Hips after Harrington et al. 2007 ("Prediction of the hip joint centre in adults, children, and patients with cerebral
 palsy based on magnetic resonance imaging", J Biomech 40:595): regressions on the width and depth of the pelvis. Knees,
 ankles and elbows lie midway between their epicondyles and malleoli (Wu et al. 2002, 2005), or half a width away from
-the lateral one, square to the limb (Davis et al. 1991). Shoulders lie 17 % of the distance between the acromia below
-them (Rab et al. 2002). Pelvis, thorax and head are turned as the typical body's landmarks (`template`) fit them best.
+the lateral one, square to the limb (Davis et al. 1991). Shoulders lie 15 % of the distance between the acromia below
+them (17 % in Rab et al. 2002, from markers' middles to heads of the humerus that lie lower with hanging arms). Pelvis, thorax and head are turned as the typical body's landmarks (`template`) fit them best.
 """
 
 from __future__ import annotations
@@ -88,6 +88,8 @@ def body_size(points: Mapping[str, np.ndarray]) -> float:
 def _fit(joint: str, points: Mapping[str, np.ndarray], size: float):
     """The typical body's segment laid on its landmarks: rotation (3, 3) and shift, or None where they do not tell."""
     names = [name for name, (carrier, _) in LANDMARK_PLACES.items() if carrier == joint and name in points]
+    firm = [name for name in names if not name.endswith("scapula")]
+    names = firm if len(firm) >= 3 else names
     if len(names) < 3:
         return None
     typical = size * np.array([LANDMARK_PLACES[name][1] for name in names])
@@ -243,14 +245,14 @@ def _leg(out: Centres, points: Mapping[str, np.ndarray], side: str, standing: bo
 
 def _knee_outwards(out, points, side, sign, standing) -> np.ndarray:
     """Where the outside of a knee points when only that side is marked: by the thigh's marker, as Plug-in Gait has it;
-    standing, half by the pelvis."""
+    standing, more by the pelvis, since wands are seldom placed that well."""
     pelvis = sign * out.axes["Hips"][:, 1]
     wand, lateral = points.get(f"{side}_thigh"), points.get(f"{side}_knee_lateral")
     if wand is None or lateral is None:
         return pelvis
     up = unit(out.places[f"{side.capitalize()}UpLeg"] - lateral)
     away = (wand - lateral) - ((wand - lateral) @ up) * up
-    return unit(away) + (unit(pelvis - (pelvis @ up) * up) if standing else 0.0)
+    return unit(away) + (2.0 * unit(pelvis - (pelvis @ up) * up) if standing else 0.0)
 
 
 def _foot(out: Centres, points: Mapping[str, np.ndarray], side: str, ankle, standing: bool) -> None:
@@ -292,7 +294,7 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
     name, sign = side.capitalize(), 1.0 if side == "left" else -1.0
     chest, acromion = out.axes["Chest"], points[f"{side}_acromion"]
     other = points.get("right_acromion" if side == "left" else "left_acromion")
-    drop = 0.17 * np.linalg.norm(acromion - other) if other is not None else 0.06 * out.size
+    drop = 0.155 * np.linalg.norm(acromion - other) if other is not None else 0.06 * out.size
     shoulder = acromion - drop * chest[:, 2]
     out.axes[f"{name}Shoulder"] = chest
     out.put(f"{name}Scapula", acromion - 0.25 * drop * chest[:, 2], chest, SIGMAS["one side"])
@@ -302,6 +304,8 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
         out.notes.append(f"{side} arm: no marker on the elbow; left out")
         return
     place, up, sigma = elbow
+    if wrist is not None and radial is None:  # a lone marker lies on the back of the wrist
+        wrist = wrist - out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2] * up
     out.put(f"{name}Arm", shoulder, frame_along("Y", sign * (place - shoulder), "Z", up), SIGMAS["shoulder"])
     if wrist is None:
         out.notes.append(f"{side} forearm: no marker on the wrist; left out")
@@ -327,11 +331,34 @@ def _elbow(out, points, side, sign, shoulder, wrist, radial):
     if lateral is None:
         return None
     hint = out.axes["Chest"][:, 0] if wrist is None or radial is None else sign * np.cross(radial, wrist - lateral)
-    if wrist is not None:
-        # the forearm folds forwards over the upper arm, so the plane of both tells the axis
-        normal = np.cross(unit(lateral - shoulder), unit(wrist - lateral)) * -sign
-        hint = normal if np.linalg.norm(normal) > _STRAIGHT else hint
+    if wrist is not None and f"{side}_elbow_medial" not in points:
+        half = out.size * HALF_WIDTHS["elbow"] + MARKER_RADIUS
+        outwards = _plane_beside(lateral, shoulder, wrist, half, -sign)
+        if outwards is not None:
+            return lateral - half * outwards, outwards, SIGMAS["one side"]
     return _hinge(out, points, side, "elbow", shoulder, hint)
+
+
+def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:
+    """The normal of the plane through `above` and `below` that passes a marker at the distance `half`, towards the
+    marker; None where the joint is too straight to have such a plane.
+
+    Two planes do; in one of them the joint bends the right way: (upper x lower bone) x sign points to the marker.
+    """
+    line = unit(below - above)
+    away = (marker - above) - ((marker - above) @ line) * line
+    distance = float(np.linalg.norm(away))
+    if distance < half * 1.001:
+        return None
+    away /= distance
+    cosine = half / distance
+    aside = np.sqrt(1.0 - cosine**2) * np.cross(line, away)
+    for normal in (cosine * away + aside, cosine * away - aside):
+        place = marker - half * normal
+        fold = sign * np.cross(unit(place - above), unit(below - place))
+        if fold @ normal > 0.0:
+            return normal if np.linalg.norm(fold) > _STRAIGHT else None
+    return None
 
 
 def _hand(out, points, side, sign, wrist, forearm, sigma) -> None:

@@ -1,0 +1,183 @@
+"""A subject's model from recordings: built on the static trial or on upright frames of the motion, then refined by the
+motion (Fredriksson §5.2.2).
+
+The motion refines what landmarks predict by adjusting the model and its poses in many frames together (`adjustment`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import Cancelled, InputError
+from .adjustment import Adjustment, Body, Prior, Pull
+from .assemble import model_from_frame
+from .calibration_frames import neutral_frames, still_frame, unlike_frames
+from .marker_set import MarkerSet
+from .model import MarkerModel
+from .pose import PoseSettings, solve
+from .trial import MarkerTrial
+from .weights import cluster_deviation, edge_deviation
+
+FRAMES = 60
+_STATIC_FRAMES = 4
+_NEUTRAL_FRAMES = 5
+_WORTH = 10.0  # independent frames that the chosen ones are worth: skin errs alike in poses alike
+_PLACE_SIGMA = 0.015
+_USUAL_SIGMA = 0.006
+_LIMBS = {"ForeArm": 1, "Hand": 1, "Leg": 2, "Foot": 2}
+"""Bones that lie exactly along an axis: joint at their end -> axis."""
+
+
+def calibrate(
+    marker_set: MarkerSet,
+    trial: MarkerTrial,
+    static: MarkerTrial | None = None,
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> MarkerModel:
+    """The model of the body in `trial`.
+
+    trial: cleaned, labelled as the set labels its markers. static: a static trial of the same body with the same
+    markers, or None: the model then begins with upright frames of the motion. InputError where too few landmarks are
+    seen, Cancelled when the user stops.
+    """
+    tell = progress or (lambda part, text: None)
+    stopped = cancelled or (lambda: False)
+    tell(0.0, "joint centres")
+    model = from_static(marker_set, static) if static is not None else from_motion(marker_set, trial)
+    model = replace(model, subject=trial.subject, sessions=(trial.name,))
+    if stopped():
+        raise Cancelled("calibration cancelled")
+    tell(0.2, "refining the model")
+    return refined(model, trial, static, stopped)
+
+
+def from_static(marker_set: MarkerSet, static: MarkerTrial) -> MarkerModel:
+    """The model that a static trial's stillest second gives."""
+    return model_from_frame(still_frame(static), marker_set, standing=True, subject=static.subject)
+
+
+def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
+    """The mean of the models that some upright frames of a motion give."""
+    index = {label: i for i, label in enumerate(trial.labels)}
+    landmarks = {
+        name: tuple(index[label] for label in labels)
+        for name, labels in marker_set.landmarks.items() if all(label in index for label in labels)
+    }
+    found, reason = [], None
+    for frame in neutral_frames(trial, landmarks, _NEUTRAL_FRAMES):
+        places = dict(zip(trial.labels, trial.positions[frame]))
+        try:
+            found.append(model_from_frame(places, marker_set, standing=False, subject=trial.subject))
+        except InputError as error:
+            reason = error
+    if not found:
+        raise reason or InputError(trial.name, "no frames")
+    most = max(found, key=lambda model: (len(model.skeleton), len(model.markers)))
+    alike = [m for m in found if m.skeleton.names == most.skeleton.names and m.markers == most.markers]
+    skeleton = replace(
+        most.skeleton, offsets=np.mean([m.skeleton.offsets for m in alike], axis=0),
+        end_offsets=np.mean([m.skeleton.end_offsets for m in alike], axis=0),
+    )
+    note = f"no static trial: begun with {len(alike)} upright frame{'s' if len(alike) > 1 else ''} of the motion"
+    places = np.mean([m.places for m in alike], axis=0)
+    return replace(most, skeleton=skeleton, places=places, notes=(*most.notes, note))
+
+
+def refined(
+    model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None = None,
+    cancelled: Callable[[], bool] = lambda: False, frames: int = FRAMES, worth: float = _WORTH,
+    place_sigma: float = _PLACE_SIGMA,
+) -> MarkerModel:
+    """The model adjusted to the motion: joint centres, bone lengths and markers' places, each by its uncertainty."""
+    part = _chosen(model, trial, static, frames)
+    motion = solve(model, part, PoseSettings(weights=False), cancelled=cancelled).motion
+    body = _body(model)
+    task = Adjustment(body, _prior(model, place_sigma), _pull(model), _seen(model, part), _sigmas(model), worth)
+    task.start(motion)
+    for _ in range(2):
+        if cancelled():
+            raise Cancelled("calibration cancelled")
+        task.run()
+        task.sigma = _scatter(task.residuals())
+    skeleton = replace(model.skeleton, offsets=body.offsets)
+    deviation = edge_deviation(model.joint, body.places, _seen(model, part))
+    return replace(
+        model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.uncertainty(),
+        edge_sigma=cluster_deviation(model.joint, deviation),
+    )
+
+
+def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, count: int) -> MarkerTrial:
+    """The frames to adjust to, of the model's markers alone: unlike ones of the motion, and some of the static trial.
+
+    They are no neighbours in time, which the rate of one frame a second tells whoever solves them.
+    """
+    root = [i for i, label in enumerate(trial.labels) if label in model.markers
+            and model.joint[model.markers.index(label)] == 0]
+    positions = _seen(model, trial)[unlike_frames(trial, np.array(root, dtype=int), count)]
+    if static is not None:
+        still = _seen(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
+        positions = np.concatenate([still, positions])
+    return MarkerTrial(model.markers, positions, 1.0, name=trial.name)
+
+
+def _seen(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
+    """The model's markers as seen, (T, M, 3) m."""
+    index = {label: i for i, label in enumerate(trial.labels)}
+    out = np.full((len(trial), len(model.markers), 3), np.nan)
+    for own, label in enumerate(model.markers):
+        if label in index:
+            out[:, own] = trial.positions[:, index[label]]
+    return out
+
+
+def _part(name: str) -> str:
+    return name.removeprefix("Left").removeprefix("Right")
+
+
+def _body(model: MarkerModel) -> Body:
+    names = model.skeleton.names
+    limb = np.array([_LIMBS.get(_part(name), -1) for name in names])
+    held = ~model.freedom.free.any(axis=1)
+    return Body(
+        names, model.skeleton.parents, model.skeleton.offsets.copy(), model.joint, model.places.copy(), held, limb
+    )
+
+
+def _prior(model: MarkerModel, place_sigma: float) -> Prior:
+    sigma = np.maximum(model.centre_sigma, 0.003)
+    above = sigma[np.maximum(model.skeleton.parents, 0)]
+    places = np.full(len(model.joint), place_sigma)
+    return Prior(model.skeleton.offsets.copy(), np.sqrt(sigma**2 + above**2), model.places.copy(), places)
+
+
+def _pull(model: MarkerModel) -> Pull:
+    """Play about the rest pose: of joints that are drawn to it, and of angles that are not free."""
+    play = {}
+    for joint in range(1, len(model.skeleton)):
+        free = model.freedom.free[joint]
+        if not free.any():
+            continue
+        row = np.full(3, _USUAL_SIGMA / model.stiffness[joint] if model.stiffness[joint] > 0.0 else np.inf)
+        for angle, letter in enumerate(model.freedom.order[joint]):
+            if not free[angle]:
+                row["XYZ".index(letter)] = np.radians(1.0)
+        if np.isfinite(row).any():
+            play[joint] = row
+    return Pull(play)
+
+
+def _sigmas(model: MarkerModel) -> np.ndarray:
+    return np.maximum(model.sigma, 0.004)
+
+
+def _scatter(residuals: np.ndarray) -> np.ndarray:
+    """How far markers stray (M,) m, from residuals (F, M, 3), half by what skin usually does."""
+    known = np.isfinite(residuals).all(axis=-1)
+    square = np.where(known, np.sum(np.nan_to_num(residuals) ** 2, axis=-1), 0.0).sum(axis=0)
+    mean = square / np.maximum(known.sum(axis=0), 1) / 3.0
+    return np.sqrt(0.5 * _USUAL_SIGMA**2 + 0.5 * np.where(known.any(axis=0), mean, _USUAL_SIGMA**2))
