@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .ball.flight import Launch
+from .ball.flight import Launch, fly
 from .ball.physics import THROWN, Ball
 from .ball.released.carry import carried_and_thrown
 from .ball.released.first_guess import by_distance, fastest, speeds
@@ -30,6 +30,7 @@ from .take import BallPath
 
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
+_LONGEST = 8.0  # s of flight until the ground
 _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
 
 
@@ -58,7 +59,9 @@ class Release:
     spin (3,) rad/s, zero where nothing tells it. time_sigma: s and speed_sigma: m/s, one standard deviation. side: of
     the hand. how: "ball" where its marker told, "hand" where only the hand did. residual: m of its marker in flight, NaN
     without. flight_frames: in which it was seen to fly. radar: m/s that the file's name tells, or None. centre: (3,) m
-    in the hand's frame, radius: m. path: the ball in all frames. notes: lines for people.
+    in the hand's frame, radius: m. path: the ball in all frames. impact: (3,) m, where it first meets the ground, or
+    None. hips: (3,) m in the first frame. notes: lines for people. All places are in the motion's space, with its floor
+    at 0, from which markers may be shifted.
     """
 
     time: float
@@ -76,6 +79,8 @@ class Release:
     centre: np.ndarray
     radius: float
     path: BallPath
+    impact: np.ndarray | None
+    hips: np.ndarray
     notes: tuple[str, ...] = ()
 
     @property
@@ -97,6 +102,7 @@ class Release:
             "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
             "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side, "how": self.how,
             "residual_m": None if np.isnan(self.residual) else self.residual, "flight_frames": self.flight_frames,
+            "impact_m": None if self.impact is None else self.impact.tolist(), "hips_m": self.hips.tolist(),
             "ball_radius_m": self.radius, "ball_centre_in_hand_m": self.centre.tolist(), "warnings": list(self.notes),
         }  # fmt: skip
 
@@ -118,10 +124,41 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     hands = [sharpened(hand_of(motion, side), even, _ball_labels(even, label)) for side in sides]
     hand = _throwing(hands, marker)
     lies, notes = _in_hand(hand, marker, settings, ball)
-    found = None if marker is None else _by_ball(hand, marker, lies, ball, settings, even.name)
+    found = None if marker is None else _by_ball(hand, marker, lies, ball, settings, notes)
     if marker is not None and found is None:
         notes.append(f"{label} is not seen in flight: the hand alone tells of the release")
-    return found(notes) if found else _by_hand(hand, motion, lies, ball, even.name, notes)
+    found = found or _by_hand(hand, motion, lies, ball, notes)
+    seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
+    return _result(found, hand, motion, lies, seen, even.name, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A launch, in the markers' space, and how sure it is."""
+
+    launch: Launch
+    ball: Ball
+    how: str
+    time_sigma: float
+    speed_sigma: float
+    residual: float = float("nan")
+    frames: int = 0
+
+
+def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, name: str, notes) -> Release:
+    """The launch in the motion's space, with all that follows from it."""
+    launch = replace(found.launch, position=found.launch.position - hand.shift)
+    home = replace(hand, origin=hand.origin - hand.shift)
+    places = carried_and_thrown(home, lies.centre, launch, found.ball)
+    bounces = fly(launch, found.ball, _LONGEST)
+    impact = bounces.at(bounces.bounces[:1])[0] * [1.0, 1.0, 0.0] if len(bounces.bounces) else None
+    hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
+    return Release(
+        launch.time, int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)), launch.position, launch.velocity,
+        np.asarray(launch.spin, float), found.time_sigma, found.speed_sigma, hand.side, found.how, found.residual,
+        found.frames, radar_speed(name), lies.centre, lies.radius, BallPath(hand.times, places, seen), impact, hips,
+        tuple(notes),
+    )  # fmt: skip
 
 
 def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
@@ -203,8 +240,8 @@ def _guess(hand: Hand, marker: np.ndarray) -> float:
     return (fastest(knuckles, hand.fps) if frame is None else frame) / hand.fps
 
 
-def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSettings, name: str):
-    """What makes the result out of notes, or None where the marker is not seen to fly."""
+def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSettings, notes) -> _Found | None:
+    """By the marker on the ball; None where it is not seen to fly."""
     held = _held_frames(hand, marker)
     sure = bool(held.sum() >= 3)
     place = np.nanmedian(hand.taken_back(marker)[held], axis=0) if sure else lies.centre
@@ -214,21 +251,13 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     guess = _guess(hand, marker)
     fits = [(fit_launch(marker, course, hand.fps, guess, air, lies.radius, settings.window), air)
             for air in (ball, _without_air(ball))]
-    if fits[0][0] is None:
+    if fits[0][0] is None or fits[1][0] is None:
         return None
     fit, ball = min(fits, key=lambda found: (-round(found[0].seconds, 3), found[0].residual))
-
-    def result(notes: list[str]) -> Release:
-        if not sure:
-            notes.append("the ball's marker is not seen in the hand: the release is where the flight meets the hand")
-        launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
-        return Release(
-            fit.time, _nearest(fit.time, hand), fit.position, fit.velocity, fit.spin, fit.time_sigma, fit.speed_sigma,
-            hand.side, "ball", fit.residual, fit.frames, radar_speed(name), lies.centre, lies.radius,
-            _path(hand, lies.centre, launch, ball, np.isfinite(marker).all(axis=-1)), tuple(notes),
-        )  # fmt: skip
-
-    return result
+    if not sure:
+        notes.append("the ball's marker is not seen in the hand: the release is where the flight meets the hand")
+    launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
+    return _Found(launch, ball, "ball", fit.time_sigma, fit.speed_sigma, fit.residual, fit.frames)
 
 
 def _without_air(ball: Ball) -> Ball:
@@ -236,20 +265,12 @@ def _without_air(ball: Ball) -> Ball:
     return replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
 
 
-def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, name: str, notes: list[str]) -> Release:
+def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _Found:
     found = release_by_hand(hand, lies.radius, _stride(motion))
     if not hand.markers:
         notes.append("no markers near the hand: the motion tells alone, which its filter has made slower")
     launch = Launch(found.time, found.position, found.velocity)
-    return Release(
-        found.time, _nearest(found.time, hand), found.position, found.velocity, np.zeros(3), found.time_sigma,
-        found.speed_sigma, hand.side, "hand", float("nan"), 0, radar_speed(name), lies.centre, lies.radius,
-        _path(hand, lies.centre, launch, ball, np.zeros(len(hand), bool)), tuple(notes),
-    )  # fmt: skip
-
-
-def _nearest(time: float, hand: Hand) -> int:
-    return int(np.clip(round(time * hand.fps), 0, len(hand) - 1))
+    return _Found(launch, ball, "hand", found.time_sigma, found.speed_sigma)
 
 
 def _stride(motion: Motion) -> np.ndarray:
@@ -258,6 +279,3 @@ def _stride(motion: Motion) -> np.ndarray:
     places, _ = forward_kinematics(motion)
     return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]
 
-
-def _path(hand: Hand, centre, launch: Launch, ball: Ball, measured: np.ndarray) -> BallPath:
-    return BallPath(hand.times, carried_and_thrown(hand, centre, launch, ball), measured)

@@ -6,7 +6,7 @@ least three markers near the wrist are seen, the hand's frame is the one that ca
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class Hand:
 
     side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
     finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's frame.
-    elbow: (T, 3) m. markers: labels that sharpen it. worth: (T,) bool, where markers did.
+    markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are, which the origin has in it.
     """
 
     side: str
@@ -44,9 +44,8 @@ class Hand:
     rotation: np.ndarray
     finger: np.ndarray
     reach: float
-    elbow: np.ndarray
     markers: tuple[str, ...] = ()
-    worth: np.ndarray | None = None
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __len__(self) -> int:
         return len(self.origin)
@@ -73,8 +72,7 @@ def hand_of(motion: Motion, side: str) -> Hand:
     places, rotations = forward_kinematics(motion)
     finger, reach = _finger(motion, limb)
     return Hand(
-        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach,
-        places[:, limb.lower_arm],
+        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach
     )  # fmt: skip
 
 
@@ -93,7 +91,7 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
         local = np.einsum("tji,tmj->tmi", hand.rotation, seen - (hand.origin + shift)[:, None, :])
         places = np.nanmedian(local, axis=0)
         shift = shift + np.nanmedian(seen - _placed(hand, shift, places), axis=(0, 1))
-    moved = replace(hand, origin=hand.origin + shift, elbow=hand.elbow + shift)
+    moved = replace(hand, origin=hand.origin + shift, shift=shift)
     fit = rigid_fit(places, seen)
     tells = fit.sound & (fit.rms < np.fmax(_TORN * np.nanmedian(fit.rms), _STEADY))
     known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
@@ -105,7 +103,6 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
         origin=np.where(tells[:, None], fit.shift, moved.origin + off),
         rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation),
         markers=names,
-        worth=known.any(axis=1),
     )
 
 
