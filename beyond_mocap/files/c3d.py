@@ -29,11 +29,13 @@ _NO_MARKERS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", 
 _AXES = {sign + axis: ("XYZ".index(axis), -1 if sign == "-" else 1) for sign in ("", "+", "-") for axis in "XYZ"}
 
 
-def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None) -> MarkerTrial:
+def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None,
+             up: str | None = None) -> MarkerTrial:  # fmt: skip
     """The trial in a C3D file: one subject's markers and the events; analog channels, angles, forces and points that
     a model computed are left out, and told in the notes.
 
     unit: metres per unit or a name; None for the file's own. subject: whose markers, where the file has several bodies.
+    up: the file's axis that points up, None to find it.
     InputError where the file is missing, damaged, cut off or no C3D file, and as `raw_markers.as_trial`.
     """
     path = Path(path)
@@ -43,7 +45,7 @@ def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: 
         layout = _layout(path, parameters, size)
         words = _words(path, handle, layout)
     positions, residuals = _points(words, layout, parameters)
-    return as_trial(_raw(path, parameters, layout, positions, residuals), path, unit, subject)
+    return as_trial(_raw(path, parameters, layout, positions, residuals), path, unit, subject, up)
 
 
 def _opened(path: Path):

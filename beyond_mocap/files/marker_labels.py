@@ -42,8 +42,11 @@ def chosen_subject(path, counts: dict[str, int], wanted: str | None) -> str:
 
     InputError, which lists them, where there are several bodies or not the one wanted.
     """
-    named = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name) or "none is named"
+    named = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name)
     if wanted is not None and wanted.strip():
+        if not named:
+            found = f"no subject {wanted.strip()[:60]!r}"
+            raise InputError(path, found, "no choice, since its labels name nobody", "leave out --subject")
         for name in counts:
             if name.lower() == wanted.strip().lower():
                 return name

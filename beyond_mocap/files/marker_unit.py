@@ -22,6 +22,7 @@ _GUESSED = ("mm", "m", "cm", "in")
 _USUAL = 1.5  # metres that the markers of a standing body span
 _GUESS_RANGE = (0.5, 2.6)
 _BODY_RANGE = (0.1, 10.0)
+_GIVEN_RANGE = (0.01, 100.0)
 _SAY = "say --unit (metres per unit, or mm, cm, m, in)"
 
 
@@ -36,6 +37,16 @@ def metres_per_unit(unit: float | str, where: object = "--unit") -> float:
     if not 1e-9 < value < 1e4:
         raise InputError(where, f"unit {str(unit)[:40]!r}", "metres per unit, or mm, cm, m, in", "check the unit")
     return value
+
+
+def given(path: str | os.PathLike, unit: float | str, positions: np.ndarray) -> tuple[float, str]:
+    """(metres per unit, line on it) of a unit that the user gives; positions: (T, M, 3) in the file's unit. InputError
+    where it is none, or makes something of the body that no body is."""
+    metres, span = metres_per_unit(unit), body_span(positions)
+    if span > 0 and not _GIVEN_RANGE[0] <= span * metres <= _GIVEN_RANGE[1]:
+        found = f"makes {path} span {span * metres:.4g} m"
+        raise InputError(f"--unit {str(unit)[:40]}", found, "a body", "check the unit")
+    return metres, f"unit {metres:g} m, as given"
 
 
 def decided(path: str | os.PathLike, said: str, positions: np.ndarray) -> tuple[float, str]:

@@ -47,8 +47,10 @@ class RawMarkers:
     notes: list[str] = field(default_factory=list)
 
 
-def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None, subject: str | None) -> MarkerTrial:
+def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None, subject: str | None,
+             up: str | None) -> MarkerTrial:  # fmt: skip
     """The trial that a file holds. unit: as the user gives it (`marker_unit.metres_per_unit`), None for the file's.
+    subject: whose markers, None for the only body. up: the file's axis that points up ("Z", "-Y"), None to find it.
 
     InputError where no marker is ever seen, several bodies are in the file and none is chosen, or the unit is unknown.
     """
@@ -57,7 +59,8 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
     positions = np.array(raw.positions[:, chosen], dtype=float)
     residuals = None if raw.residuals is None else np.array(raw.residuals[:, chosen], dtype=float)
     positions[(positions == 0).all(axis=-1)] = np.nan
-    metres, how = _unit(path, unit, raw.unit, positions)
+    known = unit is not None
+    metres, how = marker_unit.given(path, unit, positions) if known else marker_unit.decided(path, raw.unit, positions)
     notes.insert(0, how)
     positions *= metres
     far = (np.abs(positions) > _FARTHEST).any(axis=-1)
@@ -66,7 +69,7 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
         positions[far] = np.nan
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
     labels, positions, residuals = _seen_only(path, labels, positions, residuals, notes)
-    positions = _upright(raw, labels, positions, notes)
+    positions = _upright(raw, labels, positions, up, notes)
     if residuals is not None:
         residuals = np.where(np.isfinite(positions).all(axis=-1), residuals * metres, np.nan)
         residuals = residuals if np.nanmax(residuals, initial=0) > 0 else None
@@ -106,13 +109,6 @@ def _choose(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str]
     return kept, labels, whose
 
 
-def _unit(path, given, said: str, positions) -> tuple[float, str]:
-    if given is not None:
-        metres = marker_unit.metres_per_unit(given)
-        return metres, f"unit {metres:g} m, as given"
-    return marker_unit.decided(path, said, positions)
-
-
 def _seen_only(path, labels, positions, residuals, notes):
     """The markers that are seen at all."""
     ever = np.isfinite(positions).all(axis=-1).any(axis=0)
@@ -124,13 +120,19 @@ def _seen_only(path, labels, positions, residuals, notes):
     return labels, positions[:, ever], None if residuals is None else residuals[:, ever]
 
 
-def _upright(raw: RawMarkers, labels, positions, notes) -> np.ndarray:
-    """The places with Z up: as the file says, else as the body stands, else as such files usually are."""
+def _upright(raw: RawMarkers, labels, positions, given: str | None, notes) -> np.ndarray:
+    """The places with Z up: as given, else as the file says, else as the body stands, else as such files usually
+    are."""
     stands = up_axis(labels, positions)
-    up = raw.up or stands or raw.usual_up
-    why = "as the file says" if raw.up else "heads above feet" if stands else "as such files usually are"
+    said = {
+        "as given": None if given is None else axis_named(given),
+        "as the file says": raw.up,
+        "heads above feet": stands,
+        "as such files usually are": raw.usual_up,
+    }
+    why, up = next((why, up) for why, up in said.items() if up)
     notes.append(f"{_axis(up)} is up, {why}")
-    if stands and stands != up:
+    if stands and stands != up and given is None:
         notes.append(f"heads lie above feet along {_axis(stands)}, though: check which way is up")
     axes, signs = _UP[up]
     return positions[..., axes] * np.array(signs, dtype=float)
@@ -144,6 +146,14 @@ def _tell_mirrored(labels, positions, notes) -> None:
 def _events(raw: RawMarkers, whose: str) -> tuple[MarkerEvent, ...]:
     return tuple(MarkerEvent(seconds, label, side) for seconds, label, side, name in raw.events
                  if not name or not whose or name == whose)  # fmt: skip
+
+
+def axis_named(name: str) -> tuple[int, int]:
+    """(axis 0..2, sign) of an axis's name: "Z", "+Y", "-x". InputError where it is none."""
+    plain = name.strip().upper().lstrip("+-")
+    if plain not in ("X", "Y", "Z") or len(name.strip()) > 2:
+        raise InputError("--up", f"axis {name[:20]!r}", "one of X, Y, Z, -X, -Y, -Z", "name the axis that points up")
+    return "XYZ".index(plain), -1 if "-" in name else 1
 
 
 def _axis(up: tuple[int, int]) -> str:

@@ -25,10 +25,12 @@ _MOST_FRAMES = 2_000_000
 _LARGEST = 4_000_000_000  # bytes
 
 
-def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None) -> MarkerTrial:
+def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None,
+             up: str | None = None) -> MarkerTrial:  # fmt: skip
     """The trial in a TRC file. Its Y is up unless the body in it stands otherwise.
 
     unit: metres per unit or a name; None for the file's own. subject: whose markers, where labels have prefixes.
+    up: the file's axis that points up, None to find it.
     InputError, with the line, where the file is missing, damaged or no TRC file, and as `raw_markers.as_trial`.
     """
     path = Path(path)
@@ -38,7 +40,7 @@ def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: 
     fps, start, positions, told = _on_one_clock(path, head, times, positions)
     raw = RawMarkers(labels=head.labels, positions=positions, fps=fps, unit=head.unit, usual_up=(1, 1), start=start,
                      notes=[*head.notes, *told])  # fmt: skip
-    return as_trial(raw, path, unit, subject)
+    return as_trial(raw, path, unit, subject, up)
 
 
 def _lines(path: Path) -> list[str]:

@@ -42,6 +42,7 @@ def test_every_kind_of_number(body, read, processor, scale):
     assert trial.notes == (f"unit {'m' if scale < 0 else 'mm'}", "Z is up, heads above feet")
 
 
+@pytest.mark.filterwarnings("ignore")
 def test_the_same_as_the_package_reads(body, read):
     import c3d
 
@@ -53,6 +54,7 @@ def test_the_same_as_the_package_reads(body, read):
     np.testing.assert_array_equal(trial.residuals, points[..., 3])
 
 
+@pytest.mark.filterwarnings("ignore")
 def test_a_file_that_the_package_wrote(body, read):
     import c3d
 
@@ -106,6 +108,8 @@ def test_a_unit_that_cannot_be(body, read):
         read(body.c3d(body.positions * 1e6, body.labels, unit=""))
     with pytest.raises(InputError, match="--unit: unit 'parsec'"):
         read(data, unit="parsec")
+    with pytest.raises(InputError, match="--unit 1000: makes .* span 1660 m"):
+        read(data, unit="1000")
 
 
 TURNED = {"+Z": ((0, 1, 2), (1, 1, 1)), "+Y": ((0, 2, 1), (1, 1, -1)), "-Y": ((0, 2, 1), (1, -1, 1)),
@@ -130,6 +134,18 @@ def test_a_header_that_has_the_body_lying_is_told(body, read):
     assert any("check which way is up" in note for note in trial.notes)
 
 
+def test_a_lying_body_is_left_lying_where_one_says_so(body, read):
+    lying = body.positions[..., [2, 1, 0]] * [1, 1, -1]
+    assert "X is up, heads above feet" in read(body.c3d(lying, body.labels)).notes
+    trial = read(body.c3d(lying, body.labels), up="Z")
+    np.testing.assert_allclose(trial.positions, lying, atol=1e-6)
+    assert "Z is up, as given" in trial.notes
+    np.testing.assert_allclose(read(body.c3d(lying, body.labels), up="-x").positions[..., 2], -lying[..., 0], atol=1e-6)
+    for wrong in ("W", "", "ZZ", "Z-"):
+        with pytest.raises(InputError, match="--up: axis"):
+            read(body.c3d(lying, body.labels), up=wrong)
+
+
 def test_mirrored_bodies_are_told(body, read):
     trial = read(body.c3d(body.positions * [1, -1, 1], body.labels))
     assert any("mirrored" in note for note in trial.notes)
@@ -150,6 +166,8 @@ def test_one_subject_of_a_file(body, read):
     labels = [f"Jo:{label}" for label in body.labels]
     trial = read(body.c3d(body.positions, labels))
     assert (trial.subject, trial.labels) == ("Jo", body.labels)
+    with pytest.raises(InputError, match="its labels name nobody; leave out --subject"):
+        read(body.c3d(body.positions, body.labels), subject="Jo")
 
 
 def test_several_subjects(body, read):
