@@ -63,6 +63,20 @@ class Chain:
         """Each joint that carries markers, and which."""
         return tuple((int(joint), np.flatnonzero(self.joint == joint)) for joint in np.unique(self.joint))
 
+    @cached_property
+    def runs(self) -> tuple[tuple[int, ...], ...]:
+        """Runs of joints down to one that carries markers, those before it without any: markers tell only what they do
+        together, as of a lumbar spine between pelvis and thorax."""
+        marked, found = set(self.joint.tolist()), []
+        for joint in sorted(marked):
+            run = [joint]
+            while (above := self.skeleton.parents[run[0]]) > 0 and above not in marked:
+                run.insert(0, above)
+            if len(run) > 1 and all(self.turning[one] for one in run):
+                found.append(tuple(run))
+        used = [joint for run in found for joint in run]
+        return tuple(run for run in found if all(used.count(joint) == 1 for joint in run))
+
     def without_limits(self) -> "Chain":
         """The same chain with joints that turn as far as they like."""
         return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import elimination, limits
-from .chain import Chain, Placed, Poses, axes, logarithm, moved, multiply, place
+from .chain import Chain, Placed, Poses, axes, cross, logarithm, moved, multiply, place
 
 MOST_STEPS = 40
 _NEAR = 0.1  # a step that gains a smaller part of the cost is near enough for second derivatives to help
@@ -48,6 +48,7 @@ class Task:
 
     seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. lean: poses to be drawn to instead of the rest pose, or
     None. point: a held point, or None. drawn: (J, 3) m per radian, how strongly (in place of the chain's stiffness).
+    even: m per radian, how strongly the joints of a run (`Chain.runs`) are held to turn alike.
     """
 
     chain: Chain
@@ -56,6 +57,7 @@ class Task:
     drawn: np.ndarray
     lean: Poses | None = None
     point: HeldPoint | None = None
+    even: float = 0.0
 
     def frames(self, chosen) -> "Task":
         """These frames only."""
@@ -84,6 +86,7 @@ class _State:
     placed: Placed
     away: np.ndarray
     bend: np.ndarray
+    uneven: np.ndarray
     cost: np.ndarray
 
     def take(self, other: "_State", where: np.ndarray) -> None:
@@ -95,11 +98,12 @@ class _State:
         """These frames only."""
         at = self.poses.frames(chosen)
         placed = Placed(at.root, *(a[..., chosen] for a in (self.placed.world, self.placed.joints, self.placed.markers)))
-        return _State(at, placed, self.away[..., chosen], self.bend[..., chosen], self.cost[chosen])
+        more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.cost))
+        return _State(at, placed, *more)
 
     def _arrays(self):
         at, put = self.poses, self.placed
-        return at.root, at.local, at.angles, put.world, put.joints, put.markers, self.away, self.bend, self.cost
+        return at.root, at.local, at.angles, put.world, put.joints, put.markers, self.away, self.bend, self.uneven, self.cost
 
 
 def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
@@ -142,12 +146,13 @@ def _state(task: Task, at: Poses) -> _State:
     """Poses and what follows from them."""
     placed = place(task.chain, at)
     away = placed.markers + (at.root - task.seen)
-    bend = _bend(task, at)
+    bend, uneven = _bend(task, at), _uneven(task, at)
     cost = np.einsum("mf,maf,maf->f", task.weights, away, away)
     cost += np.einsum("ja,jaf,jaf->f", task.drawn**2, bend, bend)
+    cost += task.even**2 * np.einsum("jaf,jaf->f", uneven[:, 0], uneven[:, 0])
     if task.point:
         cost += task.point.weight * _distance(task.point, placed)[2] ** 2
-    return _State(at, placed, away, bend, 0.5 * cost)
+    return _State(at, placed, away, bend, uneven, 0.5 * cost)
 
 
 def _bend(task: Task, at: Poses) -> np.ndarray:
@@ -159,6 +164,29 @@ def _bend(task: Task, at: Poses) -> np.ndarray:
     for joint in task.chain.hinges:
         bend[joint] = at.angles[joint] - (0.0 if task.lean is None else task.lean.angles[joint])
     return bend
+
+
+def _uneven(task: Task, at: Poses) -> np.ndarray:
+    """Of every joint of a run how far its rotation vector is from the run's mean, and the derivative of half its square by
+    the joint's turns: (joints, 2, 3, F) rad.
+
+    The mean's own derivative adds nothing, since the distances from it cancel out.
+    """
+    out = []
+    for run in task.chain.runs:
+        vectors = logarithm(at.local[list(run)])
+        for vector, gap in zip(vectors, vectors - vectors.mean(axis=0)):
+            out.append(np.stack([gap, _carried_to_turns(vector, gap)]))
+    return np.array(out) if out else np.zeros((0, 2, 3, at.root.shape[-1]))
+
+
+def _carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """A slope (3, F) by a joint's rotation vector (3, F) as one by small turns put before it."""
+    angle = np.sqrt(np.einsum("af,af->f", vector, vector))
+    near = np.maximum(angle, 1e-3)
+    factor = np.where(angle > 1e-3, 1.0 / near**2 - 0.5 / (near * np.tan(0.5 * near)), 1.0 / 12.0)
+    once = cross(vector, slope)
+    return slope + 0.5 * once + factor * cross(vector, once)
 
 
 def _distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -194,7 +222,7 @@ def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: 
     if task.point:
         x, along, far = _distance(task.point, best.placed)
         elimination.add_distance(asked, task.point.joint, x, along, task.point.weight, far)
-    own = _drawn(task, best.bend)
+    own = _drawn(task, best)
     slope = elimination.gradient(task.chain, best.placed, about, asked, own)
     held = limits.hold(task.chain, stops, best.poses, slope, own, ahead)
     bent = None
@@ -203,13 +231,17 @@ def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: 
     return *elimination.step(task.chain, best.placed, about, asked, own, damping, bent), held
 
 
-def _drawn(task: Task, bend: np.ndarray) -> elimination.Own:
-    """What the pull to the rest pose asks of each joint's turns.
+def _drawn(task: Task, best: _State) -> elimination.Own:
+    """What the pull to the rest pose, and that to even runs, asks of each joint's turns.
 
     The derivative of half the squared length of a rotation vector by a small turn is the vector itself.
     """
     strength = task.drawn**2
-    curvature = np.zeros((len(bend), 3, 3, bend.shape[-1]))
+    curvature = np.zeros((len(strength), 3, 3, best.cost.shape[-1]))
+    pull = strength[..., None] * best.bend
+    spread = [joint for run in task.chain.runs for joint in run]
+    pull[spread] += task.even**2 * best.uneven[:, 1]
     for axis in range(3):
         curvature[:, axis, axis] = strength[:, axis, None]
-    return elimination.Own(curvature, strength[..., None] * bend)
+        curvature[spread, axis, axis] += task.even**2
+    return elimination.Own(curvature, pull)

@@ -26,6 +26,7 @@ _COARSE_SECONDS = 1.0 / 60.0
 _ENOUGH = 0.3  # part of the markers that a frame must show to be solved
 _FEWEST = 4
 _DEAR, _FAR = 1.5, np.radians(40.0)  # a start is doubted that costs so many times its neighbour, or turns a joint so far
+_EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
 _LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
 
 
@@ -169,7 +170,7 @@ class _Solving:
             there = np.isfinite(ball.seen).all(axis=-1) & ball.held
             point = HeldPoint(self.chain.skeleton.index(ball.joint), np.asarray(ball.centre, dtype=float), ball.radius,
                               np.where(there[:, None], ball.seen, 0.0)[frames].T, ball.weight * there[frames])
-        return Task(self.chain, self.seen[..., frames], self.weights[frames].T, self.drawn, lean, point)
+        return Task(self.chain, self.seen[..., frames], self.weights[frames].T, self.drawn, lean, point, _EVEN)
 
     def _chunks(self, frames: np.ndarray):
         """Slices of a list of frames, with a look at the clock between."""

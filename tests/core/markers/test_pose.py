@@ -112,3 +112,17 @@ def test_a_held_ball_turns_a_hand_that_its_markers_leave_open(run):
     distance = np.linalg.norm(joints[:, hand] + quaternion.rotate(turns[:, hand], centre) - on_surface, axis=-1)
     assert np.abs(distance - radius).max() < 2e-3
     assert world_errors(run, held, "RightHand").mean() < 0.7 * world_errors(run, without, "RightHand").mean()
+
+
+def test_a_spine_that_is_too_long_does_not_flip(run):
+    model = model_of(run)
+    offsets = model.skeleton.offsets.copy()
+    chest = model.skeleton.index("Chest")
+    offsets[chest] *= 1.0 + 0.015 / np.linalg.norm(offsets[chest])
+    solved = solve(replace(model, skeleton=replace(model.skeleton, offsets=offsets)), run.trial)
+    spine = [model.skeleton.index(name) for name in ("Spine", "Spine1", "Chest")]
+    steps = quaternion.multiply(quaternion.inverse(solved.motion.rotations[:-1]), solved.motion.rotations[1:])
+    turned = np.degrees(np.linalg.norm(quaternion.to_rotation_vector(steps[:, spine]), axis=-1))
+    assert turned.max() < 3.0
+    vectors = np.degrees(quaternion.to_rotation_vector(solved.motion.rotations[:, spine]))
+    assert np.linalg.norm(vectors - vectors.mean(axis=1, keepdims=True), axis=-1).max() < 20.0
