@@ -28,13 +28,8 @@ from .motion.humanoid import identify
 from .motion.motion import Motion, forward_kinematics, resample
 from .take import BallPath
 
-FEWEST = 12
-"""Frames without which no throw is looked for."""
-SLOWEST = 1.5
-"""m/s: a hand that is never faster throws nothing."""
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
-_NEARBY = 0.3  # s before a hand is fastest: the ball is in it
 _LONGEST = 8.0  # s of flight until the ground
 _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
 
@@ -122,17 +117,12 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     if ball is None:
         raise InputError("release", f"ball {settings.ball!r}", f"one of {', '.join(THROWN)}")
     motion = _frame_for_frame(trial, motion)
-    if len(trial) < FEWEST:
-        raise InputError(trial.name, f"{len(trial)} frames", f"at least {FEWEST}", "take a longer stretch")
     even = evenly(trial)
     label = _ball_label(even, settings.ball_marker)
     marker = None if label is None else even.positions[:, even.index(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
     hands = [sharpened(hand_of(motion, side), even, _ball_labels(even, label)) for side in sides]
     hand = _throwing(hands, marker)
-    pace = float(np.max(_steady(hand)))
-    if pace < SLOWEST:
-        raise InputError(trial.name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw", "choose another trial, or hand")
     lies, notes = _in_hand(hand, marker, settings, ball)
     found = None if marker is None else _by_ball(hand, marker, lies, ball, settings, notes)
     if marker is not None and found is None:
@@ -210,23 +200,12 @@ def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
     fast = max(range(len(hands)), key=lambda i: speeds(hands[i].origin, hands[i].fps)[peaks[i]])
     if marker is None or len(hands) == 1:
         return hands[fast]
-    nearest = [_distance(hand, marker, peaks[fast]) for hand in hands]
+    nearest = []
+    for hand in hands:
+        away = np.linalg.norm(marker - hand.carried(HOLD * hand.reach * hand.finger), axis=-1)[: peaks[fast] + 1]
+        nearest.append(np.nanmedian(away[-int(0.3 * hand.fps) :]) if np.isfinite(away).any() else np.inf)
+    nearest = np.nan_to_num(nearest, nan=np.inf)
     return hands[int(np.argmin(nearest))] if np.isfinite(nearest).any() else hands[fast]
-
-
-def _steady(hand: Hand) -> np.ndarray:
-    """(T,) m/s, of which single frames that are off are taken out."""
-    from scipy.signal import medfilt
-
-    return medfilt(speeds(hand.origin, hand.fps), 5)
-
-
-def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
-    """m between hand and marker shortly before the hand is fastest; infinite where it is hardly seen then."""
-    away = np.linalg.norm(marker - hand.carried(HOLD * hand.reach * hand.finger), axis=-1)
-    away = away[max(peak - int(_NEARBY * hand.fps), 0) : peak + 1]
-    away = away[np.isfinite(away)]
-    return float(np.median(away)) if len(away) >= 3 else np.inf
 
 
 def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:

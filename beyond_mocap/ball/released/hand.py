@@ -93,7 +93,7 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
         shift = shift + np.nanmedian(seen - _placed(hand, shift, places), axis=(0, 1))
     moved = replace(hand, origin=hand.origin + shift, shift=shift)
     fit = rigid_fit(places, seen)
-    tells = fit.sound & (fit.rms < max(_TORN * _usual(fit.rms), _STEADY))
+    tells = fit.sound & (fit.rms < np.fmax(_TORN * np.nanmedian(fit.rms), _STEADY))
     known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
     off = np.where(known[..., None], seen - _placed(hand, shift, places), 0.0).sum(axis=1)
     off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers move it, and cannot turn it
@@ -104,11 +104,6 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
         rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation),
         markers=names,
     )
-
-
-def _usual(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else 0.0
 
 
 def _reach(hand: Hand, places: np.ndarray) -> float:
@@ -125,11 +120,8 @@ def _placed(hand: Hand, shift: np.ndarray, places: np.ndarray) -> np.ndarray:
 def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
     """(3,) m, upwards: by what the motion stands too low for the markers, as far as their distances from the wrist tell:
     those of the hand's own markers do not change."""
-    often = np.count_nonzero(trial.seen[:: max(len(trial) // 300, 1)], axis=0) > 2
-    kept = [number for number, label in enumerate(trial.labels) if label not in never and often[number]]
+    kept = [number for number, label in enumerate(trial.labels) if label not in never]
     few = trial.positions[:: max(len(trial) // 300, 1), kept]
-    if not kept:
-        return np.zeros(3)
     origin = hand.origin[:: max(len(trial) // 300, 1), None, :]
     near = np.flatnonzero(np.nanmedian(np.linalg.norm(few[..., :2] - origin[..., :2], axis=-1), axis=0) < NEAR)
     best, found = np.inf, 0.0
@@ -147,7 +139,7 @@ def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple
     kept = []
     for number, label in enumerate(trial.labels):
         known = np.isfinite(away[:, number])
-        if label in never or np.count_nonzero(known) < max(0.3 * len(trial), 1):
+        if label in never or np.count_nonzero(known) < 0.3 * len(trial):
             continue
         distance = away[known, number]
         spread = np.subtract(*np.percentile(distance, [90, 10]))

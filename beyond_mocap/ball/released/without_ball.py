@@ -31,8 +31,8 @@ SPEED_SIGMA = 0.06
 """Of the speed, one standard deviation."""
 TIME_SIGMA = 0.004
 """Seconds, one standard deviation, in a fast throw; slower ones have more, as they roll longer."""
-PAD = 0.91
-"""Of the way from wrist to fingertip: where the fingers' pads push, each joint bent by some 25 degrees."""
+PAD = 0.93
+"""Of the way from wrist to fingertip: where the fingers' pads push, the fingers bent a little."""
 HOLD = 0.70
 """Of the way from wrist to fingertip: where the ball's centre is while it is gripped."""
 ROLLS_WITH = 2.0 / 7.0

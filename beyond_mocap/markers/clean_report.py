@@ -1,0 +1,84 @@
+"""What the clean-up of a trial did, marker by marker, and in lines for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+
+from ..errors import TimedLine
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Something that was found between two moments.
+
+    labels: the markers concerned. start, end: seconds on the trial's clock, the first frame and the last. frames: how
+    many. how: what was done, in a word; "" where nothing could be. off: m, how far off its place it was.
+    """
+
+    labels: tuple[str, ...]
+    start: float
+    end: float
+    frames: int
+    how: str = ""
+    off: float = 0.0
+
+    def when(self) -> str:
+        """`at 1.234 s` or `1.234 to 1.300 s`."""
+        return f"at {self.start:.3f} s" if self.frames == 1 else f"{self.start:.3f} to {self.end:.3f} s"
+
+
+@dataclass(frozen=True)
+class CleanReport:
+    """What was found and done.
+
+    seen: label -> share of the frames in which the recording sees it. gaps: what was filled; how is "cluster", "soft"
+    or "spline". left: gaps that stay. swaps: how is "mended" or ""; the labels stand in pairs. jumps: samples taken out
+    (filled again where a gap is). assigned: (unlabeled marker, label). strayed: markers that stay far from where their
+    cluster says. unnamed: unlabeled markers that remain, with the share of frames.
+    """
+
+    seen: Mapping[str, float] = field(default_factory=dict)
+    gaps: tuple[Stretch, ...] = ()
+    left: tuple[Stretch, ...] = ()
+    swaps: tuple[Stretch, ...] = ()
+    jumps: tuple[Stretch, ...] = ()
+    assigned: tuple[Stretch, ...] = ()
+    strayed: tuple[Stretch, ...] = ()
+    unnamed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What people should know, the gravest first; each line knows its seconds (`errors.spans_of`)."""
+        return (
+            *(_swapped(swap) for swap in self.swaps),
+            *(_timed(f"{one.labels[0]} taken for {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
+            *_by_label(self.jumps, "samples that jump taken out"),
+            *_by_label(self.strayed, "frames far from where the markers around it say"),
+            *_by_label(self.left, "frames not seen and left open"),
+            *_by_label(self.gaps, "frames not seen and filled"),
+        )
+
+    def as_dict(self) -> dict:
+        """The report as plain values, for JSON."""
+        return asdict(self) | {"lines": list(self.lines)}
+
+
+def _swapped(swap):
+    pairs = ", ".join(f"{a} and {b}" for a, b in zip(swap.labels[::2], swap.labels[1::2]))
+    done = "exchanged, mended" if swap.how else "seem exchanged, not mended: nothing around them tells"
+    return _timed(f"{pairs} {done} {swap.when()}", [swap])
+
+
+def _by_label(stretches, what):
+    """One line for each label."""
+    labels = dict.fromkeys(stretch.labels[0] for stretch in stretches)
+    for label in labels:
+        own = [stretch for stretch in stretches if stretch.labels[0] == label]
+        count = sum(stretch.frames for stretch in own)
+        shown = ", ".join(stretch.when() for stretch in own[:3]) + (f" and {len(own) - 3} more" if len(own) > 3 else "")
+        yield _timed(f"{label}: {count} {what if count != 1 else what.replace('frames', 'frame')}: {shown}", own)
+
+
+def _timed(text, stretches):
+    return TimedLine(text, *((stretch.start, stretch.end) for stretch in stretches))
