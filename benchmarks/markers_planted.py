@@ -23,6 +23,8 @@ from benchmarks.places import CMU_UNIT, DATA
 CLIPS = {
     "walk": "cmu10/test_walking_1.bvh", "run": "cmu10/test_running_1.bvh", "kick": "cmu10/10_01.bvh",
     "basketball": "cmu10/train_basketball_1.bvh", "pitch": "cmu_pitch/124_01.bvh",
+    "run, LAFAN1": "lafan1/fallAndGetUp1_subject4_run_filtered.bvh",
+    "kick, LMD": "lmd/Player1/P1_S01_penalty_kick.bvh",
 }  # fmt: skip
 SHIPPED = {"lower_body": "plug_in_gait_legs"}
 """Planted set -> the shipped one that describes it, where the names differ."""
@@ -30,6 +32,8 @@ TRIED = (
     ("walk", "plug_in_gait"), ("walk", "driveline"), ("walk", "sprinter"), ("walk", "full"), ("walk", "lower_body"),
     ("run", "plug_in_gait"), ("run", "sprinter"), ("kick", "plug_in_gait"), ("basketball", "driveline"),
     ("pitch", "driveline"), ("pitch", "plug_in_gait"), ("throw", "driveline"), ("throw", "full"),
+    ("run, LAFAN1", "driveline"), ("run, LAFAN1", "plug_in_gait"), ("kick, LMD", "driveline"),
+    ("kick, LMD", "plug_in_gait"),
 )
 SPOILED = (("walk", "plug_in_gait"), ("basketball", "driveline"), ("pitch", "driveline"), ("run", "sprinter"))
 TIMED = (("throw", "full"), ("pitch", "driveline"), ("basketball", "plug_in_gait"), ("run", "sprinter"))
@@ -41,7 +45,8 @@ def clip(name: str) -> Motion:
     """A recording, or the made throw at 30 m/s."""
     if name == "throw":
         return throw(speed=30.0, fps=200.0).motion
-    return bvh.read(DATA / "mocap" / CLIPS[name], unit=CMU_UNIT).motion
+    unit = CMU_UNIT if CLIPS[name].startswith("cmu") else None
+    return bvh.read(DATA / "mocap" / CLIPS[name], unit=unit).motion
 
 
 def settings(planted_set: str, **others) -> ReconstructSettings:

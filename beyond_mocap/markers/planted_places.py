@@ -16,6 +16,7 @@ import numpy as np
 from ..motion.skeleton import Skeleton
 from .planted_body import adult_share
 
+_FOOT = (0.133, 0.0, -0.054)  # m from an adult's ankle to the toe joint
 _HEEL = 0.034  # m by which a heel's marker lies below the ankle, at least
 _DEPTH, _TILT = 0.62, np.radians(9.0)  # of a pelvis: depth in widths; how much lower its front spines lie
 
@@ -192,8 +193,10 @@ def _at(skeleton: Skeleton, label: str, place: Place, side: str, size: float) ->
 
 
 def _bone(skeleton: Skeleton, name: str) -> np.ndarray:
-    """From its parent to a joint (3,), at rest; nothing where there is no such joint."""
-    return skeleton.offsets[skeleton.index(name)] if name in skeleton.names else np.zeros(3)
+    """From its parent to a joint (3,), at rest; nothing where there is no such joint, a usual foot without toes."""
+    if name in skeleton.names:
+        return skeleton.offsets[skeleton.index(name)]
+    return np.array(_FOOT) * adult_share(skeleton) if name.endswith("ToeBase") else np.zeros(3)
 
 
 def _shoulders(skeleton: Skeleton) -> np.ndarray:
