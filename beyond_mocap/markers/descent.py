@@ -46,8 +46,9 @@ class HeldPoint:
 class Task:
     """What F poses are to come near to.
 
-    seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. lean: poses to be drawn to instead of the rest pose, or
-    None. point: a held point, or None. drawn: (J, 3) m per radian, how strongly (in place of the chain's stiffness).
+    seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. drawn: (J, 3) m per radian, how strongly a joint is drawn
+    to its rest pose (in place of the chain's stiffness). lean: poses to be drawn to besides, or None; leaning: (J, F) m
+    per radian, how strongly. point: a held point, or None.
     even: m per radian, how strongly the joints of a run (`Chain.runs`) are held to turn alike.
     """
 
@@ -56,6 +57,7 @@ class Task:
     weights: np.ndarray
     drawn: np.ndarray
     lean: Poses | None = None
+    leaning: np.ndarray | None = None
     point: HeldPoint | None = None
     even: float = 0.0
 
@@ -64,6 +66,7 @@ class Task:
         return replace(
             self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
             lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
+            leaning=None if self.leaning is None else self.leaning[:, chosen],
         )
 
 
@@ -87,6 +90,7 @@ class _State:
     away: np.ndarray
     bend: np.ndarray
     uneven: np.ndarray
+    gone: np.ndarray
     cost: np.ndarray
 
     def take(self, other: "_State", where: np.ndarray) -> None:
@@ -98,12 +102,12 @@ class _State:
         """These frames only."""
         at = self.poses.frames(chosen)
         placed = Placed(at.root, *(a[..., chosen] for a in (self.placed.world, self.placed.joints, self.placed.markers)))
-        more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.cost))
+        more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.gone, self.cost))
         return _State(at, placed, *more)
 
     def _arrays(self):
         at, put = self.poses, self.placed
-        return at.root, at.local, at.angles, put.world, put.joints, put.markers, self.away, self.bend, self.uneven, self.cost
+        return at.root, at.local, at.angles, put.world, put.joints, put.markers, self.away, self.bend, self.uneven, self.gone, self.cost
 
 
 def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
@@ -146,24 +150,33 @@ def _state(task: Task, at: Poses) -> _State:
     """Poses and what follows from them."""
     placed = place(task.chain, at)
     away = placed.markers + (at.root - task.seen)
-    bend, uneven = _bend(task, at), _uneven(task, at)
+    bend, uneven, gone = _bend(task.chain, at), _uneven(task, at), _gone(task, at)
     cost = np.einsum("mf,maf,maf->f", task.weights, away, away)
     cost += np.einsum("ja,jaf,jaf->f", task.drawn**2, bend, bend)
     cost += task.even**2 * np.einsum("jaf,jaf->f", uneven[:, 0], uneven[:, 0])
+    if task.lean is not None:
+        cost += np.einsum("jf,jaf,jaf->f", task.leaning**2, gone, gone)
     if task.point:
         cost += task.point.weight * _distance(task.point, placed)[2] ** 2
-    return _State(at, placed, away, bend, uneven, 0.5 * cost)
+    return _State(at, placed, away, bend, uneven, gone, 0.5 * cost)
 
 
-def _bend(task: Task, at: Poses) -> np.ndarray:
-    """How far (J, 3, F) rad each joint is turned from where it is drawn to: as a rotation vector, a hinge as angles."""
-    if task.lean is None:
-        bend = logarithm(at.local)
-    else:
-        bend = logarithm(multiply(at.local, task.lean.local * _BACK))
-    for joint in task.chain.hinges:
-        bend[joint] = at.angles[joint] - (0.0 if task.lean is None else task.lean.angles[joint])
+def _bend(chain: Chain, at: Poses) -> np.ndarray:
+    """How far (J, 3, F) rad each joint is turned from rest: as a rotation vector, a hinge as angles."""
+    bend = logarithm(at.local)
+    for joint in chain.hinges:
+        bend[joint] = at.angles[joint]
     return bend
+
+
+def _gone(task: Task, at: Poses) -> np.ndarray:
+    """How far (J, 3, F) rad each joint is turned from where it leans to, in the same form; nothing without."""
+    if task.lean is None:
+        return np.zeros((0, 3, at.root.shape[-1]))
+    gone = logarithm(multiply(at.local, task.lean.local * _BACK))
+    for joint in task.chain.hinges:
+        gone[joint] = at.angles[joint] - task.lean.angles[joint]
+    return gone
 
 
 def _uneven(task: Task, at: Poses) -> np.ndarray:
@@ -239,9 +252,13 @@ def _drawn(task: Task, best: _State) -> elimination.Own:
     strength = task.drawn**2
     curvature = np.zeros((len(strength), 3, 3, best.cost.shape[-1]))
     pull = strength[..., None] * best.bend
+    fixed = ~task.chain.free
     spread = [joint for run in task.chain.runs for joint in run]
     pull[spread] += task.even**2 * best.uneven[:, 1]
+    if task.lean is not None:
+        pull += task.leaning[:, None] ** 2 * best.gone
     for axis in range(3):
-        curvature[:, axis, axis] = strength[:, axis, None]
+        curvature[:, axis, axis] = strength[:, axis, None] + (0.0 if task.lean is None else task.leaning**2)
         curvature[spread, axis, axis] += task.even**2
+    pull[fixed] = 0.0
     return elimination.Own(curvature, pull)

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import Cancelled, InputError
-from ..motion import quaternion
 from ..motion.motion import Motion
 from . import weights as marker_weights
-from .chain import Chain, Poses, chain, place, poses
+from .chain import Chain, Poses, chain, place
 from .descent import HeldPoint, Task, descend
 from .frames import placed as carried
 from .frames import rigid_fit
 from .start import first_poses
+from .untold import between, missing
 
 _CHUNK = 512
 _COARSE_SECONDS = 1.0 / 60.0
@@ -27,6 +27,7 @@ _ENOUGH = 0.3  # part of the markers that a frame must show to be solved
 _FEWEST = 4
 _DEAR, _FAR = 1.5, np.radians(40.0)  # a start is doubted that costs so many times its neighbour, or turns a joint so far
 _EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
+_LEANING = 0.02  # m per radian: how strongly a joint that misses markers leans on how it stands before and after
 _LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
 
 
@@ -137,6 +138,7 @@ class _Solving:
         self.held = np.zeros((count, len(seen)), dtype=bool)
         self.drawn = np.maximum(chain.stiffness, _LEAST_STIFFNESS)
         self.drawn[0] = 0.0
+        self.missing = missing(chain, self.there)
         self.notes: list[str] = []
         self.work_done, self.work = 0, 1
 
@@ -158,19 +160,31 @@ class _Solving:
         for source, frames in ((coarse[:-1], coarse[1:]), (coarse[1:], coarse[:-1])):
             doubtful = self._doubtful(frames, source)
             self._better_from(source[doubtful], frames[doubtful])
-        between = np.setdiff1d(known, coarse)
-        if len(between):
-            self._solve(between, self._interpolated(between, coarse))
+        unsure = np.flatnonzero(self.missing[coarse].any(axis=1))
+        if len(unsure):
+            self._solve_between(coarse[unsure], coarse)
+        others = np.setdiff1d(known, coarse)
+        if len(others):
+            self._solve_between(others, coarse)
         self._fill(known)
 
-    def _task(self, frames: np.ndarray, lean: Poses | None = None) -> Task:
+    def _solve_between(self, frames: np.ndarray, known: np.ndarray) -> None:
+        """Solve frames from how those beside them stand; joints that miss markers lean on it."""
+        start, some = between(self.chain, self.poses, known, ~self.missing[known], frames)
+        leaning = np.where(self.missing[frames].T & some[:, None], _LEANING, 0.0)
+        for part in self._chunks(frames):
+            here = frames[part]
+            lean = start.frames(part) if leaning[:, part].any() else None
+            self._keep(here, descend(self._task(here, lean, leaning[:, part]), start.frames(part)))
+
+    def _task(self, frames: np.ndarray, lean: Poses | None = None, leaning: np.ndarray | None = None) -> Task:
         """What these frames are to come near to."""
         point, ball = None, self.settings.ball
         if ball is not None:
             there = np.isfinite(ball.seen).all(axis=-1) & ball.held
             point = HeldPoint(self.chain.skeleton.index(ball.joint), np.asarray(ball.centre, dtype=float), ball.radius,
                               np.where(there[:, None], ball.seen, 0.0)[frames].T, ball.weight * there[frames])
-        return Task(self.chain, self.seen[..., frames], self.weights[frames].T, self.drawn, lean, point, _EVEN)
+        return Task(self.chain, self.seen[..., frames], self.weights[frames].T, self.drawn, lean, leaning, point, _EVEN)
 
     def _chunks(self, frames: np.ndarray):
         """Slices of a list of frames, with a look at the clock between."""
@@ -212,22 +226,12 @@ class _Solving:
                 self.cost[chosen], self.held[:, chosen] = arrived.cost[better], arrived.held[:, better]
             self.steps[frames[part]] += arrived.steps
 
-    def _interpolated(self, frames: np.ndarray, known: np.ndarray) -> Poses:
-        """Poses between the known frames; before the first and after the last, theirs."""
-        after = np.clip(np.searchsorted(known, frames), 1, max(len(known) - 1, 1)) if len(known) > 1 else np.zeros(len(frames), int)
-        before = np.maximum(after - 1, 0)
-        low, high = known[before], known[after]
-        part = np.clip((frames - low) / np.maximum(high - low, 1), 0.0, 1.0)
-        a, b = self.poses.frames(low), self.poses.frames(high)
-        local = quaternion.slerp(np.moveaxis(a.local, 1, -1), np.moveaxis(b.local, 1, -1), part)
-        root = a.root + part * (b.root - a.root)
-        return poses(self.chain, root.T, np.moveaxis(local, 1, 0))
-
     def _fill(self, known: np.ndarray) -> None:
         """Frames with hardly any markers lie between those beside them."""
         blind = np.setdiff1d(np.arange(len(self.cost)), known)
         if len(blind):
-            self.poses.put(blind, self._interpolated(blind, known))
+            told = np.ones((len(known), len(self.chain.skeleton)), dtype=bool)
+            self.poses.put(blind, between(self.chain, self.poses, known, told, blind)[0])
             self.notes.append(f"{len(blind)} of {len(self.cost)} frames show too few markers and are interpolated")
 
     def result(self, seconds: float) -> Solved:

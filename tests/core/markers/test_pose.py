@@ -126,3 +126,15 @@ def test_a_spine_that_is_too_long_does_not_flip(run):
     assert turned.max() < 3.0
     vectors = np.degrees(quaternion.to_rotation_vector(solved.motion.rotations[:, spine]))
     assert np.linalg.norm(vectors - vectors.mean(axis=1, keepdims=True), axis=-1).max() < 20.0
+
+
+def test_a_joint_whose_markers_are_hidden_goes_on_between_its_neighbours(run):
+    positions = run.trial.positions.copy()
+    hidden = [index for index, label in enumerate(run.trial.labels) if run.segments[label] in ("LeftForeArm", "LeftHand")]
+    positions[60:75, hidden] = np.nan
+    solved = solve(model_of(run), replace(run.trial, positions=positions))
+    errors = world_errors(run, solved, "LeftForeArm")[:, 0]
+    assert errors[60:75].max() < 15.0 and errors[:58].max() < 1.0 and errors[77:].max() < 1.0
+    arm = solved.motion.rotations[58:78, run.motion.skeleton.index("LeftForeArm")]
+    steps = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(arm[:-1]), arm[1:]))
+    assert np.degrees(np.linalg.norm(steps, axis=-1)).max() < 6.0
