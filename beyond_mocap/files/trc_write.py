@@ -10,6 +10,8 @@ import numpy as np
 from ..markers.trial import MarkerTrial
 from .whole import atomic_write
 
+_PLACE = "%.4f\t%.4f\t%.4f"
+
 
 def write_trc(trial: MarkerTrial, path: str | os.PathLike) -> None:
     """Write a trial; cells of markers that are not seen stay empty. InputError where it cannot be written."""
@@ -29,10 +31,13 @@ def trc_text(trial: MarkerTrial, name: str = "") -> str:
         "",
     ]
     places = 1000.0 * trial.positions[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
-    rows = [_row(i, seconds, frame) for i, (seconds, frame) in enumerate(zip(trial.seconds, places), 1)]
+    rows = [f"{i}\t{seconds:.7f}\t{_cells(frame, seen)}"
+            for i, (seconds, frame, seen) in enumerate(zip(trial.seconds, places, trial.seen), 1)]  # fmt: skip
     return "\n".join([*head, *rows, ""])
 
 
-def _row(number: int, seconds: float, places: np.ndarray) -> str:
-    cells = (f"{value:.4f}" if np.isfinite(place).all() else "" for place in places for value in place)
-    return f"{number}\t{seconds:.7f}\t" + "\t".join(cells)
+def _cells(places: np.ndarray, seen: np.ndarray) -> str:
+    """One frame's (M, 3) places in millimetres; empty cells where a marker is not seen."""
+    if seen.all():
+        return "\t".join([_PLACE] * len(seen)) % tuple(places.ravel().tolist())
+    return "\t".join(_PLACE % tuple(place) if there else "\t\t" for place, there in zip(places.tolist(), seen))
