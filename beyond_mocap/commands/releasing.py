@@ -29,7 +29,6 @@ def add(verbs):
     verb.add_argument("--ball-csv", type=Path, metavar="B.csv", help="the ball's way over the whole trial")
     verb.add_argument("--unit", metavar="UNIT", help="of the markers: metres per unit, or mm, cm, m, in")
     verb.add_argument("--subject", metavar="NAME", help="whose markers, where there are several bodies in the file")
-    verb.add_argument("--up", metavar="AXIS", help="of the markers' file that points up: X, Y, Z or --up=-Y; default: found")
     verb.set_defaults(run=run)
     return verb
 
@@ -43,7 +42,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
     begun = time.perf_counter()
     check_outputs(options.report, options.ball_csv, never=(options.trial, options.motion))
-    trial = read_markers(options.trial, options.unit, options.subject, options.up)
+    trial = read_markers(options.trial, options.unit, options.subject)
     motion = bvh.read(options.motion).motion
     loaded = time.perf_counter()
     settings = ReleaseSettings(options.ball_marker, options.radius, options.hand, options.ball_kind)

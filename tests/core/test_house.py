@@ -36,7 +36,7 @@ ROOMS = {
     "polish": ["motion"],
     "ball": ["motion", "annotation", "library", "polish", "markers.trial", "markers.frames"],
     "stream": ["motion", "files", "ball"],
-    "evaluation": ["motion", "annotation", "plan", "take", "ball", "library"],
+    "evaluation": ["motion", "annotation", "plan", "take", "ball", "library", "markers"],
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
 LAZY = {

@@ -1,0 +1,274 @@
+"""The verb `reconstruct`: optical markers become a moving skeleton, of one trial or of a folder of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .numbers import between, positive
+from .outputs import Writer, check_outputs, writer_of
+from .told import Told
+
+_MOST_LINES = 12
+_FILTERS = ("butterworth", "kalman", "none")  # reconstruct.FILTERS, which takes long to import
+
+
+def add(verbs):
+    """The verb's parser."""
+    verb = verbs.add_parser("reconstruct", help="optical markers (.c3d, .trc) become a moving skeleton")
+    verb.add_argument("trial", type=Path, metavar="TRIAL", help="a recording of markers, or a folder of them")
+    verb.add_argument("--static", type=Path, metavar="STATIC", help="the same markers on the same standing body")
+    verb.add_argument("--model", type=Path, metavar="MODEL.json", help="a model made before; then no --static")
+    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh", help="for a folder of trials: a folder")
+    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.add_argument("--save-model", type=Path, metavar="MODEL.json")
+    _add_reading(verb)
+    _add_posing(verb)
+    _add_ball(verb)
+    _add_library(verb)
+    verb.set_defaults(run=run)
+    return verb
+
+
+def _add_reading(verb) -> None:
+    verb.add_argument("--marker-set", metavar="FILE|NAME", help="whose markers these are; default: what fits")
+    verb.add_argument("--subject", metavar="NAME", help="whose markers, where a file holds several bodies")
+    verb.add_argument("--unit", metavar="UNIT", help="of the files: m, cm, mm, in; default: as they say")
+    verb.add_argument("--up", metavar="AXIS", help="of the files that points up: X, Y, Z or --up=-Y; default: found")
+    faster = partial(between, low=1.0, high=20000.0, expected="1 to 20000 frames per second")
+    verb.add_argument("--fps", type=faster, metavar="RATE", help="of the trial, where its file says something else")
+
+
+def _add_posing(verb) -> None:
+    verb.add_argument("--filter", choices=_FILTERS, default="butterworth")
+    verb.add_argument("--cutoff", type=partial(between, low=0.1, high=1000.0, expected="0.1 to 1000 hertz"),
+                      default=13.4, metavar="HERTZ", help="of the filter; default 13.4")  # fmt: skip
+    verb.add_argument("--no-plant", action="store_true", help="do not hold standing feet")
+    verb.add_argument("--no-limits", action="store_true", help="joints may turn as far as they like")
+    verb.add_argument("--no-weights", action="store_true", help="all markers count alike")
+    verb.add_argument("--smoothness", type=partial(between, low=0.0, high=1e6, expected="0 or more"), default=0.0,
+                      metavar="NUMBER", help="solve the whole sequence as one that moves smoothly; default 0")  # fmt: skip
+
+
+def _add_ball(verb) -> None:
+    from ..ball.physics import THROWN
+
+    small = partial(between, low=0.005, high=0.5, expected="0.005 to 0.5 metres")
+    verb.add_argument("--ball-radius", type=small, metavar="METRES", help="of a ball that carries a marker")
+    verb.add_argument("--ball-kind", choices=tuple(THROWN), default="baseball")
+    verb.add_argument("--hold-ball", action="store_true", help="its marker takes part in the pose until the release")
+    verb.add_argument("--release", choices=("auto", "yes", "no"), default="auto", help="look for a throw's release")
+
+
+def _add_library(verb) -> None:
+    verb.add_argument("--add-to", type=Path, metavar="LIBRARY", help="adds the motion to a library as NAME.bvh")
+    verb.add_argument("--words", nargs="+", default=[], metavar="WORD", help="its annotation; a throw's key: release")
+
+
+def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`reconstruct`: of one trial, or of all in a folder."""
+    if options.model and options.static:
+        raise InputError("--model", "with --static", "one of them", "leave one out")
+    if options.words and not options.add_to:
+        raise InputError("--words", "without --add-to", "both", "add --add-to LIBRARY")
+    if options.trial.is_dir():
+        _run_folder(options, told)
+    else:
+        _run_one(options, told, writers)
+
+
+def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    from ..files.model_json import write_model
+    from ..files.tables import write_report
+    from ..reconstruct import reconstruct
+
+    begun = time.perf_counter()
+    inputs = (options.trial, options.static, options.model)
+    check_outputs(options.out, options.report, options.save_model, never=inputs)
+    write = writer_of(options.out, writers)
+    if options.add_to:
+        from ..library.add_clip import free_place
+
+        check_outputs(options.out, free_place(options.add_to, options.trial.stem))
+    settings = settings_of(options)
+    trial = read_trial(options.trial, options)
+    static = None if options.static is None else read_trial(options.static, options)
+    model = None if options.model is None else _model(options.model)
+    loaded = time.perf_counter()
+    try:
+        made = reconstruct(trial, static, model, settings, told.progress, told.cancelled)
+    except InputError as error:
+        raise _with_file(error, options) from None
+    made.seconds.update(load=loaded - begun, total=time.perf_counter() - begun)
+    if options.report:
+        write_report(options.report, made.report())
+    write(as_take(made), options.out)
+    if options.save_model:
+        write_model(made.model, options.save_model)
+    notes = add_to_library(made, options.trial, options) if options.add_to else []
+    told.end()
+    lines = [f"{options.trial}: {line}" for line in (*trial.notes, *made.warnings)]
+    _tell(told, lines, options.report)
+    for note in notes:
+        told.note(note)
+    print(f"{options.out}: {summary(made)}")
+
+
+def _tell(told: Told, lines: list[str], report: Path | None) -> None:
+    """The first of many lines; all of them are in the report."""
+    for line in lines[:_MOST_LINES]:
+        told.note(line)
+    if len(lines) > _MOST_LINES:
+        more = len(lines) - _MOST_LINES
+        told.note(f"{more} more lines: {f'see {report}' if report else '--report R.json writes them'}")
+
+
+def _run_folder(options, told: Told) -> None:
+    """All trials of a folder: NAME.bvh, NAME.report.json and, where a static has made one, NAME.model.json each, and
+    trials.json and report.html over all."""
+    from ..reconstruct_folder import reconstruct_folder
+
+    for name in ("static", "report", "save_model"):
+        if getattr(options, name):
+            raise InputError(f"--{name.replace('_', '-')}", "with a folder of trials", "one trial",
+                             "leave it out: statics are found, and each trial gets its own report")  # fmt: skip
+    _check_folder(options.out, options.trial)
+    model = None if options.model is None else _model(options.model)
+    read = partial(read_trial, options=options)
+    rows = []
+    for made in reconstruct_folder(options.trial, read, settings_of(options), model, told.progress, told.cancelled):
+        rows.append(_kept(made, options))
+        told.end()
+        print(rows[-1]["line"])
+    _write_overview(rows, options, told)
+    if not any(row["bvh"] for row in rows):
+        raise InputError(options.trial, "none of its trials could be made", "at least one", rows[0]["line"])
+
+
+def _check_folder(out: Path, trials: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise InputError(out, "is a file", "a folder, as the trials are one", "choose another name")
+    if out.resolve() == trials.resolve():
+        raise InputError(out, "is the folder of the trials", "another one", "choose another folder")
+    if not out.exists():
+        check_outputs(out)
+        out.mkdir()
+
+
+def _kept(made, options) -> dict:
+    """Writes what became of one trial; its row of trials.json."""
+    from ..files import bvh
+    from ..files.model_json import write_model
+    from ..files.tables import write_report
+
+    name = made.recording.name
+    row = {"trial": name, "file": str(made.recording.path), "session": made.recording.session, "error": made.error,
+           "static": made.static and made.static.name, "bvh": "", "report": ""}  # fmt: skip
+    if made.made is None:
+        return {**row, "line": f"{name}: {made.error}"}
+    place = options.out / name
+    place.parent.mkdir(parents=True, exist_ok=True)
+    bvh.write(place.parent / f"{place.name}.bvh", made.made.motion)
+    write_report(place.parent / f"{place.name}.report.json", made.made.report())
+    write_model(made.made.model, place.parent / f"{place.name}.model.json")
+    notes = add_to_library(made.made, made.recording.path, options) if options.add_to else []
+    return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": made.made.model.subject,
+            "line": "; ".join([f"{name}: {summary(made.made)}", *notes])}  # fmt: skip
+
+
+def _write_overview(rows, options, told: Told) -> None:
+    """trials.json, and report.html where matplotlib is there to draw it."""
+    from ..evaluation.plots import require_matplotlib
+    from ..evaluation.trials import trials_report
+    from ..files.tables import write_report
+    from ..files.whole import atomic_write
+
+    write_report(options.out / "trials.json", {"trials": rows})
+    try:
+        require_matplotlib()
+    except InputError as error:
+        told.note(f"{options.out / 'report.html'} was not written: {error}")
+        return
+    atomic_write(options.out / "report.html", trials_report(options.out))
+
+
+def settings_of(options):
+    """The recipe's settings."""
+    from ..files.marker_set_text import chosen_set
+    from ..reconstruct import ReconstructSettings
+
+    release = "yes" if _is_throw(options.words) and options.release == "auto" else options.release
+    return ReconstructSettings(
+        marker_set=options.marker_set and chosen_set(options.marker_set), weights=not options.no_weights, limits=not options.no_limits,
+        smoothness=options.smoothness, filter=options.filter, cutoff=options.cutoff, plant=not options.no_plant,
+        radius=options.ball_radius, hold_ball=options.hold_ball, ball=options.ball_kind,
+        release=release,
+    )  # fmt: skip
+
+
+def read_trial(path: Path, options):
+    """A recording, at the rate that was asked for."""
+    from ..files.marker_files import read_markers
+
+    trial = read_markers(path, unit=options.unit, subject=options.subject, up=options.up)
+    return replace(trial, fps=options.fps) if options.fps else trial
+
+
+def _model(path: Path):
+    from ..files.model_json import read_model
+
+    return read_model(path)
+
+
+def _with_file(error: InputError, options) -> InputError:
+    """The same error, told with its file: trials know only the file's name."""
+    for path in (options.trial, options.static):
+        if path is not None and error.where == path.stem:
+            return InputError(path, str(error).split(": ", 1)[1])
+    return error if error.where.startswith("--") else InputError(options.trial, str(error))
+
+
+def as_take(made):
+    """The reconstruction as a take, for those who write takes: Blender's formats too."""
+    from ..annotation import Timeline
+    from ..motion.contacts import points
+    from ..take import Take
+
+    count = len(made.motion)
+    try:
+        contacts = points(made.motion).all(axis=2)
+    except InputError:  # no legs
+        contacts = np.zeros((count, 2), bool)
+    return Take(
+        motion=made.motion, start_time=made.trial.start, clips=(made.raw.name,), clip=np.zeros(count, int),
+        clip_frame=np.arange(count, dtype=float), mirrored=np.zeros(count, bool), words=((),) * count,
+        contacts=contacts, seams=np.zeros(0, int), timeline=Timeline(), keys=(),
+        ball=None if made.release is None else made.release.path, method="reconstruct", seed=0, warnings=made.warnings,
+    )  # fmt: skip
+
+
+def summary(made) -> str:
+    """What came out, in a line."""
+    residual = made.solved.residual[np.isfinite(made.solved.residual)]
+    near = f", markers {1000.0 * np.mean(residual):.1f} mm off" if len(residual) else ""
+    return f"{len(made.motion)} frames, {made.motion.duration:.1f} s, {len(made.model.markers)} markers{near}"
+
+
+def _is_throw(words) -> bool:
+    return any(word.startswith("throw") for word in words)
+
+
+def add_to_library(made, trial: Path, options) -> list[str]:
+    """The motion as a clip of a library, a throw's words at its release; notes for people."""
+    from ..library.add_clip import add_clip
+
+    key = None
+    if _is_throw(options.words) and made.release is not None:
+        key = made.release.frame / made.motion.fps
+    return add_clip(options.add_to, trial.stem, made.motion, options.words, key)

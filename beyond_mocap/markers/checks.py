@@ -1,0 +1,177 @@
+"""What no fitting can mend, told apart before it begins: mirrored markers, exchanged sides, somebody else's static,
+nobody there.
+
+Skin lets two markers of a segment come nearer and go apart by a centimetre, but their usual distance stays: in 21
+comparisons between recordings of different bodies a third to nine tenths of the distances within segments differed by
+more than 15 mm, between a static and a walk of the same body none, between a static and a sprint at most a fifth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ..errors import InputError, TimedLine
+from ..motion.runs import runs
+from .marker_set import UNLABELED
+from .model import MarkerModel
+from .trial import MarkerTrial
+from .upright import handedness
+
+_MIRRORED = -0.5
+_OFF = 0.012  # metres by which a distance may differ, beside half of what it does in the trial itself
+_OTHER_BODY, _SOME = 0.25, 0.1  # shares of distances that are off: another body's; markers that were put on anew
+_LACKING = 0.3  # of the trial's markers that a static may lack
+_FEW = 4  # distances that are too few to tell
+_EMPTY_SECONDS, _EMPTY_SHARE = 0.1, 0.2  # from when on a stretch with so few markers is told
+
+
+def check(
+    trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str, Sequence[str]],
+    model: MarkerModel | None = None,
+) -> tuple[str, ...]:
+    """Lines on what is odd about a trial and its static, or model; InputError where no skeleton can come of it.
+
+    clusters: segment -> labels. static, model: either may be missing. Raises where markers are mirrored or left and right
+    exchanged, where static or model are of another body, and where no marker is seen at all.
+    """
+    labels = [label for group in clusters.values() for label in group if label in trial.labels]
+    body = trial.only(labels)
+    if not body.seen.any():
+        raise InputError(trial.name, "none of its body's markers is seen", "a recording of a body", "choose another file")
+    _check_sides(body, static, clusters)
+    lines = list(_empty(body))
+    if static is not None:
+        lines += _complete(body, static)
+        lines += _same_body(body, _Usual(static), clusters, static.name, "the static")
+    elif model is not None:
+        lines += _same_body(body, _of_model(model), clusters, model.subject or "the model", "the model")
+    return tuple(lines)
+
+
+def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
+    """A line on the trial's markers that the static lacks; InputError where these are most."""
+    lacking = [label for label in trial.labels if label not in static.labels]
+    if not lacking:
+        return []
+    told = some(lacking)
+    if len(lacking) > _LACKING * len(trial.labels):
+        raise InputError(
+            static.name, f"has {len(trial.labels) - len(lacking)} of the trial's {len(trial.labels)} markers, not {told}",
+            "a static trial with the trial's markers", "choose another, or go without",
+        )
+    return [f"{static.name} lacks {told}: where these lie is told by the motion"]
+
+
+def some(labels: Sequence[str]) -> str:
+    """The first of many labels."""
+    return ", ".join(labels[:6]) + (f" and {len(labels) - 6} more" if len(labels) > 6 else "")
+
+
+def unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], others: Sequence[str] = ()) -> list[str]:
+    """A line on the named markers that lie on no segment; others: those known to be on no body."""
+    known = {label for group in clusters.values() for label in group} | set(others)
+    left = [label for label in trial.labels if label not in known and not UNLABELED.match(label)]
+    return [f"{len(left)} markers of no segment are not used: {some(left)}"] if left else []
+
+
+def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:
+    mirrored = {one.name: handedness(one.labels, one.positions) < _MIRRORED for one in (trial, static) if one is not None}
+    if not any(mirrored.values()):
+        return
+    name = next(name for name, is_so in mirrored.items() if is_so)
+    found, step = "left and right are exchanged", "exchange the labels, or the coordinates' left and right"
+    if len(mirrored) == 2 and not all(mirrored.values()):
+        good, bad = (static, trial) if mirrored[trial.name] else (trial, static)
+        if _crossed(bad, good, clusters):
+            found, step = "left and right labels are exchanged", "exchange L and R in its labels"
+        else:
+            found, step = "its coordinates are mirrored", "read it with its axes right-handed"
+    raise InputError(name, f"the body stands mirrored: {found}", "a right-handed recording, left labels on the left", step)
+
+
+def _crossed(bad: MarkerTrial, good: MarkerTrial, clusters) -> bool:
+    """Whether the bad one's left segments have the shape of the good one's right ones rather than of its left ones."""
+    mine, own = _Usual(bad), _Usual(good)
+    straight, crossed = [], []
+    for one, other in _pairs(clusters):
+        swapped = _other_side(one), _other_side(other)
+        if (one, other) != swapped and all(pair in known for known in (mine, own) for pair in ((one, other), swapped)):
+            straight.append(abs(mine[one, other] - own[one, other]))
+            crossed.append(abs(mine[one, other] - own[swapped]))
+    return bool(straight) and float(np.sum(crossed)) < float(np.sum(straight))
+
+
+def _other_side(label: str) -> str:
+    return {"L": "R", "R": "L"}.get(label[:1], label[:1]) + label[1:]
+
+
+def _pairs(clusters) -> list[tuple[str, str]]:
+    """Pairs of markers that one segment carries, in the order of their labels' tails, so that sides compare."""
+    return [tuple(sorted(two, key=lambda label: (label[1:], label)))
+            for group in clusters.values() for two in combinations(group, 2)]  # fmt: skip
+
+
+class _Usual:
+    """The usual distance of two markers in a trial, metres, found when it is asked for."""
+
+    def __init__(self, trial: MarkerTrial):
+        self._trial, self._index = trial, {label: i for i, label in enumerate(trial.labels)}
+        self._known: dict[tuple[str, str], np.ndarray] = {}
+
+    def apart(self, pair) -> np.ndarray:
+        """Distances in the frames that see both: (t,) m."""
+        if pair not in self._known:
+            one, other = (self._trial.positions[:, self._index[label]] for label in pair)
+            apart = np.linalg.norm(one - other, axis=-1)
+            self._known[pair] = apart[np.isfinite(apart)]
+        return self._known[pair]
+
+    def __contains__(self, pair) -> bool:
+        return all(label in self._index for label in pair) and len(self.apart(pair)) > 0
+
+    def __getitem__(self, pair) -> float:
+        return float(np.median(self.apart(pair)))
+
+
+def _of_model(model: MarkerModel) -> dict[tuple[str, str], float]:
+    """Distances between markers that one segment of a model carries, metres."""
+    known = {}
+    for rows in model.clusters().values():
+        for i, j in combinations(rows, 2):
+            apart = float(np.linalg.norm(model.places[i] - model.places[j]))
+            known[model.markers[i], model.markers[j]] = known[model.markers[j], model.markers[i]] = apart
+    return known
+
+
+def _same_body(trial: MarkerTrial, known, clusters, name: str, what: str) -> list[str]:
+    usual = _Usual(trial)
+    pairs = [pair for pair in _pairs(clusters) if pair in usual and pair in known]
+    if len(pairs) < _FEW:
+        return []
+    off = np.array([abs(usual[pair] - known[pair]) for pair in pairs])
+    play = np.array([0.5 * np.subtract(*np.percentile(usual.apart(pair), [90, 10])) for pair in pairs])
+    wrong = off > _OFF + play
+    share = float(wrong.mean())
+    if share <= _SOME:
+        return []
+    worst = [pairs[i] for i in np.argsort(play - off)[: min(3, int(wrong.sum()))]]
+    told = ", ".join(f"{a}-{b} {1000 * usual[a, b]:.0f} against {1000 * known[a, b]:.0f} mm" for a, b in worst)
+    count = f"{int(wrong.sum())} of {len(pairs)} distances within segments differ from {what}'s: {told}"
+    if share >= _OTHER_BODY:
+        raise InputError(
+            trial.name, f"{count}; {name} is of another body, or its markers were put on anew",
+            f"{what} of the same body in the same session", "choose that, or go without",
+        )
+    return [f"{count}; some markers may have been put on anew"]
+
+
+def _empty(trial: MarkerTrial):
+    """A line for each stretch in which hardly any marker is seen."""
+    few = trial.seen.mean(axis=1) < _EMPTY_SHARE
+    for first, end in runs(few):
+        if (end - first) / trial.fps >= _EMPTY_SECONDS:
+            span = trial.start + first / trial.fps, trial.start + (end - 1) / trial.fps
+            yield TimedLine(f"no markers from {span[0]:.2f} to {span[1]:.2f} s: the pose there is a guess", span)

@@ -1,0 +1,345 @@
+"""The recipe from optical markers to a moving skeleton (Fredriksson §5): named, cleaned, modelled, posed, filtered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from . import __version__
+from .errors import Cancelled, InputError
+from .markers.butterworth import CUTOFF
+from .markers.clean import Cleaned, clean
+from .markers.model import MarkerModel
+from .markers.pose import HeldBall, PoseSettings, Solved, solve
+from .markers.trial import MarkerTrial
+from .motion.motion import Motion
+
+FILTERS = ("butterworth", "kalman", "none")
+RELEASES = ("auto", "yes", "no")
+LEAST_MARKERS = 0.5
+"""Share of a model's markers that a trial must have."""
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class ReconstructSettings:
+    """What may be chosen. marker_set: whose markers these are; None: the shipped set that fits. weights, limits,
+    smoothness: of the pose (`markers.pose`). filter: one of FILTERS, at `cutoff` hertz. plant: standing feet are held.
+    radius: metres of a ball that carries a marker, None where not known. hold_ball: its marker takes part in the pose
+    until the release. ball: its kind, one of `ball.physics.THROWN`. release: whether a throw's release is looked for; "auto": where a marker is on a ball."""
+
+    marker_set: object | None = None
+    weights: bool = True
+    limits: bool = True
+    smoothness: float = 0.0
+    filter: str = "butterworth"
+    cutoff: float = CUTOFF
+    plant: bool = True
+    radius: float | None = None
+    hold_ball: bool = False
+    ball: str = "baseball"
+    release: str = "auto"
+
+    def __post_init__(self):
+        for name, choices in (("filter", FILTERS), ("release", RELEASES)):
+            if getattr(self, name) not in choices:
+                raise InputError(name, f"{getattr(self, name)!r}", f"one of {', '.join(choices)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What came out.
+
+    motion: at the trial's rate, on the markers' own ground, only its height moved where the floor was not at 0 (`floor`
+    metres, which `trial` was moved by too). model: whose skeleton it has. trial: the markers as they were posed to, under
+    the set's names, cleaned. raw: as given. solved: the pose before filters. cleaned: what was mended. release: of a
+    throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds: of each step. warnings: lines.
+    """
+
+    motion: Motion
+    model: MarkerModel
+    trial: MarkerTrial
+    raw: MarkerTrial
+    solved: Solved
+    cleaned: Cleaned
+    release: object | None = None
+    held: np.ndarray | None = None
+    floor: float = 0.0
+    seconds: dict[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def report(self) -> dict:
+        """The figures, for JSON."""
+        from .evaluation.reconstruction import figures
+
+        return {"version": __version__, **figures(self)}
+
+
+def reconstruct(
+    trial: MarkerTrial,
+    static: MarkerTrial | None = None,
+    model: MarkerModel | None = None,
+    settings: ReconstructSettings = ReconstructSettings(),
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Reconstruction:
+    """The skeleton that moved under the markers of a trial.
+
+    static: the same markers on the same standing body, from which the model is made; without one it is made of the
+    trial itself. model: one that was made before. InputError where markers are of no known set, where the static or the
+    model is of another body or set, where the markers are mirrored or too few. Cancelled where the user wants out.
+    """
+    road = _Road(progress, cancelled)
+    with road.step("clean", 0.1):
+        marker_set = set_of(trial, model, settings)
+        seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
+        if model is not None:
+            _check_fits(model, seen)
+        road.tell(_checked(seen, still, marker_set, model))
+        cleaned = _tidied(seen, marker_set, model, road.inner(0.0, 0.1), cancelled)
+        tidy = cleaned.trial
+        road.tell(cleaned.report.lines)
+    with road.step("model", 0.45):
+        if model is None:
+            still = None if still is None else _tidied(still, marker_set, None, None, cancelled).trial
+            model = _calibrated(marker_set, tidy, still, road.inner(0.1, 0.45), cancelled)
+            road.tell(model.notes)
+    with road.step("pose", 0.85):
+        solved = _posed(model, tidy, marker_set, settings, road, cancelled)
+        road.tell(solved.notes)
+    with road.step("filter", 0.92):
+        motion, held = _filtered(solved, model, seen, settings, road)
+    with road.step("floor", 0.94):
+        motion, tidy, floor = _grounded(motion, model, tidy, road)
+    with road.step("release", 1.0):
+        found = _release(_lowered(seen, floor), motion, marker_set, settings, road)
+    return Reconstruction(
+        motion, model, tidy, trial, solved, cleaned, found, held, floor, road.seconds, tuple(road.warnings)
+    )
+
+
+class _Road:
+    """What is told on the way: progress, seconds of each step, warnings; and whether the user wants out."""
+
+    def __init__(self, progress, cancelled):
+        self._progress, self._cancelled = progress, cancelled
+        self._done = 0.0
+        self.seconds: dict[str, float] = {}
+        self.warnings: list[str] = []
+
+    @contextmanager
+    def step(self, name: str, until: float):
+        """One step; `until`: the share of the whole that is done after it."""
+        self.check()
+        if self._progress:
+            self._progress(self._done, name)
+        begun = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - begun
+        self._done = until
+
+    def inner(self, low: float, high: float) -> Progress | None:
+        """The progress of a part of the way, from 0 to 1, as that of the whole."""
+        if self._progress is None:
+            return None
+        return lambda fraction, text="": self._progress(low + (high - low) * fraction, text)
+
+    def tell(self, lines) -> None:
+        """Lines for people, each once."""
+        self.warnings += [line for line in lines if line not in self.warnings]
+
+    def check(self) -> None:
+        if self._cancelled is not None and self._cancelled():
+            raise Cancelled("cancelled")
+
+
+def set_of(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructSettings):
+    """The set that a trial's markers are of: the one chosen, the model's own, or the shipped one that fits; None for a
+    model of a set that is not shipped."""
+    if settings.marker_set is not None:
+        return settings.marker_set
+    from .files.marker_set_text import shipped_sets
+    from .markers.marker_set import recognise
+
+    sets = shipped_sets()
+    if model is not None:
+        return next((one for one in sets if one.name == model.set_name), None)
+    try:
+        return recognise(trial.labels, sets)
+    except InputError as error:
+        raise InputError(trial.name, str(error)) from None  # labels do not know their file
+
+
+def named_by(trial: MarkerTrial, marker_set) -> MarkerTrial:
+    """The trial under the set's own names."""
+    from .markers.naming import named_as
+
+    return trial if marker_set is None else named_as(trial, marker_set)
+
+
+def clusters_of(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> dict[str, tuple[str, ...]]:
+    """Segment -> those of its markers that the trial has."""
+    if marker_set is not None:
+        return marker_set.clusters(trial.labels)
+    names = model.skeleton.names
+    found = {names[joint]: tuple(model.markers[i] for i in rows if model.markers[i] in trial.labels)
+             for joint, rows in model.clusters().items()}
+    return {name: labels for name, labels in found.items() if labels}
+
+
+def _checked(trial, still, marker_set, model) -> tuple[str, ...]:
+    """Whether the markers are mirrored, or those of somebody else than the static's."""
+    from .markers.checks import check, unused
+
+    clusters = clusters_of(marker_set, model, trial)
+    others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
+    return (*unused(trial, clusters, others), *check(trial, still, clusters, model))
+
+
+def modelled(
+    trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
+    progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
+) -> MarkerModel:
+    """The model alone, as `reconstruct` makes it of a trial and its static. Raises as that does."""
+    marker_set = set_of(trial, None, settings)
+    seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
+    _checked(seen, still, marker_set, None)
+    tidy, still = (None if one is None else _tidied(one, marker_set, None, None, cancelled).trial for one in (seen, still))
+    return _calibrated(marker_set, tidy, still, progress, cancelled)
+
+
+def named_evenly(trial: MarkerTrial, marker_set) -> MarkerTrial:
+    """The trial under the set's names, its frames on even times."""
+    from .markers.frame_times import evenly
+
+    return evenly(named_by(trial, marker_set))
+
+
+def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Cleaned:
+    """A trial under the set's names, cleaned."""
+    return clean(trial, clusters_of(marker_set, model, trial), progress=progress, cancelled=cancelled)
+
+
+def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
+    from .markers.calibrate import calibrate
+
+    try:
+        return calibrate(marker_set, trial, still, progress=progress, cancelled=cancelled)
+    except InputError as error:
+        lacking = [] if still is None else [label for label in trial.labels if label not in still.labels]
+        if not lacking:
+            raise
+        raise InputError(still.name, f"{error}; it lacks {', '.join(lacking[:6])}") from None
+
+
+def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
+    lacking = [label for label in model.markers if label not in trial.labels]
+    if len(lacking) > (1.0 - LEAST_MARKERS) * len(model.markers):
+        some = ", ".join(lacking[:6]) + (", ..." if len(lacking) > 6 else "")
+        raise InputError(
+            trial.name, f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some}",
+            "a trial with the model's markers", "choose another model, or the marker set whose labels these are",
+        )
+
+
+def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _Road, cancelled) -> Solved:
+    """The pose; where a ball is to be held, once without it to find out how it is, and again with it."""
+    how = PoseSettings(weights=settings.weights, limits=settings.limits, smoothness=settings.smoothness)
+    label = _ball_label(marker_set, trial) if settings.hold_ball else None
+    solved = solve(model, trial, how, road.inner(0.45, 0.85 if label is None else 0.65), cancelled)
+    if label is None:
+        if settings.hold_ball:
+            road.tell(["no marker on a ball: nothing is held"])
+        return solved
+    found = _release(trial, solved.motion, marker_set, replace(settings, release="auto"), road)
+    if found is None or found.how != "ball":
+        road.tell([f"{label} does not tell how the ball is held: it takes no part in the pose"])
+        return solved
+    hand = f"{found.side.capitalize()}Hand"
+    held = np.arange(len(trial)) < found.frame
+    ball = HeldBall(hand, found.centre, found.radius, trial.positions[:, trial.index(label)], held)
+    return solve(model, trial, replace(how, ball=ball), road.inner(0.65, 0.85), cancelled)
+
+
+def _ball_label(marker_set, trial: MarkerTrial) -> str | None:
+    """The first marker of the set that lies on a ball and is in the trial."""
+    labels = () if marker_set is None else marker_set.ball
+    return next((label for label in labels if label in trial.labels), None)
+
+
+def _filtered(solved: Solved, model: MarkerModel, trial: MarkerTrial, settings, road: _Road):
+    """The motion after both filters, and which points of the feet are held. trial: as it was seen, no gap filled."""
+    from .markers.butterworth import butterworth
+    from .markers.kalman import kalman
+    from .markers.plant_filter import plant_filter
+
+    motion = solved.motion
+    if settings.filter == "butterworth":
+        out = butterworth(motion, settings.cutoff)
+    elif settings.filter == "kalman":
+        out = kalman(motion, told_by_markers(model, trial), settings.cutoff)
+    if settings.filter != "none":
+        motion = out.motion
+        road.tell(out.notes)
+    if not (settings.plant and _has_legs(motion)):
+        return motion, None
+    planted = plant_filter(motion)
+    return planted.motion, planted.held
+
+
+def told_by_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
+    """(T, J) share of each joint's own markers that are seen; 1 for joints that carry none."""
+    from .markers.residuals import seen_markers
+
+    seen = np.isfinite(seen_markers(model, trial)).all(axis=-1)
+    worth = np.ones((len(trial), len(model.skeleton)))
+    for joint, rows in model.clusters().items():
+        worth[:, joint] = seen[:, rows].mean(axis=1)
+    return worth
+
+
+def _has_legs(motion: Motion) -> bool:
+    from .motion.humanoid import identify
+
+    try:
+        identify(motion.skeleton)
+    except InputError:
+        return False
+    return True
+
+
+def _grounded(motion: Motion, model: MarkerModel, trial: MarkerTrial, road: _Road):
+    """Motion and markers with the floor at height 0, and by how much they were lowered for that."""
+    from .markers.floor import floor_under
+
+    floor = floor_under(model, trial)
+    if not floor:
+        return motion, trial, 0.0
+    road.tell([f"the floor lay at {floor:+.3f} m; markers and motion were moved so that it is at 0"])
+    down = np.array([0.0, 0.0, floor])
+    return replace(motion, root_positions=motion.root_positions - down), _lowered(trial, floor), floor
+
+
+def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
+    return trial.with_positions(trial.positions - [0.0, 0.0, by]) if by else trial
+
+
+def _release(trial, motion, marker_set, settings: ReconstructSettings, road: _Road):
+    """When and how the ball left the hand, where that is asked for."""
+    label = _ball_label(marker_set, trial)
+    if settings.release == "no" or (settings.release == "auto" and label is None):
+        return None
+    from .release import ReleaseSettings, release
+
+    try:
+        return release(trial, motion, ReleaseSettings(label, settings.radius, ball=settings.ball))
+    except InputError as error:
+        if settings.release == "yes":
+            raise
+        road.tell([f"no release found: {error}"])
+        return None

@@ -1,0 +1,43 @@
+"""A motion put into a library: the library reads it with its words, and nothing is replaced."""
+
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.library.add_clip import add_clip
+from beyond_mocap.library.library import build
+from beyond_mocap.motion.gait import gait
+
+
+@pytest.fixture
+def walk():
+    return gait(1.4, 2.0, 60.0)
+
+
+def test_the_library_reads_what_was_added(tmp_path, walk):
+    add_clip(tmp_path, "walk", walk, ["walking"])
+    lines = add_clip(tmp_path, "throw", walk, ["throwb", "high"], key_seconds=1.2)
+    library = build(tmp_path)
+    assert {clip.path for clip in library.clips} == {"walk.bvh", "throw.bvh"} and len(lines) == 1
+    key = next(key for key in library.keys if not library.clips[key.clip].mirrored)
+    assert set(key.words) >= {"throwb", "high"} and (tmp_path / "throw.txt").read_text() == "72f throwb high\n"
+
+
+def test_words_of_its_own_are_told(tmp_path, walk):
+    assert any("juggle" in line for line in add_clip(tmp_path, "walk", walk, ["juggle"])[1:])
+
+
+def test_nothing_is_replaced(tmp_path, walk):
+    add_clip(tmp_path, "walk", walk)
+    with pytest.raises(InputError, match="already"):
+        add_clip(tmp_path, "walk", walk)
+    (tmp_path / "run.txt").write_text("0 1 running\n")
+    with pytest.raises(InputError, match="words already"):
+        add_clip(tmp_path, "run", walk, ["walking"])
+    assert not (tmp_path / "run.bvh").exists()
+
+
+@pytest.mark.parametrize("name, key", [("", None), ("a/b", None), ("late", 9.0), ("early", -0.5)])
+def test_what_cannot_be_is_refused(tmp_path, walk, name, key):
+    with pytest.raises(InputError):
+        add_clip(tmp_path, name, walk, ["throwb"], key)
+    assert not list(tmp_path.glob("*.bvh"))

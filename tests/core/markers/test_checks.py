@@ -1,0 +1,92 @@
+"""Mirrored markers, exchanged sides, another body's static, nobody there: told apart."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError, spans_of
+from beyond_mocap.files.marker_set_text import chosen_set
+from beyond_mocap.markers.assemble import model_from_frame
+from beyond_mocap.markers.checks import check, unused
+from beyond_mocap.markers.planted import planted
+from beyond_mocap.markers.planted_faults import mirrored, sides_exchanged
+from beyond_mocap.motion.gait import gait
+
+SET = chosen_set("plug_in_gait")
+
+
+@pytest.fixture(scope="module")
+def known():
+    return planted(gait(1.5, 2.0, 50.0), "plug_in_gait", seed=1)
+
+
+@pytest.fixture(scope="module")
+def clusters(known):
+    return SET.clusters(known.trial.labels)
+
+
+def test_a_body_and_its_static_pass(known, clusters):
+    assert check(known.trial, known.static, clusters) == ()
+    assert check(known.trial, None, clusters) == ()
+
+
+@pytest.mark.parametrize("spoil, found", [(mirrored, "coordinates are mirrored"), (sides_exchanged, "labels are exchanged")])
+def test_mirrored_is_told_from_exchanged_where_the_static_tells(known, clusters, spoil, found):
+    with pytest.raises(InputError, match=found):
+        check(spoil(known.trial), known.static, clusters)
+    with pytest.raises(InputError, match=f"{known.static.name}.*{found}"):
+        check(known.trial, spoil(known.static), clusters)
+
+
+@pytest.mark.parametrize("spoil", [mirrored, sides_exchanged])
+def test_without_a_static_it_is_told_as_mirrored(known, clusters, spoil):
+    with pytest.raises(InputError, match="mirrored"):
+        check(spoil(known.trial), None, clusters)
+
+
+def smaller(trial, share):
+    return trial.with_positions(trial.positions * share)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_another_bodys_static_is_refused(known, clusters, share):
+    with pytest.raises(InputError, match="another body"):
+        check(known.trial, smaller(known.static, share), clusters)
+
+
+def test_another_bodys_model_is_refused(known, clusters):
+    frame = dict(zip(known.static.labels, known.static.positions.mean(axis=0)))
+    assert check(known.trial, None, clusters, model_from_frame(frame, SET)) == ()
+    large = model_from_frame({label: 1.12 * place for label, place in frame.items()}, SET)
+    with pytest.raises(InputError, match="model"):
+        check(known.trial, None, clusters, large)
+
+
+def test_one_marker_put_on_anew_is_told(known, clusters):
+    moved = np.array(known.static.positions)
+    moved[:, known.static.index("LWRA")] += [0.05, 0.0, 0.0]
+    moved[:, known.static.index("LASI")] += [0.0, 0.06, 0.0]
+    lines = check(known.trial, known.static.with_positions(moved), clusters)
+    assert len(lines) == 1 and "anew" in lines[0]
+
+
+def test_stretches_without_markers_are_told_with_their_seconds(known, clusters):
+    positions = np.array(known.trial.positions)
+    positions[20:40] = np.nan
+    (line,) = check(known.trial.with_positions(positions), None, clusters)
+    assert "no markers" in line and spans_of(line)[0] == pytest.approx((0.4, 0.78))
+    with pytest.raises(InputError, match="none"):
+        check(known.trial.with_positions(np.full_like(positions, np.nan)), None, clusters)
+
+
+def test_a_static_that_lacks_markers_is_told_or_refused(known, clusters):
+    without = [label for label in known.static.labels if label not in ("LKNE", "RKNE")]
+    assert any("LKNE, RKNE" in line for line in check(known.trial, known.static.only(without), clusters))
+    with pytest.raises(InputError, match="of the trial's"):
+        check(known.trial, known.static.only(["LASI", "RASI", "LPSI", "RPSI", "C7", "CLAV", "LHEE", "LTOE"]), clusters)
+
+
+def test_markers_of_no_segment_are_told(known, clusters):
+    assert unused(known.trial, clusters) == []
+    strange = known.trial.renamed({"LWRA": "STICK", "RWRA": "*4"})
+    assert unused(strange, clusters) == ["1 markers of no segment are not used: STICK"]
+    assert unused(strange, clusters, ["STICK"]) == []

@@ -1,0 +1,39 @@
+"""The floor is at height 0 unless markers of the feet say otherwise."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.files.marker_set_text import chosen_set
+from beyond_mocap.markers.assemble import model_from_frame
+from beyond_mocap.markers.floor import OVER_SOLE, floor_under
+from beyond_mocap.markers.planted import planted
+from beyond_mocap.motion.gait import gait
+
+
+@pytest.fixture(scope="module")
+def known():
+    return planted(gait(1.3, 1.0, 50.0), "plug_in_gait", seed=1)
+
+
+@pytest.fixture(scope="module")
+def model(known):
+    return model_from_frame(dict(zip(known.static.labels, known.static.positions.mean(axis=0))), chosen_set("plug_in_gait"))
+
+
+def at_height(trial, height):
+    """The trial with its lowest foot marker at this height, by the 2nd percentile."""
+    feet = [trial.index(label) for label in ("LHEE", "RHEE", "LTOE", "RTOE")]
+    now = np.percentile(np.nanmin(trial.positions[:, feet, 2], axis=1), 2)
+    return trial.with_positions(trial.positions + [0.0, 0.0, height - now])
+
+
+@pytest.mark.parametrize("height, floor", [
+    (0.03, 0.0), (0.012, 0.0), (0.085, 0.0), (0.0, -OVER_SOLE), (-0.04, -0.04 - OVER_SOLE), (0.4, 0.4 - OVER_SOLE),
+])
+def test_the_floor_is_told_by_the_lowest_foot_marker(known, model, height, floor):
+    assert floor_under(model, at_height(known.trial, height)) == pytest.approx(floor, abs=1e-6)
+
+
+def test_without_markers_on_feet_it_is_at_zero(known, model):
+    none = known.trial.only(["C7", "CLAV", "LASI"])
+    assert floor_under(model, none) == 0.0

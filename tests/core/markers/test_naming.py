@@ -1,0 +1,40 @@
+"""A trial under its set's names: aliases, and unlabeled markers that are numbered anew in every trial."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.markers.marker_set import MarkerSet
+from beyond_mocap.markers.naming import named_as
+from beyond_mocap.markers.trial import MarkerTrial
+
+SET = MarkerSet(
+    "mine", {"LeftForeArm": ("LWR",), "RightForeArm": ("RWR",), "LeftHand": ("LHAND",), "RightHand": ("RHAND",)},
+    aliases={"x52": "LHAND", "x53": "RHAND", "LWRIST": "LWR"}, optional=frozenset({"LHAND", "RHAND"}),
+)
+
+
+def trial_of(labels):
+    """Wrists half a metre to the left and right, x52 beside the left one."""
+    there = {"LWRIST": 0.5, "LWR": 0.5, "RWR": -0.5, "x52": 0.56, "x53": -0.56, "LHAND": 0.56, "RHAND": -0.56}
+    positions = np.zeros((20, len(labels), 3))
+    positions[:, :, 1] = [there[label] for label in labels]
+    positions[:, :, 0] = np.arange(20)[:, None] * 0.01
+    return MarkerTrial(tuple(labels), positions, 100.0)
+
+
+def test_other_names_become_the_sets_own():
+    assert named_as(trial_of(("LWRIST", "RWR")), SET).labels == ("LWR", "RWR")
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_unlabeled_markers_go_to_the_side_they_move_with(exchanged):
+    trial = trial_of(("LWR", "RWR", "x52", "x53"))
+    if exchanged:
+        trial = trial.renamed({"x52": "x53", "x53": "x52"})
+    out = named_as(trial, SET)
+    assert out.positions[0, out.index("LHAND"), 1] > 0 > out.positions[0, out.index("RHAND"), 1]
+
+
+def test_what_has_a_name_keeps_it():
+    trial = trial_of(("LWR", "RWR", "RHAND", "LHAND")).renamed({"LHAND": "RHAND", "RHAND": "LHAND"})
+    assert named_as(trial, SET).labels == trial.labels

@@ -1,0 +1,181 @@
+"""The road from markers to a skeleton: a planted body is found again, and what cannot be made is told in a line."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.__main__ import main
+from beyond_mocap.errors import Cancelled, InputError
+from beyond_mocap.files import bvh
+from beyond_mocap.files.trc_write import write_trc
+from beyond_mocap.markers.planted import planted
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.reconstruct import ReconstructSettings, reconstruct
+
+FPS = 100.0
+
+
+@pytest.fixture(scope="module")
+def known():
+    """A walk of a second under Plug-in Gait's markers."""
+    return planted(gait(1.3, 1.0, FPS), "plug_in_gait", seed=3, softness=0.3, occlusion=0.02)
+
+
+@pytest.fixture(scope="module")
+def made(known):
+    return reconstruct(known.trial, known.static)
+
+
+LIMBS = ("Arm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase")
+
+
+def joints_off(made, known):
+    """Metres (T, J) between the found and the true centres of the limbs' joints."""
+    places, _ = forward_kinematics(made.motion)
+    names = [side + limb for side in ("Left", "Right") for limb in LIMBS]
+    found = places[:, [made.motion.skeleton.index(name) for name in names]] + [0.0, 0.0, made.floor]
+    return np.linalg.norm(found - np.stack([known.centre(name) for name in names], axis=1), axis=-1)
+
+
+def test_a_planted_body_is_found_again(made, known):
+    off = joints_off(made, known)
+    assert len(made.motion) == len(known.trial) and made.motion.fps == FPS
+    assert np.sqrt(np.mean(off**2)) < 0.015
+
+
+def test_the_report_has_its_figures(made):
+    report = json.loads(json.dumps(made.report()))
+    for key in ("markers", "frames", "fps", "seconds", "residual_mm", "weighted_se", "frames_per_second",
+                "bones_change_m", "skate", "limits", "gaps", "swaps", "assigned", "warnings"):  # fmt: skip
+        assert key in report
+    assert 0 < report["residual_mm"]["mean"] < 12 and report["residual_mm"]["single_mean"] is not None
+    assert report["bones_change_m"] < 1e-9 and set(report["seconds"]) >= {"clean", "model", "pose", "filter"}
+
+
+def test_filters_are_chosen(made, known):
+    raw = reconstruct(known.trial, model=made.model, settings=ReconstructSettings(filter="none", plant=False))
+    smooth = reconstruct(known.trial, model=made.model, settings=ReconstructSettings(filter="kalman", plant=False))
+    assert np.array_equal(raw.motion.rotations, raw.solved.motion.rotations)
+    jerk = [np.abs(np.diff(one.motion.rotations, n=3, axis=0)).mean() for one in (raw, smooth)]
+    assert jerk[1] < 0.6 * jerk[0]
+
+
+def test_the_same_input_gives_the_same_bits(made, known):
+    again = reconstruct(known.trial, model=made.model)
+    assert np.array_equal(again.motion.rotations, made.motion.rotations)
+
+
+def test_a_floor_that_is_not_at_zero_is_told(known, made):
+    up = [0.0, 0.0, 0.8]
+    out = reconstruct(known.trial.with_positions(known.trial.positions + up), model=made.model)
+    assert out.floor == pytest.approx(0.8 + made.floor, abs=0.03) and any("floor" in line for line in out.warnings)
+    assert np.allclose(out.motion.root_positions[:, :2], made.motion.root_positions[:, :2], atol=2e-3)
+
+
+def test_it_can_be_stopped(known):
+    with pytest.raises(Cancelled):
+        reconstruct(known.trial, known.static, cancelled=lambda: True)
+
+
+def test_progress_rises_to_its_end(known, made):
+    told = []
+    reconstruct(known.trial, model=made.model, progress=lambda fraction, text: told.append(fraction))
+    assert told == sorted(told) and 0 <= told[0] and told[-1] <= 1
+
+
+def test_markers_of_no_set_and_a_model_of_another_are_refused(known, made):
+    strange = known.trial.renamed({label: f"q{i}" for i, label in enumerate(known.trial.labels)})
+    with pytest.raises(InputError, match="nearest"):
+        reconstruct(strange)
+    with pytest.raises(InputError, match="model"):
+        reconstruct(strange, model=replace(made.model, set_name="mine"))
+
+
+@pytest.mark.parametrize("wrong", [{"filter": "median"}, {"release": "maybe"}])
+def test_settings_that_are_none_are_refused(wrong):
+    with pytest.raises(InputError):
+        ReconstructSettings(**wrong)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory, known):
+    """A folder with the trial and its static."""
+    folder = tmp_path_factory.mktemp("markers")
+    write_trc(known.trial, folder / "walk.trc")
+    write_trc(known.static, folder / "static.trc")
+    return folder
+
+
+@pytest.fixture
+def run(capfd):
+    """run(*words) -> status, standard output, lines on standard error."""
+
+    def call(*words):
+        capfd.readouterr()
+        status = main(["reconstruct", *[str(word) for word in words]])
+        said, error = capfd.readouterr()
+        return status, said, error.splitlines()
+
+    return call
+
+
+def test_the_verb_does_what_the_recipe_does(run, place, tmp_path, made):
+    out, report, model = (tmp_path / name for name in ("o.bvh", "r.json", "m.json"))
+    more = ("--report", report, "--save-model", model)
+    status, said, _ = run(place / "walk.trc", "--static", place / "static.trc", "--out", out, *more)
+    assert status == 0 and "frames" in said
+    motion = bvh.read(out).motion
+    assert len(motion) == len(made.motion) and motion.fps == pytest.approx(FPS, rel=1e-3)
+    mine, _ = forward_kinematics(motion)
+    recipes, _ = forward_kinematics(made.motion)
+    order = [motion.skeleton.names.index(name) for name in made.motion.skeleton.names]
+    assert np.abs(mine[:, order] - recipes).max() < 2e-3
+    assert json.loads(report.read_text())["frames"] == len(motion)
+    status, _, _ = run(place / "walk.trc", "--model", model, "--out", tmp_path / "again.bvh")
+    again, _ = forward_kinematics(bvh.read(tmp_path / "again.bvh").motion)
+    assert status == 0 and np.abs(again - mine).max() < 5e-3
+
+
+def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, made):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    words = ("--add-to", clips, "--words", "walking")
+    status, _, _ = run(place / "walk.trc", "--static", place / "static.trc", "--out", tmp_path / "o.bvh", *words)
+    assert status == 0 and (clips / "walk.bvh").is_file()
+    assert (clips / "walk.txt").read_text().split() == ["0f", f"{len(made.motion) - 1}f", "walking"]
+    status, _, error = run(place / "walk.trc", "--out", tmp_path / "o.bvh", *words)
+    assert status == 2 and "already" in error[0]
+
+
+def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
+    trials = tmp_path / "trials"
+    for session in ("monday", "tuesday"):
+        (trials / session).mkdir(parents=True)
+        write_trc(known.static, trials / session / "static.trc")
+        write_trc(known.trial.frames(0, 50), trials / session / "walk.trc")
+    (trials / "broken.trc").write_text("nothing")
+    out = tmp_path / "out"
+    status, said, error = run(trials, "--out", out)
+    rows = {row["trial"]: row for row in json.loads((out / "trials.json").read_text())["trials"]}
+    assert status == 0 and set(rows) == {"broken", "monday/walk", "tuesday/walk"}
+    assert rows["broken"]["error"] and rows["monday/walk"]["static"] == "monday/static"
+    skeletons = [bvh.read(out / session / "walk.bvh").motion.skeleton for session in ("monday", "tuesday")]
+    assert np.allclose(skeletons[0].offsets, skeletons[1].offsets, atol=1e-6)
+
+
+@pytest.mark.parametrize("words, expected", [
+    (("{place}/walk.trc", "--model", "m.json", "--static", "s.trc", "--out", "o.bvh"), "--model"),
+    (("{place}/walk.trc", "--words", "throwb", "--out", "{tmp}/o.bvh"), "--add-to"),
+    (("{place}/walk.trc", "--out", "{tmp}/o.fbx"), ".fbx"),
+    (("{place}/nobody.trc", "--out", "{tmp}/o.bvh"), "nobody.trc"),
+    (("{place}/walk.trc", "--marker-set", "mine", "--out", "{tmp}/o.bvh"), "plug_in_gait"),
+    (("{place}/walk.trc", "--cutoff", "0", "--out", "{tmp}/o.bvh"), "hertz"),
+    (("{place}", "--report", "{tmp}/r.json", "--out", "{tmp}/o"), "--report"),
+    (("{tmp}", "--out", "{tmp}/o"), "holds no .c3d"),
+])
+def test_what_is_wrong_is_told_in_a_line(run, place, tmp_path, words, expected):
+    status, _, error = run(*[word.format(place=place, tmp=tmp_path) for word in words])
+    assert status == 2 and len(error) == 1 and expected in error[0]
