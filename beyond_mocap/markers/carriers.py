@@ -6,8 +6,9 @@ chosen by what the trial shows: pairs whose distance hardly varies, near ones of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -79,24 +80,41 @@ def softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> n
     return soft
 
 
-def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int] | None = None) -> dict[int, Carried]:
-    """Marker -> how it is carried, for `wanted` markers (None: all) of positions (T, M, 3) m.
+def carriers(
+    positions: np.ndarray,
+    soft: np.ndarray,
+    wanted: Iterable[int],
+    known: Mapping[int, Carried] = MappingProxyType({}),
+    changed: Iterable[int] = (),
+    ask: Callable[[], None] = lambda: None,
+) -> dict[int, Carried]:
+    """Marker -> how it is carried, for `wanted` markers of positions (T, M, 3) m.
 
-    soft: (M, M) m from `softness`.
+    soft: (M, M) m from `softness`. known: an earlier look, of whose markers a few samples have `changed`: their shapes
+    still hold. ask: called for each marker; it may raise.
     """
-    wanted = range(positions.shape[1]) if wanted is None else wanted
-    return {marker: carried(positions, marker, helpers_of(marker, soft, positions)) for marker in wanted}
+    found, changed = {}, set(changed)
+    for marker in wanted:
+        ask()
+        helpers = helpers_of(marker, soft, positions)
+        held = known.get(marker)
+        holds = held is not None and held.helpers == helpers
+        if holds and not changed & {marker, *helpers}:
+            found[marker] = held
+        else:
+            found[marker] = carried(positions, marker, helpers, held.shape if holds else None)
+    return found
 
 
-def carried(positions: np.ndarray, marker: int, helpers: Sequence[int]) -> Carried:
-    """How these helpers carry this marker over the frames of positions (T, M, 3) m."""
+def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: Shape | None = None) -> Carried:
+    """How these helpers carry this marker over the frames of positions (T, M, 3) m; `shape`: theirs, where it is known."""
     frames = len(positions)
     nothing = np.full((frames, 3), np.nan)
     alone = Carried((), None, None, np.zeros(frames, dtype=bool), nothing, np.full(3, np.nan), np.inf)
     if len(helpers) < 3:
         return alone
     seen = positions[:, list(helpers)]
-    shape = mean_shape(seen)
+    shape = shape or mean_shape(seen)
     fit = rigid_fit(shape.places, seen, 1.0 / (shape.sigma**2 + 0.002**2))
     trusted = fit.sound & (np.nan_to_num(fit.rms, nan=np.inf) <= max(_DEFORMED, _TIMES_USUAL * shape.usual))
     local = np.where(trusted[:, None], taken_back(fit, positions[:, marker, None])[:, 0], np.nan)

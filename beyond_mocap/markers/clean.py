@@ -52,6 +52,16 @@ class Cleaned(NamedTuple):
     trial: MarkerTrial
     report: CleanReport
 
+    def for_pose(self, longest: float = 0.08) -> MarkerTrial:
+        """The trial without what was filled softly or by a curve over more than `longest` seconds: good to look at, no
+        evidence for a pose."""
+        positions = np.array(self.trial.positions)
+        for gap in self.report.gaps:
+            if gap.how != "cluster" and gap.frames > longest * self.trial.fps:
+                first = round((gap.start - self.trial.start) * self.trial.fps)
+                positions[first : first + gap.frames, self.trial.index(gap.labels[0])] = np.nan
+        return self.trial.with_positions(positions)
+
 
 @dataclass
 class _Work:
@@ -61,16 +71,22 @@ class _Work:
     positions: np.ndarray
     clusters: list[list[int]]
     nameless: list[int]
+    ask: Callable[[], None]
     found: dict = field(default_factory=dict)
     carried: dict = field(default_factory=dict)
     soft: np.ndarray | None = None
 
     def look(self):
-        """See anew which markers carry which."""
+        """See which markers carry which."""
         named = [i for i in range(len(self.trial.labels)) if i not in self.nameless and self.seen(i)]
         self.soft = softness(self.positions, self.clusters)
         self.soft[self.nameless], self.soft[:, self.nameless] = np.inf, np.inf
-        self.carried = carriers(self.positions, self.soft, named)
+        self.carried = carriers(self.positions, self.soft, named, ask=self.ask)
+
+    def look_again(self, changed: Sequence[int]):
+        """See it anew where a few samples of these markers have changed."""
+        named = [i for i in self.carried if self.seen(i)]
+        self.carried = carriers(self.positions, self.soft, named, self.carried, changed, self.ask)
 
     def seen(self, marker):
         return np.isfinite(self.positions[:, marker, 0]).any()
@@ -100,7 +116,7 @@ def clean(
     work = _Work(
         trial, np.array(trial.positions),
         [[index[label] for label in labels if label in index] for labels in clusters.values()],
-        unlabeled(trial.labels, known),
+        unlabeled(trial.labels, known), lambda: _go_on(cancelled),
     )
     work.found = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
     steps = [("who carries whom", _Work.look)]
@@ -109,8 +125,7 @@ def clean(
     steps += [("unlabeled markers", _names)] if settings.assign and work.nameless else []
     steps += [("gaps", lambda work: _gaps(work, settings))]
     for number, (text, step) in enumerate(steps):
-        if cancelled and cancelled():
-            raise Cancelled("clean-up stopped")
+        work.ask()
         if progress:
             progress(number / len(steps), f"markers: {text}")
         if len(trial) and trial.labels:
@@ -120,11 +135,16 @@ def clean(
     return _told(work)
 
 
+def _go_on(cancelled):
+    if cancelled and cancelled():
+        raise Cancelled("clean-up stopped")
+
+
 def _swaps(work):
     work.positions, found = there_and_back(work.positions, work.carried)
     _note_swaps(work, found)
     leaping = leaps(work.positions, work.carried, work.trial.fps)
-    work.positions, found = mend(work.positions, work.carried, leaping, work.trial.fps, _opposite(work))
+    work.positions, found = mend(work.positions, work.carried, leaping, work.trial.fps, _opposite(work), work.ask)
     _note_swaps(work, found)
 
 
@@ -154,7 +174,7 @@ def _jumps(work):
     work.positions = positions
     work.found["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
     if found:
-        work.look()
+        work.look_again([jump.marker for jump in found])
 
 
 def _names(work):
@@ -164,14 +184,13 @@ def _names(work):
         work.stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
     )
     if found:
-        work.look()
+        work.look_again([one.label for one in found])
 
 
 def _gaps(work, settings):
     longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.found["strayed"] = tuple(_strayed(work))
-    named = [i for i in range(len(work.trial.labels)) if i not in work.nameless]
-    filled, found = fill(work.positions, work.soft, work.trial.fps, longest, named)
+    filled, found = fill(work.positions, work.soft, work.trial.fps, longest, work.carried, work.ask)
     work.positions = filled
     for name, kept in (("gaps", True), ("left", False)):
         work.found[name] = tuple(

@@ -53,7 +53,7 @@ class CleanReport:
         return (
             *(_swapped(swap) for swap in self.swaps),
             *(_timed(f"{one.labels[0]} taken for {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
-            *_by_label(self.jumps, "samples that jump taken out"),
+            *_by_label(self.jumps, "frames that jump taken out"),
             *_by_label(self.strayed, "frames far from where the markers around it say"),
             *_by_label(self.left, "frames not seen and left open"),
             *_by_label(self.gaps, "frames not seen and filled"),
@@ -71,13 +71,25 @@ def _swapped(swap):
 
 
 def _by_label(stretches, what):
-    """One line for each label."""
-    labels = dict.fromkeys(stretch.labels[0] for stretch in stretches)
-    for label in labels:
-        own = [stretch for stretch in stretches if stretch.labels[0] == label]
-        count = sum(stretch.frames for stretch in own)
-        shown = ", ".join(stretch.when() for stretch in own[:3]) + (f" and {len(own) - 3} more" if len(own) > 3 else "")
-        yield _timed(f"{label}: {count} {what if count != 1 else what.replace('frames', 'frame')}: {shown}", own)
+    """One line for each label, and one for all that share all their stretches."""
+    own: dict[str, list] = {}
+    for stretch in stretches:
+        own.setdefault(stretch.labels[0], []).append(stretch)
+    alike: dict[tuple, list[str]] = {}
+    for label, ones in own.items():
+        alike.setdefault(tuple((one.start, one.frames) for one in ones), []).append(label)
+    for labels in alike.values():
+        ones = own[labels[0]]
+        count = sum(one.frames for one in ones)
+        shown = ", ".join(one.when() for one in ones[:3]) + (f" and {len(ones) - 3} more" if len(ones) > 3 else "")
+        yield _timed(f"{_named(labels)}: {count} {what if count != 1 else what.replace('frames', 'frame')}: {shown}", ones)
+
+
+def _named(labels):
+    """`LKNE`, `LKNE and LANK`, or `46 markers (LFHD, RFHD, LBHD, ...)`."""
+    if len(labels) > 4:
+        return f"{len(labels)} markers ({', '.join(labels[:3])}, ...)"
+    return " and ".join([", ".join(labels[:-1]), labels[-1]] if len(labels) > 1 else labels)
 
 
 def _timed(text, stretches):

@@ -9,8 +9,8 @@ import numpy as np
 from .frames import RigidFit, placed, rigid_fit, taken_back
 from .robust import median, medians, quantile
 
-_ROUNDS = 4
-_MOST_FRAMES = 120
+_ROUNDS = 3
+_MOST_FRAMES = 100
 
 
 class Shape(NamedTuple):

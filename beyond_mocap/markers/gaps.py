@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from ..motion.runs import runs
-from .carriers import carried, helpers_of
+from .carriers import Carried, carried, helpers_of
+from .cluster_shape import Shape, mean_shape
 
 # a marker that strays this far from its place among its helpers rides on them softly, m
 _SOFT = 0.015
@@ -50,16 +51,24 @@ def gaps_of(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
 
 
 def fill(
-    positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, markers: Iterable[int]
+    positions: np.ndarray,
+    soft: np.ndarray,
+    fps: float,
+    longest: Longest,
+    known: Mapping[int, Carried],
+    ask: Callable[[], None] = lambda: None,
 ) -> tuple[np.ndarray, list[Gap]]:
     """(positions (T, M, 3) m with gaps filled, the gaps and how): nothing that was seen is moved, and nothing jumps.
 
-    soft: (M, M) m, how much each pair's distance varies. markers: whose gaps. Every gap is filled from what was seen alone, never from
+    soft: (M, M) m, how much each pair's distance varies. known: the markers whose gaps are filled, and what carries them
+    as a rule. ask: called for each gap; it may raise. Every gap is filled from what was seen alone, never from
     another gap's filling.
     """
     out, told = positions.copy(), []
-    for gap in gaps_of(positions, markers):
-        how, path = _by_helpers(positions, gap, soft, fps, longest) or ("spline", None)
+    shapes: dict[tuple[int, ...], Shape] = {one.helpers: one.shape for one in known.values() if one.helpers}
+    for gap in gaps_of(positions, known):
+        ask()
+        how, path = _by_helpers(positions, gap, soft, fps, longest, known[gap.marker], shapes) or ("spline", None)
         if path is None and gap.frames <= longest.spline * fps:
             path = bridge(positions[:, gap.marker], gap.first, gap.end, fps)
         if path is None:
@@ -70,16 +79,15 @@ def fill(
     return out, told
 
 
-def _by_helpers(positions, gap, soft, fps, longest):
+def _by_helpers(positions, gap, soft, fps, longest, one, shapes):
     """(how, path (n, 3)) of a gap ridden over on the markers seen all through it, or None."""
     low, high = max(gap.first - 1, 0), min(gap.end + 1, len(positions))
     there = np.isfinite(positions[low:high, :, 0]).all(axis=0)
     there[gap.marker] = False
     if there.sum() < 3 or gap.frames > max(longest.cluster, longest.soft) * fps:
         return None
-    reachable = np.where(there[None, :] & there[:, None], soft, np.inf)
-    reachable[gap.marker] = np.where(there, soft[gap.marker], np.inf)
-    one = carried(positions, gap.marker, helpers_of(gap.marker, reachable, positions))
+    if not (one.helpers and there[list(one.helpers)].all() and one.trusted[gap.first : gap.end].all()):
+        one = _others(positions, gap, soft, there, shapes)
     if not one.helpers or not one.trusted[gap.first : gap.end].all():
         return None
     how = "cluster" if one.sigma <= _SOFT else "soft"
@@ -88,6 +96,16 @@ def _by_helpers(positions, gap, soft, fps, longest):
         return None
     turn, shift = one.fit.rotation[gap.first : gap.end], one.fit.shift[gap.first : gap.end]
     return how, np.einsum("tij,tj->ti", turn, local) + shift
+
+
+def _others(positions, gap, soft, there, shapes):
+    """How the marker of a gap is carried by markers that are `there` (M,) all through it."""
+    reachable = np.where(there[None, :] & there[:, None], soft, np.inf)
+    reachable[gap.marker] = np.where(there, soft[gap.marker], np.inf)
+    helpers = helpers_of(gap.marker, reachable, positions)
+    if helpers and helpers not in shapes:
+        shapes[helpers] = mean_shape(positions[:, list(helpers)])
+    return carried(positions, gap.marker, helpers, shapes.get(helpers))
 
 
 def _between(local, gap, fps, curved):

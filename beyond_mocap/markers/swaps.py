@@ -6,7 +6,7 @@ cluster tells, two leaps in which each marker goes on where the other one was, t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -73,18 +73,22 @@ def mend(
     leaping: np.ndarray,
     fps: float,
     opposite: Sequence[Pairs] = (),
+    ask: Callable[[], None] = lambda: None,
 ) -> tuple[np.ndarray, list[Swap]]:
     """(positions (T, M, 3) m with swaps exchanged back, the swaps): what deforms the clusters and mends them exchanged.
 
     leaping: (T, M) bool from `pieces.leaps`. opposite: pairs that are likely taken for each other (left and right), and
     whole segments of them: always asked about. The exchange that mends the most is made first, and the others are asked
-    about again where it matters. Of a pair that no cluster tells of, a single leap onto each other's ways is told.
+    about again where it matters. ask: called for each question; it may raise. Of a pair that no cluster tells of, a single leap onto each other's ways is told.
     """
     out, found, deformed = positions.copy(), [], _Deformed(carried)
     crossings = _crossings(positions)
     step = max(1, int(_EVERY * fps))
     asked = [pairs for pairs in _questions(positions, carried, crossings, fps, opposite) if deformed.told(pairs)]
-    offers = {pairs: _offers(deformed, out, pairs, leaping, step) for pairs in asked}
+    offers = {}
+    for pairs in asked:
+        ask()
+        offers[pairs] = _offers(deformed, out, pairs, leaping, step)
     for _ in range(_MOST_SWAPS):
         best = max(((gain, pairs, first, end) for pairs, rows in offers.items() for gain, first, end in rows), default=None)
         if best is None:

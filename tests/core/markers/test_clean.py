@@ -203,3 +203,34 @@ def test_it_can_be_stopped_and_says_how_far_it_is(walk):
 def test_settings_that_cannot_be_are_refused():
     with pytest.raises(InputError, match="longest_gap"):
         CleanSettings(longest_gap=-1.0)
+
+
+def test_markers_that_are_all_gone_together_are_told_in_one_line(walk):
+    def hide(positions, index):
+        positions[60:100] = np.nan
+
+    cleaned, report = clean(spoiled(walk, hide), clusters_of(walk))
+    assert len(report.left) == len(walk.trial.labels) and len(report.lines) == 1
+    assert report.lines[0].startswith(f"{len(walk.trial.labels)} markers") and "0.600 to 0.990 s" in report.lines[0]
+    assert np.isnan(cleaned.positions[60:100]).all()
+
+
+def test_the_pose_gets_no_long_guesses(walk):
+    def hide(positions, index):
+        positions[60:69, [index[label] for label in ("LFIN", "LWRA", "LWRB", "LFRM", "LELB", "LUPA")]] = np.nan
+        positions[60:80, index["LFHD"]] = np.nan
+
+    done = clean(spoiled(walk, hide), clusters_of(walk))
+    how = {gap.labels[0]: gap.how for gap in done.report.gaps}
+    assert how["LFHD"] == "cluster" and how["LFIN"] in ("soft", "spline")
+    assert np.isnan(off(walk, done.for_pose(), "LFIN")[60:69]).all() and not np.isnan(off(walk, done.trial, "LFIN")).any()
+    assert off(walk, done.for_pose(), "LFHD").max() < 0.005
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_trial_that_hardly_sees_anything_says_nothing_on_the_terminal(walk):
+    chance = np.random.default_rng(1)
+    positions = np.where(chance.random(walk.trial.positions.shape[:2])[..., None] < 0.9, np.nan, walk.trial.positions)
+    cleaned, _ = clean(walk.trial.with_positions(positions), clusters_of(walk))
+    seen = np.isfinite(positions)
+    assert np.mean(cleaned.positions[seen] == positions[seen]) > 0.95
