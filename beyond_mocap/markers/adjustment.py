@@ -21,6 +21,7 @@ from ..motion import quaternion
 
 _HUBER = 2.5  # sigmas beyond which a marker counts less
 _HINGES = {"Leg": (1, 2, 0), "ForeArm": (2, 1, None)}  # axis of the bend, axis that must stay square to it, its twist
+_LARGEST_TURN = 0.3  # radians in one step: further off the equations are no longer straight
 _CARRY, _TWIST = np.radians(4.0), np.radians(15.0)
 """How far a hinge's axis strays (radians): to the side, and about the limb (knees)."""
 
@@ -79,9 +80,9 @@ class Adjustment:
         self.root = motion.root_positions.copy()
         self.local = quaternion.to_matrix(motion.rotations)
 
-    def run(self, steps: int = 8) -> None:
+    def run(self, steps: int = 14) -> None:
         """Adjust until nothing moves by more than a tenth of a millimetre, at most so many steps."""
-        damping = 1e-6
+        damping = 1e-4
         cost = self.cost()
         for _ in range(steps):
             kept = self._state()
@@ -89,12 +90,12 @@ class Adjustment:
             now = self.cost()
             if now > cost * (1.0 + 1e-9):
                 self._restore(kept)
-                damping = max(damping * 30.0, 1e-4)
+                damping *= 20.0
                 if damping > 1e4:
                     return
                 continue
-            damping, cost = damping * 0.2, now
-            if largest < 1e-4:
+            damping, cost, gain = max(damping * 0.1, 1e-7), now, cost - now
+            if largest < 1e-4 or gain < 1e-3 * cost:
                 return
 
     def _state(self):
@@ -230,8 +231,8 @@ class Adjustment:
         flat = shape.reshape(-1, columns.count)
         normal = normal + flat.T @ flat - _joined(mixed).T @ _joined(solved[..., :-1])
         right = right + flat.T @ miss.reshape(-1) - np.einsum("fap,fa->p", mixed, solved[..., -1])
+        self.normal = normal.copy()
         normal[range(columns.count), range(columns.count)] *= 1.0 + damping
-        self.normal = normal
         change = -np.linalg.solve(normal, right)
         pose_change = -solved[..., -1] - np.einsum("fap,p->fa", solved[..., :-1], change)
         self._move(world, change, pose_change)
@@ -243,6 +244,8 @@ class Adjustment:
         body.places = body.places + change[columns.place]
         self.root = self.root + pose_change[:, :3]
         turns = pose_change[:, 3:].reshape(len(self.root), -1, 3)
+        size = np.linalg.norm(turns, axis=-1, keepdims=True)
+        turns = turns * np.minimum(1.0, _LARGEST_TURN / np.maximum(size, 1e-9))
         local = self.local.copy()
         for joint, parent in enumerate(body.parents):
             if body.held[joint]:

@@ -12,12 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import Cancelled, InputError
+from ..motion.motion import Motion
 from .adjustment import Adjustment, Body, Prior, Pull
 from .assemble import model_from_frame
 from .calibration_frames import neutral_frames, still_frame, unlike_frames
 from .marker_set import MarkerSet
 from .model import MarkerModel
-from .pose import PoseSettings, solve
+from .pose import PoseSettings, Solved, solve
 from .trial import MarkerTrial
 from .weights import cluster_deviation, edge_deviation
 
@@ -27,6 +28,7 @@ _NEUTRAL_FRAMES = 5
 _WORTH = 10.0  # independent frames that the chosen ones are worth: skin errs alike in poses alike
 _PLACE_SIGMA = 0.015
 _USUAL_SIGMA = 0.006
+_FAR, _FAR_BESIDE = 2.0, 0.005  # a frame is passed over that fits so many times, and m, worse than the middle one
 _LIMBS = {"ForeArm": 1, "Hand": 1, "Leg": 2, "Foot": 2}
 """Bones that lie exactly along an axis: joint at their end -> axis."""
 
@@ -94,7 +96,8 @@ def refined(
 ) -> MarkerModel:
     """The model adjusted to the motion: joint centres, bone lengths and markers' places, each by its uncertainty."""
     part = _chosen(model, trial, static, frames)
-    motion = solve(model, part, PoseSettings(weights=False), cancelled=cancelled).motion
+    solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
+    motion, part = _sane(solved, part)
     body = _body(model)
     task = Adjustment(body, _prior(model, place_sigma), _pull(model), _seen(model, part), _sigmas(model), worth)
     task.start(motion)
@@ -123,6 +126,15 @@ def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, 
         still = _seen(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
         positions = np.concatenate([still, positions])
     return MarkerTrial(model.markers, positions, 1.0, name=trial.name)
+
+
+def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
+    """Without the frames that fit far worse than most: swapped markers, or a pose that was not found."""
+    away = np.sqrt(np.nanmean(solved.residual**2, axis=1))
+    good = np.flatnonzero(away <= _FAR * np.nanmedian(away) + _FAR_BESIDE)
+    motion = solved.motion
+    kept = Motion(motion.skeleton, motion.root_positions[good], motion.rotations[good], motion.fps)
+    return kept, part.with_positions(part.positions[good])
 
 
 def _seen(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:

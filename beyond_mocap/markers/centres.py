@@ -300,12 +300,16 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
     out.put(f"{name}Scapula", acromion - 0.25 * drop * chest[:, 2], chest, SIGMAS["one side"])
     wrist, radial = _wrist(points, side)
     elbow = _elbow(out, points, side, sign, shoulder, wrist, radial)
+    if elbow is not None and wrist is not None and radial is None:  # a lone marker lies on the back of the wrist
+        inside = out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2]
+        marker = wrist
+        for _ in range(4):  # which side is the back follows from the elbow, and the elbow from the wrist's centre
+            wrist = marker - inside * elbow[1]
+            elbow = _elbow(out, points, side, sign, shoulder, wrist, radial)
     if elbow is None:
         out.notes.append(f"{side} arm: no marker on the elbow; left out")
         return
     place, up, sigma = elbow
-    if wrist is not None and radial is None:  # a lone marker lies on the back of the wrist
-        wrist = wrist - out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2] * up
     out.put(f"{name}Arm", shoulder, frame_along("Y", sign * (place - shoulder), "Z", up), SIGMAS["shoulder"])
     if wrist is None:
         out.notes.append(f"{side} forearm: no marker on the wrist; left out")
