@@ -26,8 +26,9 @@ FRAMES = 60
 _STATIC_FRAMES = 4
 _NEUTRAL_FRAMES = 5
 _WORTH = 10.0  # independent frames that the chosen ones are worth: skin errs alike in poses alike
-_PLACE_SIGMA = 0.015
+_PLACE_SIGMA = 0.008
 _USUAL_SIGMA = 0.006
+_UNTOLD = 0.001  # m: what no motion can tell stays as predicted
 _FAR, _FAR_BESIDE = 2.0, 0.005  # a frame is passed over that fits so many times, and m, worse than the middle one
 _LIMBS = {"ForeArm": 1, "Hand": 1, "Leg": 2, "Foot": 2}
 """Bones that lie exactly along an axis: joint at their end -> axis."""
@@ -164,7 +165,9 @@ def _prior(model: MarkerModel, place_sigma: float) -> Prior:
     sigma = np.maximum(model.centre_sigma, 0.003)
     above = sigma[np.maximum(model.skeleton.parents, 0)]
     places = np.full(len(model.joint), place_sigma)
-    return Prior(model.skeleton.offsets.copy(), np.sqrt(sigma**2 + above**2), model.places.copy(), places)
+    held = ~model.freedom.free.any(axis=1)
+    offsets = np.where(held, _UNTOLD, np.sqrt(sigma**2 + above**2))
+    return Prior(model.skeleton.offsets.copy(), offsets, model.places.copy(), places)
 
 
 def _pull(model: MarkerModel) -> Pull:

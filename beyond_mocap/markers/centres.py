@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
+from ..motion import quaternion
 from .frames import rigid_fit
 from .template import LANDMARK_PLACES, PLACES, TIPS
 
@@ -299,13 +300,13 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
     out.axes[f"{name}Shoulder"] = chest
     out.put(f"{name}Scapula", acromion - 0.25 * drop * chest[:, 2], chest, SIGMAS["one side"])
     wrist, radial = _wrist(points, side)
-    elbow = _elbow(out, points, side, sign, shoulder, wrist, radial)
-    if elbow is not None and wrist is not None and radial is None:  # a lone marker lies on the back of the wrist
-        inside = out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2]
-        marker = wrist
-        for _ in range(4):  # which side is the back follows from the elbow, and the elbow from the wrist's centre
-            wrist = marker - inside * elbow[1]
-            elbow = _elbow(out, points, side, sign, shoulder, wrist, radial)
+    elbow = None
+    if f"{side}_elbow_lateral" in points:
+        plain = _outwards_plainly(chest, shoulder, points[f"{side}_elbow_lateral"], sign)
+        if wrist is None or radial is not None:
+            elbow = _elbow(out, points, side, sign, shoulder, wrist, radial, plain)
+        else:
+            elbow, wrist = _elbow_and_wrist(out, points, side, sign, shoulder, wrist, plain)
     if elbow is None:
         out.notes.append(f"{side} arm: no marker on the elbow; left out")
         return
@@ -329,17 +330,35 @@ def _wrist(points, side) -> tuple[np.ndarray | None, np.ndarray | None]:
     return (lone[0], None) if lone else (None, None)
 
 
-def _elbow(out, points, side, sign, shoulder, wrist, radial):
+def _outwards_plainly(chest, shoulder, elbow, sign) -> np.ndarray:
+    """Where the outside of an elbow points when the arm has come down from a T-pose the short way."""
+    turn = quaternion.between(sign * chest[:, 1], elbow - shoulder)
+    return quaternion.rotate(turn, chest[:, 2])
+
+
+def _elbow_and_wrist(out, points, side, sign, shoulder, marker, plain):
+    """An elbow as `_elbow` and the wrist's centre, where a lone `marker` lies on the back of the wrist.
+
+    Which side is the back follows from the elbow, and the elbow from the wrist's centre.
+    """
+    inside = out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2]
+    outwards = plain
+    for _ in range(4):
+        wrist = marker - inside * outwards
+        elbow = _elbow(out, points, side, sign, shoulder, wrist, None, plain)
+        outwards = elbow[1]
+    return elbow, wrist
+
+
+def _elbow(out, points, side, sign, shoulder, wrist, radial, plain):
     """An elbow's centre, the direction from its medial to its lateral side, and the uncertainty."""
-    lateral = points.get(f"{side}_elbow_lateral")
-    if lateral is None:
-        return None
-    hint = out.axes["Chest"][:, 0] if wrist is None or radial is None else sign * np.cross(radial, wrist - lateral)
+    lateral = points[f"{side}_elbow_lateral"]
     if wrist is not None and f"{side}_elbow_medial" not in points:
         half = out.size * HALF_WIDTHS["elbow"] + MARKER_RADIUS
         outwards = _plane_beside(lateral, shoulder, wrist, half, -sign)
         if outwards is not None:
             return lateral - half * outwards, outwards, SIGMAS["one side"]
+    hint = plain if wrist is None or radial is None else sign * np.cross(radial, wrist - lateral)
     return _hinge(out, points, side, "elbow", shoulder, hint)
 
 
