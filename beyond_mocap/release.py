@@ -1,8 +1,8 @@
 """The recipe: when and how a ball left the hand of a recorded throw (Fredriksson ch. 6).
 
 `release(trial, motion)` takes the markers and the motion that was solved from them. Where a marker sits on the ball and
-is seen in flight, time, way and spin are fitted to it; else the hand tells, less surely. Neither looks at the speed that
-the file's name may give: that stands beside the result, for comparison.
+is seen in flight, time, way and spin are fitted to it; else the hand tells, less surely. Neither looks at the speed
+that the file's name may give: that stands beside the result, for comparison.
 """
 
 from __future__ import annotations
@@ -28,8 +28,13 @@ from .motion.humanoid import identify
 from .motion.motion import Motion, forward_kinematics, resample
 from .take import BallPath
 
+FEWEST = 12
+"""Frames without which no throw is looked for."""
+SLOWEST = 1.5
+"""m/s: a hand that is never faster throws nothing."""
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
+_NEARBY = 0.3  # s before a hand is fastest: the ball is in it
 _LONGEST = 8.0  # s of flight until the ground
 _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
 
@@ -38,8 +43,8 @@ _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or ne
 class ReleaseSettings:
     """What is known beforehand.
 
-    ball_marker: label, None to find one named as a ball, "" for none. radius: m, None for the kind's, or fitted where the
-    markers tell it. hand: "left", "right" or None for the one that throws. ball: one of `THROWN`. window: s about the
+    ball_marker: label, None to find one named as a ball, "" for none. radius: m, None for the kind's, or fitted where
+    the markers tell it. hand: "left", "right" or None for the one that throws. ball: one of `THROWN`. window: s about the
     first guess that are searched. centre: (3,) m, the ball's centre in the hand's frame where other throws told it.
     """
 
@@ -56,12 +61,12 @@ class Release:
     """How the ball left.
 
     time: s from the trial's first frame. frame: the nearest one. position (3,) m and velocity (3,) m/s of its centre,
-    spin (3,) rad/s, zero where nothing tells it. time_sigma: s and speed_sigma: m/s, one standard deviation. side: of
-    the hand. how: "ball" where its marker told, "hand" where only the hand did. residual: m of its marker in flight, NaN
-    without. flight_frames: in which it was seen to fly. radar: m/s that the file's name tells, or None. centre: (3,) m
-    in the hand's frame, radius: m. path: the ball in all frames. impact: (3,) m, where it first meets the ground, or
-    None. hips: (3,) m in the first frame. notes: lines for people. All places are in the motion's space, with its floor
-    at 0, from which markers may be shifted.
+    spin (3,) rad/s, zero where nothing tells it. time_sigma: s, speed_sigma: m/s and way_sigma: rad of the direction,
+    one standard deviation each. side: of the hand. how: "ball" where its marker told, "hand" where only the hand did.
+    residual: m of its marker in flight, NaN without. flight_frames: in which it was seen to fly. radar: m/s that the
+    file's name tells, or None. centre: (3,) m in the hand's frame, radius: m. path: the ball in all frames. impact:
+    (3,) m, where it first meets the ground, or None. hips: (3,) m in the first frame. notes: lines for people. All
+    places are in the motion's space, with its floor at 0, from which markers may be shifted.
     """
 
     time: float
@@ -71,6 +76,7 @@ class Release:
     spin: np.ndarray
     time_sigma: float
     speed_sigma: float
+    way_sigma: float
     side: str
     how: str
     residual: float
@@ -98,7 +104,8 @@ class Release:
         return {
             "release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
             "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
-            "uncertainty_m_s": self.speed_sigma, "radar_speed_m_s": self.radar,
+            "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
+            "radar_speed_m_s": self.radar,
             "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
             "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side, "how": self.how,
             "residual_m": None if np.isnan(self.residual) else self.residual, "flight_frames": self.flight_frames,
@@ -110,19 +117,24 @@ class Release:
 def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = ReleaseSettings()) -> Release:
     """When and how the ball left the hand.
 
-    motion: solved from the trial, frame for frame, or at another rate over the same time. InputError: a motion of another
-    length, a skeleton without hands, a ball's marker that is not there, a kind of ball that is not known.
+    motion: solved from the trial, frame for frame, or at another rate over the same time. InputError: a motion of
+    another length, a skeleton without hands, a ball's marker that is not there, a kind of ball that is not known.
     """
     ball = THROWN.get(settings.ball)
     if ball is None:
         raise InputError("release", f"ball {settings.ball!r}", f"one of {', '.join(THROWN)}")
     motion = _frame_for_frame(trial, motion)
+    if len(trial) < FEWEST:
+        raise InputError(trial.name, f"{len(trial)} frames", f"at least {FEWEST}", "take a longer stretch")
     even = evenly(trial)
     label = _ball_label(even, settings.ball_marker)
     marker = None if label is None else even.positions[:, even.index(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
     hands = [sharpened(hand_of(motion, side), even, _ball_labels(even, label)) for side in sides]
     hand = _throwing(hands, marker)
+    pace = float(np.max(_steady(hand)))
+    if pace < SLOWEST:
+        raise InputError(trial.name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw", "choose another trial, or hand")
     lies, notes = _in_hand(hand, marker, settings, ball)
     found = None if marker is None else _by_ball(hand, marker, lies, ball, settings, notes)
     if marker is not None and found is None:
@@ -141,6 +153,7 @@ class _Found:
     how: str
     time_sigma: float
     speed_sigma: float
+    way_sigma: float
     residual: float = float("nan")
     frames: int = 0
 
@@ -155,9 +168,9 @@ def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, nam
     hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
     return Release(
         launch.time, int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)), launch.position, launch.velocity,
-        np.asarray(launch.spin, float), found.time_sigma, found.speed_sigma, hand.side, found.how, found.residual,
-        found.frames, radar_speed(name), lies.centre, lies.radius, BallPath(hand.times, places, seen), impact, hips,
-        tuple(notes),
+        np.asarray(launch.spin, float), found.time_sigma, found.speed_sigma, found.way_sigma, hand.side,
+        found.how, found.residual, found.frames, radar_speed(name), lies.centre, lies.radius,
+        BallPath(hand.times, places, seen), impact, hips, tuple(notes),
     )  # fmt: skip
 
 
@@ -200,12 +213,23 @@ def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
     fast = max(range(len(hands)), key=lambda i: speeds(hands[i].origin, hands[i].fps)[peaks[i]])
     if marker is None or len(hands) == 1:
         return hands[fast]
-    nearest = []
-    for hand in hands:
-        away = np.linalg.norm(marker - hand.carried(HOLD * hand.reach * hand.finger), axis=-1)[: peaks[fast] + 1]
-        nearest.append(np.nanmedian(away[-int(0.3 * hand.fps) :]) if np.isfinite(away).any() else np.inf)
-    nearest = np.nan_to_num(nearest, nan=np.inf)
+    nearest = [_distance(hand, marker, peaks[fast]) for hand in hands]
     return hands[int(np.argmin(nearest))] if np.isfinite(nearest).any() else hands[fast]
+
+
+def _steady(hand: Hand) -> np.ndarray:
+    """(T,) m/s, of which single frames that are off are taken out."""
+    from scipy.signal import medfilt
+
+    return medfilt(speeds(hand.origin, hand.fps), 5)
+
+
+def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
+    """m between hand and marker shortly before the hand is fastest; infinite where it is hardly seen then."""
+    away = np.linalg.norm(marker - hand.carried(HOLD * hand.reach * hand.finger), axis=-1)
+    away = away[max(peak - int(_NEARBY * hand.fps), 0) : peak + 1]
+    away = away[np.isfinite(away)]
+    return float(np.median(away)) if len(away) >= 3 else np.inf
 
 
 def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
@@ -257,7 +281,8 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     if not sure:
         notes.append("the ball's marker is not seen in the hand: the release is where the flight meets the hand")
     launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
-    return _Found(launch, ball, "ball", fit.time_sigma, fit.speed_sigma, fit.residual, fit.frames)
+    way_sigma = fit.speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
+    return _Found(launch, ball, "ball", fit.time_sigma, fit.speed_sigma, way_sigma, fit.residual, fit.frames)
 
 
 def _without_air(ball: Ball) -> Ball:
@@ -270,7 +295,7 @@ def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _
     if not hand.markers:
         notes.append("no markers near the hand: the motion tells alone, which its filter has made slower")
     launch = Launch(found.time, found.position, found.velocity)
-    return _Found(launch, ball, "hand", found.time_sigma, found.speed_sigma)
+    return _Found(launch, ball, "hand", found.time_sigma, found.speed_sigma, found.way_sigma)
 
 
 def _stride(motion: Motion) -> np.ndarray:

@@ -29,6 +29,7 @@ def add(verbs):
     verb.add_argument("--ball-csv", type=Path, metavar="B.csv", help="the ball's way over the whole trial")
     verb.add_argument("--unit", metavar="UNIT", help="of the markers: metres per unit, or mm, cm, m, in")
     verb.add_argument("--subject", metavar="NAME", help="whose markers, where there are several bodies in the file")
+    verb.add_argument("--up", metavar="AXIS", help="of the file that points up: X, Y, Z or --up=-Y; default: found")
     verb.set_defaults(run=run)
     return verb
 
@@ -42,7 +43,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
     begun = time.perf_counter()
     check_outputs(options.report, options.ball_csv, never=(options.trial, options.motion))
-    trial = read_markers(options.trial, options.unit, options.subject)
+    trial = read_markers(options.trial, options.unit, options.subject, options.up)
     motion = bvh.read(options.motion).motion
     loaded = time.perf_counter()
     settings = ReleaseSettings(options.ball_marker, options.radius, options.hand, options.ball_kind)
@@ -55,7 +56,9 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     told.end()
     for note in found.notes:
         told.note(f"{options.trial}: {note}")
-    radar = "" if found.radar is None else f", radar {found.radar:.1f} m/s ({100 * (found.speed / found.radar - 1):+.1f} %)"
+    radar = ""
+    if found.radar is not None:
+        radar = f", radar {found.radar:.1f} m/s ({100 * (found.speed / found.radar - 1):+.1f} %)"
     print(
         f"{options.report}: {found.side} hand, released at {found.time:.3f} s (frame {found.frame}, +-"
         f"{1000 * found.time_sigma:.0f} ms), {found.speed:.1f} +- {found.speed_sigma:.1f} m/s{radar}"

@@ -13,7 +13,7 @@ from beyond_mocap.files import bvh
 from beyond_mocap.files.trc_write import write_trc
 from beyond_mocap.markers.planted import planted
 from beyond_mocap.markers.planted_ball import PlantedBall
-from beyond_mocap.motion.motion import resample
+from beyond_mocap.motion.motion import concatenate, resample
 from beyond_mocap.motion.throws import throw
 from beyond_mocap.release import ReleaseSettings, release
 
@@ -78,6 +78,51 @@ def test_a_moved_motion_serves(known):
 def test_bad_settings_are_said(known, settings, said):
     with pytest.raises(InputError, match=said):
         release(known.trial, known.motion, settings)
+
+
+def seen_as(known, change):
+    positions = known.trial.positions.copy()
+    change(positions, known.trial.index("BALL"), int(known.ball.asked.release * 200.0))
+    return known.trial.with_positions(positions)
+
+
+def hide_held(places, ball, release):
+    places[: release + 3, ball] = np.nan
+
+
+def hide_all(places, ball, release):
+    places[:, ball] = np.nan
+
+
+def bounce_off(places, ball, release):
+    steps = np.arange(len(places) - release - 30)[:, None]
+    places[release + 30 :, ball] = places[release + 29, ball] - steps * [0.05, 0.0, 0.0]
+
+
+def scatter(places, ball, release):
+    rng = np.random.default_rng(1)
+    places[rng.integers(0, len(places), 60), ball] += rng.normal(0.0, 0.3, (60, 3))
+
+
+@pytest.mark.parametrize("change, how, frames, share", [
+    (hide_held, "ball", 1.0, 0.02), (bounce_off, "ball", 1.0, 0.02), (scatter, "ball", 2.0, 0.02),
+    (hide_all, "hand", 4.0, 0.1),
+])
+def test_a_ball_that_is_badly_seen(known, change, how, frames, share):
+    found = release(seen_as(known, change), known.motion)
+    assert (found.how, found.side) == (how, "right")
+    assert abs(found.time - known.ball.asked.release) < frames / 200.0
+    assert abs(found.speed / known.ball.speed - 1.0) < share
+    assert abs(found.radius - 0.0366) < 0.002
+
+
+def test_no_throw_is_said(known):
+    still = known.motion.frames(0, 1)
+    standing = concatenate([still] * len(known.trial))
+    with pytest.raises(InputError, match="a throw"):
+        release(known.trial.with_positions(np.repeat(known.trial.positions[:1], len(known.trial), axis=0)), standing)
+    with pytest.raises(InputError, match="at least 12"):
+        release(known.trial.frames(0, 5), known.motion.frames(0, 5))
 
 
 def test_another_trials_motion_is_said(known):

@@ -1,7 +1,8 @@
 """Where a hand is, frame by frame: by its joint of a solved motion, and sharper by the markers that it carries.
 
 A solved motion is filtered, which takes off the very peak that a throw is about; the hand's markers are not. Where at
-least three markers near the wrist are seen, the hand's frame is the one that carries them (eq. 3.14), else the motion's.
+least three markers near the wrist are seen, the hand's frame is the one that carries them (eq. 3.14), else the
+motion's.
 """
 
 from __future__ import annotations
@@ -34,8 +35,9 @@ class Hand:
     """One hand over T frames.
 
     side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
-    finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's frame.
-    markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are, which the origin has in it.
+    finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's
+    frame. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are, which the origin
+    has in it.
     """
 
     side: str
@@ -93,7 +95,7 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
         shift = shift + np.nanmedian(seen - _placed(hand, shift, places), axis=(0, 1))
     moved = replace(hand, origin=hand.origin + shift, shift=shift)
     fit = rigid_fit(places, seen)
-    tells = fit.sound & (fit.rms < np.fmax(_TORN * np.nanmedian(fit.rms), _STEADY))
+    tells = fit.sound & (fit.rms < max(_TORN * _usual(fit.rms), _STEADY))
     known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
     off = np.where(known[..., None], seen - _placed(hand, shift, places), 0.0).sum(axis=1)
     off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers move it, and cannot turn it
@@ -104,6 +106,11 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
         rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation),
         markers=names,
     )
+
+
+def _usual(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else 0.0
 
 
 def _reach(hand: Hand, places: np.ndarray) -> float:
@@ -118,10 +125,13 @@ def _placed(hand: Hand, shift: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
-    """(3,) m, upwards: by what the motion stands too low for the markers, as far as their distances from the wrist tell:
-    those of the hand's own markers do not change."""
-    kept = [number for number, label in enumerate(trial.labels) if label not in never]
+    """(3,) m, upwards: by what the motion stands too low for the markers, as far as their distances from the wrist
+    tell: those of the hand's own markers do not change."""
+    often = np.count_nonzero(trial.seen[:: max(len(trial) // 300, 1)], axis=0) > 2
+    kept = [number for number, label in enumerate(trial.labels) if label not in never and often[number]]
     few = trial.positions[:: max(len(trial) // 300, 1), kept]
+    if not kept:
+        return np.zeros(3)
     origin = hand.origin[:: max(len(trial) // 300, 1), None, :]
     near = np.flatnonzero(np.nanmedian(np.linalg.norm(few[..., :2] - origin[..., :2], axis=-1), axis=0) < NEAR)
     best, found = np.inf, 0.0
@@ -139,7 +149,7 @@ def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple
     kept = []
     for number, label in enumerate(trial.labels):
         known = np.isfinite(away[:, number])
-        if label in never or np.count_nonzero(known) < 0.3 * len(trial):
+        if label in never or np.count_nonzero(known) < max(0.3 * len(trial), 1):
             continue
         distance = away[known, number]
         spread = np.subtract(*np.percentile(distance, [90, 10]))

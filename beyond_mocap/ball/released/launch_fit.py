@@ -7,8 +7,8 @@ Before the release the marker stands still in the hand's frame; after it, it goe
 which is eq. 6.3 with the turning marker written as the circle that it goes on (a, b: where it starts and where it is a
 quarter turn later; what it has along the spin's axis goes into p). For a given rate w it is linear in p, v, a and b, so
 that all release times, on both sides of the first guess, and all rates are tried at once. The paper searched before the
-guess alone, with the hand's velocity as the ball's: its throws came out 1.15 m/s too slow (§8.2.2). Here the flight says
-how fast the ball is, and the hand only when.
+guess alone, with the hand's velocity as the ball's: its throws came out 1.15 m/s too slow (§8.2.2). Here the flight
+says how fast the ball is, and the hand only when.
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ SPEED_SIGMA = 0.06
 """Of the speed, one standard deviation."""
 TIME_SIGMA = 0.004
 """Seconds, one standard deviation, in a fast throw; slower ones have more, as they roll longer."""
-PAD = 0.93
-"""Of the way from wrist to fingertip: where the fingers' pads push, the fingers bent a little."""
+PAD = 0.91
+"""Of the way from wrist to fingertip: where the fingers' pads push, each joint bent by some 25 degrees."""
 HOLD = 0.70
 """Of the way from wrist to fingertip: where the ball's centre is while it is gripped."""
 ROLLS_WITH = 2.0 / 7.0
@@ -48,13 +48,15 @@ _LEAST_STEP = 0.25  # m between the feet along the throw, from where on they tel
 @dataclass(frozen=True, eq=False)
 class HandRelease:
     """How the ball left by the hand alone. time: s from frame 0. position: (3,) m of its centre. velocity: (3,) m/s.
-    time_sigma, speed_sigma: s and m/s, one standard deviation. rolled: s that it took along the fingers."""
+    time_sigma, speed_sigma, way_sigma: s, m/s and rad, one standard deviation. rolled: s that it took along the
+    fingers."""
 
     time: float
     position: np.ndarray
     velocity: np.ndarray
     time_sigma: float
     speed_sigma: float
+    way_sigma: float
     rolled: float
 
 
@@ -78,10 +80,10 @@ def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None)
     velocity = grip[start] + ROLLS_WITH * (tips[k] - tips[start])
     velocity = velocity + push * float((tips[k] - velocity) @ push)
     position = course.place(PAD)[k] + radius * push
-    speed = float(np.linalg.norm(velocity))
+    time_sigma = float(np.hypot(max(TIME_SIGMA, 0.5 * rolled), 0.3 / hand.fps))
     return HandRelease(
-        float(times[k]), position, velocity, float(np.hypot(max(TIME_SIGMA, 0.5 * rolled), 0.3 / hand.fps)),
-        SPEED_SIGMA * speed, float(rolled),
+        float(times[k]), position, velocity, time_sigma, SPEED_SIGMA * float(np.linalg.norm(velocity)),
+        _swept(grip[_about(times, start, time_sigma)]), float(rolled),
     )  # fmt: skip
 
 
@@ -153,6 +155,13 @@ def _push(course: _Course, k: int, aim: np.ndarray) -> np.ndarray:
     push = course.turn[k]
     size = np.linalg.norm(push)
     return aim if size < 1.0 or push @ aim < 0.5 * size else push / size
+
+
+def _swept(velocities: np.ndarray) -> float:
+    """rad: half the angle between the first and the last of velocities (N, 3)."""
+    first, last = velocities[0], velocities[-1]
+    size = max(float(np.linalg.norm(first) * np.linalg.norm(last)), 1e-9)
+    return 0.5 * float(np.arccos(np.clip(first @ last / size, -1.0, 1.0)))
 
 
 def _about(times: np.ndarray, k: int, seconds: float) -> slice:

@@ -46,8 +46,8 @@ def trials_report(folder: Path) -> str:
 def _fit_text(made: Sequence[TrialResult]) -> str:
     residual, single = (_mean([getattr(r, name) for r in made]) for name in ("residual", "single"))
     rate = _mean([r.rate for r in made])
-    return (f"<p>Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on the whole. Bars end "
-            "one standard deviation up and down.</p>")
+    return (f"<p>Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on the whole. "
+            "Bars end one standard deviation up and down.</p>")
 
 
 def _throws(made: Sequence[TrialResult]) -> list[str]:
@@ -71,7 +71,8 @@ def _throws(made: Sequence[TrialResult]) -> list[str]:
 
 
 def _paired_text(found: Paired) -> str:
-    lines = [f"{found.count} throws with a measured speed: estimated - measured {found.mean:+.2f} m/s"
+    many = "throws" if found.count != 1 else "throw"
+    lines = [f"{found.count} {many} with a measured speed: estimated - measured {found.mean:+.2f} m/s"
              + (f" (standard deviation {found.sd:.2f})" if np.isfinite(found.sd) else "")
              + f", {100 * found.share:.1f} % off on average, {100 * found.within:.0f} % of them within 10 %."]
     if np.isfinite(found.normal):

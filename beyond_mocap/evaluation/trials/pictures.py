@@ -1,4 +1,5 @@
-"""The pictures of a folder of trials, each a PNG as bytes (Fredriksson figs. 8.1 to 8.4); matplotlib inside functions."""
+"""The pictures of a folder of trials, each a PNG as bytes (Fredriksson figs. 8.1 to 8.4); matplotlib inside functions.
+"""
 
 from __future__ import annotations
 
@@ -94,7 +95,8 @@ def speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
     figure, (left, right) = _canvas(1, 2, 3.8)
     edges = _edges(np.concatenate([measured, estimated]), 16)
     for values, colour, name in ((measured, QUIET, "measured"), (estimated, DOMINANT, "estimated")):
-        left.hist(values, bins=edges, weights=np.full(len(values), 1.0 / len(values)), color=colour, alpha=0.6, label=name)
+        share = np.full(len(values), 1.0 / len(values))
+        left.hist(values, bins=edges, weights=share, color=colour, alpha=0.6, label=name)
     left.set_xlabel("m/s", fontsize=8)
     left.set_ylabel("share of throws")
     left.set_title("ball speeds", loc="left", fontsize=9.5)

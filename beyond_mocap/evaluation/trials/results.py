@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +29,10 @@ class Throw:
 
 @dataclass(frozen=True, eq=False)
 class TrialResult:
-    """One trial. subject: "" where unknown. frames: how many. squares: m^2, weighted squared residuals a frame (mean and
-    standard deviation; eq. 5.1). residual, single: mm, root mean square of the model's markers and of single segments.
-    rate: frames a second of the pose. throw: its release, or None. error: why there is no motion, "" where there is.
+    """One trial. subject: as the file says, else its session, "" where unknown. frames: how many. squares: m^2,
+    weighted squared residuals a frame (mean and standard deviation; eq. 5.1). residual, single: mm, root mean square of
+    the model's markers and of single segments. rate: frames a second of the pose. throw: its release, or None. error:
+    why there is no motion, "" where there is.
     """
 
     name: str
@@ -46,8 +47,8 @@ class TrialResult:
 
 
 def read_results(folder: Path) -> tuple[TrialResult, ...]:
-    """The trials of a folder by name: of its trials.json, else of all *.report.json below it. InputError where there are
-    none, or a report cannot be read."""
+    """The trials of a folder by name: of its trials.json, else of all *.report.json below it. InputError where there
+    are none, or a report cannot be read."""
     table = folder / "trials.json"
     if table.is_file():
         rows = _read(table).get("trials", ())
@@ -62,7 +63,8 @@ def _of_row(folder: Path, row: Mapping) -> TrialResult:
     name = str(row.get("trial", ""))
     if row.get("error") or not row.get("report"):
         return TrialResult(name, str(row.get("subject") or ""), error=str(row.get("error") or "no motion"))
-    return _of_report(name, _read(folder / row["report"]))
+    found = _of_report(name, _read(folder / row["report"]))
+    return found if found.subject else replace(found, subject=str(row.get("session") or ""))
 
 
 def _of_report(name: str, report: Mapping) -> TrialResult:

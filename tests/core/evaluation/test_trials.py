@@ -23,7 +23,8 @@ def report(subject, radar=30.0, speed=29.0, angle=0.0, hand="right", throws=True
     }  # fmt: skip
     return {
         "subject": subject, "frames": 400, "residual_mm": {"rms": 6.0, "single_rms": 4.0},
-        "weighted_se": {"mean": 0.002, "sd": 0.0005}, "frames_per_second": 400.0, "release": release if throws else None,
+        "weighted_se": {"mean": 0.002, "sd": 0.0005}, "frames_per_second": 400.0,
+        "release": release if throws else None,
     }  # fmt: skip
 
 
@@ -37,8 +38,8 @@ def test_a_folder_of_throws_becomes_a_page(tmp_path):
     rng = np.random.default_rng(2)
     radar = rng.normal(30.0, 3.0, 24)
     reports = {
-        f"t{i:02d}": report("ann" if i % 2 else "<bob>", radar[i], radar[i] - 1.2 + rng.normal(0, 0.3), rng.normal(90, 4),
-                            "left" if i % 8 == 1 else "right")
+        f"t{i:02d}": report("ann" if i % 2 else "<bob>", radar[i], radar[i] - 1.2 + rng.normal(0, 0.3),
+                            rng.normal(90, 4), "left" if i % 8 == 1 else "right")
         for i in range(24)
     }  # fmt: skip
     page = trials_report(written(tmp_path, reports))
@@ -61,7 +62,8 @@ def test_one_throw_without_impact_or_radar(tmp_path):
 
 
 def test_errors_of_trials_are_in_the_table(tmp_path):
-    rows = [{"trial": "a", "report": "a.report.json", "error": ""}, {"trial": "b", "report": "", "error": "<no markers>"}]
+    rows = [{"trial": "a", "report": "a.report.json", "error": ""},
+            {"trial": "b", "report": "", "error": "<no markers>"}]
     written(tmp_path, {"a": report("ann")})
     (tmp_path / "trials.json").write_text(json.dumps({"trials": rows}), "utf-8")
     assert "&lt;no markers&gt;" in trials_report(tmp_path)
@@ -79,7 +81,8 @@ def test_a_folder_without_reports_is_said(tmp_path):
 def throw_to(subject, angle, metres=20.0, side="right"):
     way = np.array([np.cos(angle), np.sin(angle)])
     hips = np.array([3.0, -1.0])
-    return TrialResult("t", subject, throw=Throw(30.0, None, side, hips, hips + metres * way, 30.0 * np.append(way, 0.0), "ball"))
+    thrown = Throw(30.0, None, side, hips, hips + metres * way, 30.0 * np.append(way, 0.0), "ball")
+    return TrialResult("t", subject, throw=thrown)
 
 
 def test_impacts_are_aligned_to_each_subjects_throws():

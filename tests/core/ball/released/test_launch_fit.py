@@ -64,7 +64,7 @@ def test_a_ball_that_is_never_seen_to_fly_is_none():
 
 
 def test_the_first_guess_is_near():
-    marker, held, _, centre = planted(200.0, 25.0, (0.0, -50.0, 0.0))
+    marker, _, _, centre = planted(200.0, 25.0, (0.0, -50.0, 0.0))
     assert abs(by_distance(centre, marker, 200.0) / 200.0 - RELEASE) < 0.03
     assert abs(fastest(centre, 200.0) / 200.0 - RELEASE) < 0.02
     assert by_distance(centre, np.full_like(marker, np.nan), 200.0) is None

@@ -19,8 +19,8 @@ def test_speeds_are_read(name, speed):
 
 
 @pytest.mark.parametrize("name", [
-    "pitch_biodata", "sprinter_run0350cms", "throw_808", "000870_003252_74_195_002_FF_8080", "trial_300kmh", "a_81mph_90mph",
-    "000870_003252_74_195_002_FF_010", "", "throw_3ms",
+    "pitch_biodata", "sprinter_run0350cms", "throw_808", "000870_003252_74_195_002_FF_8080", "trial_300kmh",
+    "a_81mph_90mph", "000870_003252_74_195_002_FF_010", "", "throw_3ms",
 ])
 def test_other_numbers_are_no_speed(name):
     assert radar_speed(name) is None
