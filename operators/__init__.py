@@ -23,6 +23,7 @@ from . import (
     build_library,
     cancel,
     choose_player,
+    clean_markers,
     command,
     delete_moment,
     discard,
@@ -46,6 +47,7 @@ from . import (
     leave_path,
     list_clips,
     load_video,
+    marker_model,
     marker_set,
     make_assets,
     mirror,
@@ -66,6 +68,7 @@ from . import (
     preview,
     propose_words,
     read_words,
+    reconstruct_markers,
     relink_library,
     remove_clip,
     remove_pin,
@@ -205,6 +208,10 @@ CLASSES = (
     marker_set.BEYOND_MOCAP_OT_load_marker_set,
     marker_set.BEYOND_MOCAP_OT_save_marker_set,
     set_static.BEYOND_MOCAP_OT_set_static,
+    marker_model.BEYOND_MOCAP_OT_load_marker_model,
+    marker_model.BEYOND_MOCAP_OT_save_marker_model,
+    clean_markers.BEYOND_MOCAP_OT_clean_markers,
+    reconstruct_markers.BEYOND_MOCAP_OT_reconstruct_markers,
 )
 
 

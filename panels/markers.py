@@ -45,6 +45,10 @@ class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
         row.prop(kept, "lines", text="", icon="MOD_WIREFRAME")
         row.prop(kept, "size", text="")
         section(layout, "markers_labels", "Labels & Segments", lambda opened: labels(opened, kept), closed=False)
+        section(layout, "markers_clean", "Clean Up", lambda opened: clean(self, opened, context, kept))
+        section(layout, "markers_model", "Static Trial & Model", lambda opened: model(opened, kept))
+        section(layout, "markers_pose", "Reconstruct", lambda opened: pose(self, opened, context, kept), closed=False)
+        section(layout, "markers_release", "Ball & Release", lambda opened: release(self, opened, context, kept))
 
 
 def labels(layout, kept) -> None:

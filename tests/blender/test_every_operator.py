@@ -301,6 +301,7 @@ ROWS = {
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
     "choose_player": Row("imported", lambda places: {"player": "player2"}),
+    "clean_markers": Row("imported", prepare=a_cloud),
     "clear_hits": Row("accepted", prepare=analyse),
     "delete_moment": Row("imported", prepare=pick_a_moment),
     "discard": Row("synthesized"),
@@ -329,6 +330,7 @@ ROWS = {
     "leave_path": Row("accepted", prepare=ride),
     "list_clips": Row("imported", changes=False),
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
+    "load_marker_model": Row("imported", lambda places: {"filepath": f"{marker_model_file(places)}"}),
     "load_marker_set": Row("imported", lambda places: {"filepath": f"{marker_set_file(places)}"}),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "make_assets": Row("imported", prepare=list_clips),
@@ -356,6 +358,7 @@ ROWS = {
     "preview": Row("synthesized", lambda places: {"number": 2}, two_variants),
     "propose_words": Row("clip"),
     "read_words": Row("imported", prepare=forget_dots),
+    "reconstruct_markers": Row("imported", prepare=a_cloud),
     "reduce_keys": Row("rig", prepare=bake_it),
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
@@ -364,6 +367,9 @@ ROWS = {
     "remove_video": Row("video"),
     "resynthesize_stretch": Row("synthesized", lambda places: {"player": "player1", "start": 1.0, "end": 2.0}),
     "save_bone_map": Row("rig", lambda places: {"filepath": f"{places.out}/saved.json"}, changes=False),
+    "save_marker_model": Row(
+        "imported", lambda places: {"filepath": f"{places.out}/model.json"}, a_body_of_markers, changes=False
+    ),
     "save_marker_set": Row(
         "imported", lambda places: {"filepath": f"{places.out}/set.txt"}, a_cloud, changes=False
     ),
