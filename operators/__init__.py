@@ -34,6 +34,7 @@ from . import (
     export_bvh,
     export_motion,
     export_words,
+    find_release,
     go_to_moment,
     hit_analysis,
     import_clip,
@@ -212,6 +213,7 @@ CLASSES = (
     marker_model.BEYOND_MOCAP_OT_save_marker_model,
     clean_markers.BEYOND_MOCAP_OT_clean_markers,
     reconstruct_markers.BEYOND_MOCAP_OT_reconstruct_markers,
+    find_release.BEYOND_MOCAP_OT_find_release,
 )
 
 

@@ -50,5 +50,5 @@ class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, Exp
         from ..beyond_mocap.files.model_json import write_model
 
         path = bpy.path.abspath(self.filepath)
-        write_model(path, models.of_cloud(cloud_meant(context)))
+        write_model(models.of_cloud(cloud_meant(context)), path)
         self.report({"INFO"}, f"written to {path}")

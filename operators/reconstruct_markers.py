@@ -39,9 +39,10 @@ clip of the library where asked for"""
         if not is_cloud(thing):
             self.report({"WARNING"}, f"{order.cloud} is gone: nothing was written")
             return
+        notes = solve.add(order, made)
         elsewhere = bpy.context.scene != scene
         with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]) if elsewhere else nullcontext():
             body = solve.show(bpy.context, thing, made)
-        for line in (*made.warnings, *solve.add(order, made)):
+        for line in (*made.warnings, *notes):
             self.report({"INFO"}, f"{thing.name}: {line}")
         self.report({"INFO"}, f"{body.name}: {'; '.join(solve.figures(made))}")

@@ -111,8 +111,10 @@ def release(panel, layout, context, kept) -> None:
     """When and how the ball left the hand."""
     settings = context.scene.beyond_mocap_markers
     column = split(layout)
-    column.prop(settings, "hand")
-    column.prop(settings, "radius")
+    for name in ("hand", "thrown", "radius"):
+        column.prop(settings, name)
     layout.operator("beyond_mocap.find_release", icon="FORCE_FORCE")
     panel.progress(context, "find release")
     table(layout, kept.release.splitlines())
+    if kept.ball is not None:
+        split(layout).prop(kept, "ball")

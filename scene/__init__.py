@@ -42,6 +42,7 @@ from . import (
 )
 from .aimed import live as aimed_live
 from .aimed import settings as aimed
+from .markers import kept as kept_markers
 from .markers import labels as marker_labels
 from .markers import settings as markers
 from .passes import hits_shown
@@ -148,6 +149,7 @@ def unregister():
     strip_events.unregister()
     watch.unregister()
     session.clear()
+    kept_markers.clear()
     for owner, name, _ in reversed(KEPT_WITH):
         delattr(getattr(bpy.types, owner), name)
     for cls in reversed(CLASSES):

@@ -6,4 +6,9 @@ way from it to a body that moves.
 - `cloud`      a trial as objects, and back
 - `lines`      which markers belong together, drawn as edges and colours
 - `labels`     names drawn at the markers
+- `sets`       the labels as a marker set, and a marker set on the labels
+- `solve`      what the recipe gets of a cloud, and the body that comes out
+- `models`     the body's model as a text of the file
+- `thrown`     the ball that left the hand
+- `kept`       reconstructions of this session, at the recording's own rate
 """

@@ -19,6 +19,7 @@ FILTERS = (
     ("kalman", "Kalman", "Smoothing by how a body moves, forwards and backwards"),
     ("none", "None", "As it was solved"),
 )
+THROWN = tuple((name, name.capitalize(), f"A {name}") for name in ("baseball", "tennis", "handball", "volleyball", "football"))
 HANDS = (
     ("AUTO", "Found", "The hand that throws"), ("left", "Left", "The left hand"), ("right", "Right", "The right hand"),
 )  # fmt: skip
@@ -152,9 +153,10 @@ class BeyondMocapMarkers(bpy.types.PropertyGroup):
     add: BoolProperty(name="Add to Library", description="Write the motion with its words into the library's folder too")
     words: StringProperty(name="Words", default="throwb", description="The words of the clip that is added")
     hand: EnumProperty(name="Hand", items=HANDS, default="AUTO", description="The hand that throws")
+    thrown: EnumProperty(name="Ball", items=THROWN, default="baseball", description="What is thrown")
     radius: FloatProperty(
-        name="Ball Radius", default=0.0, min=0.0, max=0.5, precision=4,
-        description="Metres; 0: fitted where a marker lies on the ball, else a baseball's",
+        name="Radius", default=0.0, min=0.0, max=0.5, precision=4,
+        description="Metres; 0: fitted where a marker lies on the ball, else that of the ball's kind",
     )
 
 

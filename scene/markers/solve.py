@@ -11,12 +11,12 @@ import numpy as np
 from mathutils import Matrix
 
 from ...beyond_mocap.errors import InputError
-from .. import action, armature, bake, body, linked
+from .. import action, armature, bake, body, channels, linked
 from ..measure import frames_per_second, units_per_metre
 from ..settings import absolute
 from . import cloud as clouds
 from . import kept as store
-from . import models, sets
+from . import models, sets, thrown
 from .settings import is_cloud
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ...beyond_mocap.markers.trial import MarkerTrial
     from ...beyond_mocap.reconstruct import Reconstruction, ReconstructSettings
 
+MADE = "beyond_mocap_reconstructed"  # custom property of actions made here; no group has its name
 SKIN = (0.55, 0.55, 0.60)
 
 
@@ -69,13 +70,12 @@ def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) ->
 
 def clip_place(scene: bpy.types.Scene, name: str) -> Path:
     """Where the clip goes in the library's folder. InputError where there is none, or where the name is taken."""
+    from ...beyond_mocap.library.add_clip import free_place
+
     folder = scene.beyond_mocap.library_folder
-    if not folder or not Path(absolute(folder)).is_dir():
-        raise InputError("library", f"{folder or 'no folder'}", "a folder", "choose one in the panel Library")
-    place = Path(absolute(folder), f"{bpy.path.clean_name(name)}.bvh")
-    if place.exists():
-        raise InputError(place, "is there already", "a name that is free", "rename the cloud or the clip")
-    return place
+    if not folder:
+        raise InputError("library", "no folder is chosen", "one", "choose it in the panel Library")
+    return free_place(Path(absolute(folder)), bpy.path.clean_name(name))
 
 
 def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruction") -> bpy.types.Object:
@@ -92,11 +92,14 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
     context.view_layer.update()
     slowed = clouds.played_rate(cloud, scene) / kept.fps
     played = replace(made.motion, fps=made.motion.fps * slowed)
-    action.write(thing, played, scene, clouds.start_frame(cloud), cloud.name, generated=True)
+    channels.discard(thing, MADE)
+    action.write(thing, played, scene, clouds.start_frame(cloud), cloud.name, generated=True)[MADE] = True
     thing.matrix_world = cloud.matrix_world @ Matrix.Translation((0.0, 0.0, made.floor * units_per_metre(scene)))
     bake.lengthen(scene, clouds.start_frame(cloud) + played.duration * frames_per_second(scene))
     kept.made, kept.figures, kept.told = store.keep(made), "\n".join(figures(made)), "\n".join(made.warnings)
     models.onto(cloud, made.model)
+    if made.release is not None:
+        thrown.show(context, cloud, made.release)
     return thing
 
 
@@ -124,8 +127,7 @@ def add(order: Order, made: "Reconstruction") -> list[str]:
     """Write the clip and its words into the library, where that was asked for; lines about it."""
     if order.add is None:
         return []
-    from types import SimpleNamespace
+    from ...beyond_mocap.library.add_clip import add_clip
 
-    from ...beyond_mocap.commands.reconstructing import add_to_library
-
-    return add_to_library(made, order.add, SimpleNamespace(words=list(order.words)))
+    throw = made.release is not None and any(word.startswith("throw") for word in order.words)
+    return add_clip(order.add.parent, order.add.stem, made.motion, order.words, made.release.time if throw else None)
