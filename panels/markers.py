@@ -7,6 +7,7 @@ import bpy
 from ..scene.markers.settings import active_label, cloud_meant
 from .tab import Step, paragraph, section, split, table
 
+MOST = 6  # lines of what was told
 ROLE_ICONS = {"OPTIONAL": "CHECKBOX_DEHLT", "STATIC": "ARMATURE_DATA", "BALL": "MESH_UVSPHERE", "OTHER": "CANCEL"}
 
 
@@ -15,13 +16,14 @@ class BEYOND_MOCAP_UL_markers(bpy.types.UIList):
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         """One marker."""
-        row = layout.split(factor=0.36)
+        row = layout.split(factor=0.38)
         row.prop(item, "name", text="", emboss=False)
-        right = row.row(align=True)
+        right = row.split(factor=0.72)
         free = not item.segment and item.role not in ("BALL", "OTHER")
-        right.prop(item, "segment", text="", emboss=False, icon="ERROR" if free else ROLE_ICONS.get(item.role, "BLANK1"))
+        carrier = item.segment or ("Ball" if item.role == "BALL" else "")
+        right.label(text=carrier, icon="ERROR" if free else ROLE_ICONS.get(item.role, "BLANK1"))
         share = right.row()
-        share.alignment, share.active = "RIGHT", item.seen > 99.95
+        share.alignment, share.active = "RIGHT", item.seen < 99.95
         share.label(text=f"{item.seen:.0f} %")
 
 
@@ -66,12 +68,20 @@ def labels(layout, kept) -> None:
             column.prop(label, name)
 
 
+def lines(layout, text: str, icon: str) -> None:
+    """The first lines of a text, and how many more there are."""
+    told = text.splitlines()
+    for line in told[:MOST]:
+        paragraph(layout, line, icon)
+    if len(told) > MOST:
+        layout.label(text=f"and {len(told) - MOST} more, in the Info editor", icon="BLANK1")
+
+
 def clean(panel, layout, context, kept) -> None:
     """The button, and what was done."""
     layout.operator("beyond_mocap.clean_markers", icon="BRUSH_DATA")
     panel.progress(context, "clean markers")
-    for line in kept.cleaned.splitlines():
-        paragraph(layout, line, "DOT")
+    lines(layout, kept.cleaned, "DOT")
 
 
 def model(layout, kept) -> None:
@@ -103,8 +113,7 @@ def pose(panel, layout, context, kept) -> None:
     row.operator("beyond_mocap.reconstruct_markers", icon="PLAY")
     panel.progress(context, "reconstruct markers")
     table(layout, kept.figures.splitlines())
-    for line in kept.told.splitlines():
-        paragraph(layout, line, "INFO")
+    lines(layout, kept.told, "INFO")
 
 
 def release(panel, layout, context, kept) -> None:

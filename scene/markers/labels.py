@@ -9,6 +9,7 @@ from mathutils import Vector
 from . import cloud as clouds
 from .settings import is_cloud
 
+WIDE = 32  # pixels of a label, at a scale of 1
 SIZE, RGBA, FREE = 11, (1.0, 1.0, 1.0, 0.9), (1.0, 0.65, 0.1, 1.0)
 
 _handle: list = []
@@ -34,11 +35,13 @@ def _draw() -> None:
     context = bpy.context
     if context.space_data is None or not context.space_data.overlay.show_overlays:
         return
-    scale = context.preferences.system.ui_scale
+    scale, taken = context.preferences.system.ui_scale, set()
     blf.size(0, SIZE * scale)
     for place, text, rgba in labels(context):
         at = location_3d_to_region_2d(context.region, context.region_data, place)
-        if at is not None:
+        cell = at and (round(at.x / (WIDE * scale)), round(at.y / (SIZE * scale)))
+        if cell and cell not in taken:  # one over the other cannot be read
+            taken.add(cell)
             blf.color(0, *rgba)
             blf.position(0, at.x + 6 * scale, at.y + 3 * scale, 0)
             blf.draw(0, text)

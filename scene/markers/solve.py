@@ -117,7 +117,7 @@ def figures(made: "Reconstruction") -> list[str]:
     lines = [f"Frames: {len(made.motion)} at {made.motion.fps:g}/s", f"Joints: {len(made.motion.skeleton)}"]
     lines.append(f"Markers: {len(made.model.markers)}")
     if len(away):
-        lines.append(f"Markers off: {away.mean():.1f} mm, 95 % below {np.percentile(away, 95.0):.0f}")
+        lines += [f"Markers off: {away.mean():.1f} mm", f"95 % of them: below {np.percentile(away, 95.0):.1f} mm"]
     spent = sum(value for name, value in made.seconds.items() if name != "total")
     lines.append(f"Took: {spent:.1f} s")
     return lines
