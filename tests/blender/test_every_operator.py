@@ -314,6 +314,7 @@ ROWS = {
         "accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False
     ),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
+    "find_release": Row("imported", prepare=a_body_of_markers),
     "free_ball": Row("accepted", prepare=carry),
     "go_to_strike": Row("accepted", lambda places: {"frame": 7}, analyse),
     "go_to_moment": Row("imported", lambda places: {"strip": "Moments", "index": 0}),

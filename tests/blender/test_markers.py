@@ -215,3 +215,120 @@ def test_a_file_that_is_none_is_refused_and_nothing_comes(tmp_path):
     with pytest.raises(RuntimeError, match="broken.c3d"):
         bpy.ops.beyond_mocap.import_markers(filepath=str(path))
     assert not len(bpy.data.objects) and not len(bpy.data.meshes)
+
+
+@pytest.fixture
+def session(extension):
+    """What is kept of reconstructions, emptied afterwards."""
+    yield importlib.import_module(f"{EXTENSION}.scene.markers.kept")
+    importlib.import_module(f"{EXTENSION}.scene.markers.kept").clear()
+
+
+def bone_at(body, bone, frame):
+    """A bone's head in the world."""
+    bpy.context.scene.frame_set(frame)
+    return np.array(body.matrix_world @ body.pose.bones[bone].head)
+
+
+def test_cleaning_is_what_the_core_does_and_one_step(cloud, core, walk):
+    thing = imported(walk)
+    trial = cloud.read(thing, bpy.context.scene)
+    sets = importlib.import_module(f"{EXTENSION}.scene.markers.sets")
+    wanted = core("markers.clean").clean(trial, sets.of_cloud(thing).clusters(trial.labels))
+    assert_one_step(bpy.ops.beyond_mocap.clean_markers)
+    thing = bpy.data.objects["walk"]
+    back = cloud.read(thing, bpy.context.scene)
+    assert back.labels == wanted.trial.labels
+    assert np.allclose(back.positions, wanted.trial.positions, atol=1e-5, equal_nan=True)
+    assert thing.beyond_mocap_cloud.cleaned.splitlines() == list(wanted.report.lines)
+    assert thing.beyond_mocap_cloud.labels["LKNE"].segment == "LeftUpLeg"
+
+
+def test_reconstructing_gives_the_recipe_s_body_beside_the_cloud(cloud, core, walk, session):
+    thing = imported(walk)
+    thing.location = (0.0, 2.0, 0.0)
+    bpy.context.view_layer.update()
+    assert_one_step(bpy.ops.beyond_mocap.reconstruct_markers)
+    scene, thing = bpy.context.scene, bpy.data.objects["walk"]
+    kept = thing.beyond_mocap_cloud
+    made, body = session.made(kept.made), kept.body
+    assert made is not None and kept.figures and kept.model is not None
+    motion = importlib.import_module(f"{EXTENSION}.scene.action").read(body, scene)
+    assert motion.skeleton.names == made.motion.skeleton.names
+    places = core("motion.motion").forward_kinematics(made.motion)[0]
+    for frame in (1, 8):
+        row = (frame - 1) / 24.0 * made.motion.fps
+        for name in ("Hips", "LeftFoot", "RightHand"):
+            joint = made.motion.skeleton.names.index(name)
+            low = int(row)
+            want = places[low, joint] * (1.0 - row + low) + places[low + 1, joint] * (row - low)
+            assert np.abs(bone_at(body, name, frame) - want - [0.0, 2.0, made.floor]).max() < 5e-3, (frame, name)
+    ankle, _, *_ = seen_at(thing, 8)
+    near = ankle[[row.name for row in kept.labels].index("LANK")] + [0.0, 2.0, 0.0]
+    assert np.linalg.norm(bone_at(body, "LeftFoot", 8) - near) < 0.12
+    before = len(bpy.data.objects), len(bpy.data.actions)
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    assert (len(bpy.data.objects), len(bpy.data.actions)) == before and kept.body == body
+
+
+def test_a_model_is_saved_loaded_and_used(walk, session, tmp_path):
+    thing = imported(walk)
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    path = str(tmp_path / "model.json")
+    bpy.ops.beyond_mocap.save_marker_model(filepath=path)
+    made = session.made(thing.beyond_mocap_cloud.made)
+    thing.beyond_mocap_cloud.model = None
+    with pytest.raises(RuntimeError, match="no model"):
+        bpy.ops.beyond_mocap.save_marker_model(filepath=path)
+    assert_one_step(bpy.ops.beyond_mocap.load_marker_model, filepath=path)
+    kept = bpy.data.objects["walk"].beyond_mocap_cloud
+    assert kept.use_model
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    again = session.made(kept.made)
+    assert np.array_equal(again.model.places, made.model.places)
+    assert np.allclose(again.motion.root_positions, made.motion.root_positions, atol=1e-4)
+
+
+def test_the_motion_goes_to_the_library_with_its_words(walk, session, tmp_path):
+    imported(walk)
+    bpy.context.scene.beyond_mocap.library_folder = str(tmp_path)
+    settings = bpy.context.scene.beyond_mocap_markers
+    settings.add, settings.words = True, "walking"
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    assert (tmp_path / "walk.bvh").is_file() and "walking" in (tmp_path / "walk.txt").read_text()
+    with pytest.raises(RuntimeError, match="is there already"):
+        bpy.ops.beyond_mocap.reconstruct_markers()
+
+
+def test_a_slowed_cloud_has_a_slowed_body(cloud, walk, session):
+    scene = bpy.context.scene
+    thing = imported(walk)
+    nodes = importlib.import_module(f"{EXTENSION}.scene.markers.nodes")
+    modifier = nodes.modifier_of(thing)
+    nodes.put(modifier, "Step", nodes.get(modifier, "Step") / 2.0)
+    assert cloud.played_rate(thing, scene) == pytest.approx(50.0)
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    body = thing.beyond_mocap_cloud.body
+    first, last = body.animation_data.action.frame_range
+    assert last - first == pytest.approx(0.6 * 2 * 24, abs=1.0)
+
+
+def test_a_throw_s_release_is_found_and_the_ball_flies(core, session):
+    sample = worlds.SAMPLE.parent / "markers" / "throw.c3d"
+    thing = imported(sample)
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    thing.beyond_mocap_cloud.release = ""
+    bpy.ops.beyond_mocap.find_release()
+    kept = thing.beyond_mocap_cloud
+    speed = float(kept.release.split("Speed: ")[1].split()[0])
+    assert abs(speed / 28.15 - 1.0) < 0.03
+    assert [marker.frame for marker in bpy.context.scene.timeline_markers] == [round(1 + 0.958 * 24)]
+    places, seen, *_ = seen_at(thing, 26)
+    marker = places[[row.name for row in kept.labels].index("BALL")]
+    assert abs(np.linalg.norm(np.array(kept.ball.matrix_world.translation) - marker) - 0.0366) < 0.03
+
+
+def test_without_a_body_no_release_is_looked_for(walk):
+    imported(walk)
+    with pytest.raises(RuntimeError, match="press Reconstruct"):
+        bpy.ops.beyond_mocap.find_release()
