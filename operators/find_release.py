@@ -27,9 +27,9 @@ the timeline"""
         """Find it."""
         from ..beyond_mocap.release import release
 
-        name, made, settings = order
+        name, trial, motion, settings = order
         progress(0.1, "release")
-        return name, release(made.trial, made.motion, settings)
+        return name, release(trial, motion, settings)
 
     def apply(self, scene, result):
         """Ball, timeline, figures."""

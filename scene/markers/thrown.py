@@ -17,14 +17,16 @@ from . import cloud as clouds
 from . import kept as store
 
 if TYPE_CHECKING:
+    from ...beyond_mocap.markers.trial import MarkerTrial
+    from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.release import Release, ReleaseSettings
-    from ...beyond_mocap.reconstruct import Reconstruction
 
 MADE = "beyond_mocap_thrown"  # custom property of balls and actions made here; no group has its name
 
 
-def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "Reconstruction", "ReleaseSettings"]:
-    """What is asked of a cloud. InputError where its body has not been reconstructed in this session."""
+def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "MarkerTrial", "Motion", "ReleaseSettings"]:
+    """What is asked of a cloud: its name, its markers as recorded, on the motion's floor, the motion, the settings.
+    InputError where its body has not been reconstructed in this session."""
     from ...beyond_mocap.release import ReleaseSettings
 
     linked.refuse(cloud, cloud.data)
@@ -32,9 +34,11 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "Rec
     made = store.made(kept.made)
     if made is None:
         raise InputError(cloud.name, "not reconstructed in this session", "a body", "press Reconstruct first")
-    marked = [row.name for row in kept.labels if row.role == "BALL" and row.name in made.trial.labels]
+    marked = [row.name for row in kept.labels if row.role == "BALL" and row.name in made.raw.labels]
     hand = None if chosen.hand == "AUTO" else chosen.hand
-    return cloud.name, made, ReleaseSettings(marked[0] if marked else None, chosen.radius or None, hand, chosen.thrown)
+    asked = ReleaseSettings(marked[0] if marked else None, chosen.radius or None, hand, chosen.thrown)
+    trial = made.raw.with_positions(made.raw.positions - [0.0, 0.0, made.floor])
+    return cloud.name, trial, made.motion, asked
 
 
 def show(context: bpy.types.Context, cloud: bpy.types.Object, found: "Release") -> bpy.types.Object:

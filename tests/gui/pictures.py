@@ -162,6 +162,32 @@ def check_path_editing():
     fold()
 
 
+def check_optical_markers():
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    scene = bpy.context.scene
+    bpy.ops.beyond_mocap.import_markers(filepath=str(sample() / "markers" / "throw.c3d"))
+    cloud = bpy.context.object
+    assert bpy.ops.beyond_mocap.reconstruct_markers() == bpy.ops.beyond_mocap.find_release() == {"FINISHED"}
+    scene.frame_set(25)
+    view = window.area("VIEW_3D").spaces.active.region_3d
+    view.view_perspective, view.view_distance = "PERSP", 5.0
+    view.view_location, view.view_rotation = (1.1, 0.0, 1.1), Euler((1.45, 0.0, 0.3)).to_quaternion()
+    panel, = (cls for cls in panels("VIEW_3D") if "PT_markers" in cls.__name__)
+    area = window.area("VIEW_3D")
+    solo([panel], "VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    fold, look = unfold(panel), bpy.context.preferences.view
+    look.ui_scale = 0.75  # it is longer than the window
+    yield 1
+    yield from picture_of_tab("panel-markers", area)
+    look.ui_scale = 1.0
+    fold()
+    scene.beyond_mocap_markers.names = False
+    cloud.select_set(False)
+    yield from picture_of_view("markers")
+
+
 def check_the_preferences():
     before = set(bpy.context.window_manager.windows.values())
     bpy.ops.screen.userpref_show()
