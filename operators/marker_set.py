@@ -34,7 +34,7 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
     bl_idname = "beyond_mocap.use_marker_set"
     bl_label = "Use Marker Set"
 
-    name: EnumProperty(name="Marker Set", items=shipped, description="Which one")
+    which: EnumProperty(name="Marker Set", items=shipped, description="Which one")
 
     def do(self, context):
         """Find it, apply it."""
@@ -42,8 +42,8 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
 
         thing = self.cloud(context)
         labels = tuple(row.name for row in thing.beyond_mocap_cloud.labels)
-        named = (one for one in shipped_sets() if one.name == self.name)
-        found = sets.recognised(labels) if self.name == "AUTO" else next(named)
+        named = (one for one in shipped_sets() if one.name == self.which)
+        found = sets.recognised(labels) if self.which == "AUTO" else next(named)
         for line in sets.apply(thing, found):
             self.report({"WARNING"}, line)
         self.report({"INFO"}, f"{thing.name}: {found.name}")

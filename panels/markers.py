@@ -56,7 +56,7 @@ class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
 def labels(layout, kept) -> None:
     """The list, and what is known of the marker that is chosen."""
     row = layout.row(align=True)
-    row.operator_menu_enum("beyond_mocap.use_marker_set", "name", text=kept.set_name or "Marker Set", icon="PRESET")
+    row.operator_menu_enum("beyond_mocap.use_marker_set", "which", text=kept.set_name or "Marker Set", icon="PRESET")
     row.operator("beyond_mocap.load_marker_set", text="", icon="FILE_FOLDER")
     row.operator("beyond_mocap.save_marker_set", text="", icon="FILE_TICK")
     layout.template_list("BEYOND_MOCAP_UL_markers", "", kept, "labels", kept, "active_label", rows=5)

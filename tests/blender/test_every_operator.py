@@ -395,7 +395,7 @@ ROWS = {
     "update": Row("synthesized"),
     "update_path": Row("accepted", prepare=ride_elsewhere),
     "update_live": Row("synthesized", lambda places: {"player": "player1", "kind": "quick"}),
-    "use_marker_set": Row("imported", lambda places: {"name": "plug_in_gait_legs"}, a_cloud),
+    "use_marker_set": Row("imported", lambda places: {"which": "plug_in_gait_legs"}, a_cloud),
     "use_selected_rig": Row("rig", prepare=another_rig),
     "variants": Row("synthesized", lambda places: {"count": 2}),
     "words_to_text": Row("imported"),

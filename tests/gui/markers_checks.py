@@ -69,7 +69,7 @@ def check_vertices_are_assigned_in_edit_mode():
     window.picture(PICTURES / "markers_edit.png")
     with bpy.context.temp_override(window=window.window):
         bpy.ops.object.mode_set(mode="OBJECT")
-    run("beyond_mocap.use_marker_set", "EXEC_DEFAULT", name="AUTO")
+    run("beyond_mocap.use_marker_set", "EXEC_DEFAULT", which="AUTO")
     assert len({row.segment for row in cloud().labels}) > 12
     assert_no_trouble_since(mark)
 
