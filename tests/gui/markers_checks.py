@@ -94,6 +94,8 @@ def check_a_body_is_reconstructed_by_its_button():
     yield from until(lambda: cloud().figures, 240.0)
     output.say(f"     {time.monotonic() - start:.1f} s; {' ; '.join(cloud().figures.splitlines())}")
     body = cloud().body
+    look(10)
+    yield 0.5
     hand = body.matrix_world @ body.pose.bones["RightHand"].head
     yield from window.move(300, 300)
     look(22)
