@@ -18,7 +18,7 @@ class BEYOND_MOCAP_UL_markers(bpy.types.UIList):
         """One marker."""
         row = layout.split(factor=0.38)
         row.prop(item, "name", text="", emboss=False)
-        right = row.split(factor=0.72)
+        right = row.split(factor=0.64)
         free = not item.segment and item.role not in ("BALL", "OTHER")
         carrier = item.segment or ("Ball" if item.role == "BALL" else "")
         right.label(text=carrier, icon="ERROR" if free else ROLE_ICONS.get(item.role, "BLANK1"))
