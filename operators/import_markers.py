@@ -5,12 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-from bpy.props import FloatProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
 from ..scene.markers import cloud, sets
 from ..scene.settings import as_setting
 from .verb import ImportVerb
+
+UP = (
+    ("AUTO", "Found", "As the file says, or heads above feet"),
+    *((axis, axis, f"{axis} of the file points up") for axis in ("X", "-X", "Y", "-Y", "Z", "-Z")),
+)
 
 
 class BEYOND_MOCAP_OT_import_markers(ImportVerb, bpy.types.Operator):
@@ -26,6 +31,7 @@ set know their segments at once"""
         name="Metres per unit", default=0.0, min=0.0, precision=5,
         description="Size of one unit of the file in metres; 0: as the file says, or by the body's size",
     )
+    up: EnumProperty(name="Up", items=UP, description="Which axis of the file points up")
     subject: StringProperty(name="Subject", description="Whose markers to read, where a file holds several subjects'")
 
     def do(self, context):
@@ -36,7 +42,7 @@ set know their segments at once"""
         if not paths:
             raise InputError("import", "no file given", "a .c3d or .trc file", "choose one")
         unit = self.unit or context.scene.beyond_mocap_markers.unit or None
-        trials = [(path, read_markers(path, unit, self.subject or None)) for path in paths]
+        trials = [(path, read_markers(path, unit, self.subject or None, None if self.up == "AUTO" else self.up)) for path in paths]
         for _, trial in trials:
             cloud.check(trial)
         made = [self.add(context, path, trial) for path, trial in trials]

@@ -38,9 +38,11 @@ class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
         """The active cloud, part by part."""
         layout, cloud = self.layout, cloud_meant(context)
         layout.operator("beyond_mocap.import_markers", icon="IMPORT")
+        settings = context.scene.beyond_mocap_markers
         if cloud is None:
+            split(layout).prop(settings, "unit")
             return
-        kept, settings = cloud.beyond_mocap_cloud, context.scene.beyond_mocap_markers
+        kept = cloud.beyond_mocap_cloud
         row = layout.row(align=True)
         row.label(text=cloud.name, icon="POINTCLOUD_DATA")
         row.prop(settings, "names", text="", icon="FONT_DATA")
