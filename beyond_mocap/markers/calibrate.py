@@ -15,10 +15,11 @@ from ..errors import Cancelled, InputError
 from ..motion.motion import Motion
 from .adjustment import Adjustment, Body, Prior, Pull
 from .assemble import model_from_frame
-from .calibration_frames import neutral_frames, still_frame, unlike_frames
+from .calibration_frames import neutral_frames, unlike_frames
 from .marker_set import MarkerSet
 from .model import MarkerModel
 from .pose import PoseSettings, Solved, solve
+from .static import static_frame
 from .trial import MarkerTrial
 from .weights import cluster_deviation, edge_deviation
 
@@ -59,8 +60,9 @@ def calibrate(
 
 
 def from_static(marker_set: MarkerSet, static: MarkerTrial) -> MarkerModel:
-    """The model that a static trial's stillest second gives."""
-    return model_from_frame(still_frame(static), marker_set, standing=True, subject=static.subject)
+    """The model that a static trial gives where it is stillest, averaged over its segments."""
+    frame = static_frame(static, marker_set.clusters(static.labels))
+    return model_from_frame(frame, marker_set, standing=True, subject=static.subject)
 
 
 def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:

@@ -1,4 +1,4 @@
-"""Which frames a model is made from: a still stretch, upright frames of a motion, frames as unlike as can be."""
+"""Which frames of a motion a model is made from: upright ones, and ones as unlike as can be."""
 
 from __future__ import annotations
 
@@ -7,29 +7,7 @@ import numpy as np
 from .frames import rigid_fit
 from .trial import MarkerTrial
 
-_STILL_SECONDS = 1.0
 _CANDIDATES = 400
-
-
-def still_frame(trial: MarkerTrial) -> dict[str, np.ndarray]:
-    """The markers of a static trial where it is stillest: label -> (3,) m, the median over a second; NaN if unseen."""
-    length = max(1, min(len(trial), int(round(_STILL_SECONDS * trial.fps))))
-    starts = np.unique(np.linspace(0, len(trial) - length, 12).astype(int))
-    positions = trial.positions
-
-    def unrest(start):
-        part = positions[start : start + length]
-        known = np.isfinite(part).all(axis=-1).sum()
-        with np.errstate(invalid="ignore"):
-            spread = np.nanmax(part, axis=0, initial=-np.inf) - np.nanmin(part, axis=0, initial=np.inf)
-        spread = spread[np.isfinite(spread).all(axis=-1)]
-        return (-known // max(part.shape[0], 1), float(spread.mean()) if len(spread) else np.inf)
-
-    best = min(starts, key=unrest)
-    part = positions[best : best + length]
-    seen = np.isfinite(part).all(axis=-1).any(axis=0)
-    return {label: np.nanmedian(part[:, i], axis=0) if seen[i] else np.full(3, np.nan)
-            for i, label in enumerate(trial.labels)}
 
 
 def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], count: int) -> list[int]:
