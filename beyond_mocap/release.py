@@ -35,6 +35,8 @@ SLOWEST = 1.5
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
 _NEARBY = 0.3  # s before a hand is fastest: the ball is in it
+_REACHES = 0.35  # m from the palm, within which a marker may be on a ball that the hand holds
+_BESIDE = 1.5  # m, between the middle of the markers and that of the joints
 _LONGEST = 8.0  # s of flight until the ground
 _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
 
@@ -127,21 +129,71 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     if len(trial) < FEWEST:
         raise InputError(trial.name, f"{len(trial)} frames", f"at least {FEWEST}", "take a longer stretch")
     even = evenly(trial)
+    _check_near(even, motion)
     label = _ball_label(even, settings.ball_marker)
     marker = None if label is None else even.positions[:, even.index(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
     hands = [sharpened(hand_of(motion, side), even, _ball_labels(even, label)) for side in sides]
     hand = _throwing(hands, marker)
-    pace = float(np.max(_steady(hand)))
-    if pace < SLOWEST:
-        raise InputError(trial.name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw", "choose another trial, or hand")
+    _check_throws(hand, even.name)
     lies, notes = _in_hand(hand, marker, settings, ball)
-    found = None if marker is None else _by_ball(hand, marker, lies, ball, settings, notes)
-    if marker is not None and found is None:
-        notes.append(f"{label} is not seen in flight: the hand alone tells of the release")
+    found = None
+    if marker is not None:
+        found = _by_ball(hand, marker, lies, ball, settings, notes)
+        found = _believed(found, hand, marker, label, settings, even.name, notes)
     found = found or _by_hand(hand, motion, lies, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
     return _result(found, hand, motion, lies, seen, even.name, notes)
+
+
+def _believed(found: _Found | None, hand: Hand, marker, label, settings: ReleaseSettings, name: str, notes):
+    """What the marker told, None where it was on no ball in this hand. InputError where the user said that it was."""
+    away = _away(hand, marker, found)
+    if away <= _REACHES:
+        if found is None:
+            notes.append(f"{label} is not seen in flight: the hand alone tells of the release")
+        return found
+    said = f"{label} is {away:.2f} m from the {hand.side} hand"
+    if settings.ball_marker or settings.hand:
+        raise InputError(name, said, "a marker on the ball in that hand", "check the marker and the hand")
+    notes.append(f"{said}: the hand alone tells of the release")
+    return None
+
+
+def _check_throws(hand: Hand, name: str) -> None:
+    """InputError where the hand is never fast enough to throw."""
+    pace = float(np.max(_steady(hand)))
+    if pace < SLOWEST:
+        raise InputError(
+            name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw", "choose another trial, or the other hand"
+        )
+
+
+def _check_near(trial: MarkerTrial, motion: Motion) -> None:
+    """InputError where the markers are elsewhere than the motion's body."""
+    places, _ = forward_kinematics(motion)
+    often = trial.seen.mean(axis=0) > 0.5
+    markers = trial.positions[:, often]
+    if not often.any():
+        return
+    away = np.linalg.norm(np.nanmedian(markers, axis=(0, 1)) - np.median(places, axis=(0, 1)))
+    if away > _BESIDE:
+        raise InputError(
+            trial.name, f"markers {away:.1f} m beside the motion", "the motion that was made from this trial",
+            "reconstruct the trial first",
+        )  # fmt: skip
+
+
+def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
+    """m from the hand to the ball's marker: while it is held where it is seen then, else to where the flight begins."""
+    held = _held_frames(hand, marker)
+    palm = hand.carried(HOLD * hand.reach * hand.finger)
+    if held.sum() >= 3:
+        return float(np.median(np.linalg.norm(marker[held] - palm[held], axis=-1)))
+    if found is None:
+        return 0.0
+    k = int(np.clip(round(found.launch.time * hand.fps), 0, len(hand) - 1))
+    return float(np.linalg.norm(found.launch.position - palm[k]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +266,7 @@ def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
     if marker is None or len(hands) == 1:
         return hands[fast]
     nearest = [_distance(hand, marker, peaks[fast]) for hand in hands]
-    return hands[int(np.argmin(nearest))] if np.isfinite(nearest).any() else hands[fast]
+    return hands[int(np.argmin(nearest))] if min(nearest) < 2.0 * _REACHES else hands[fast]
 
 
 def _steady(hand: Hand) -> np.ndarray:

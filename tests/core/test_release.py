@@ -116,6 +116,26 @@ def test_a_ball_that_is_badly_seen(known, change, how, frames, share):
     assert abs(found.radius - 0.0366) < 0.002
 
 
+@pytest.mark.parametrize("settings, said", [
+    (ReleaseSettings(ball_marker="LASI"), "LASI is .* from the"),
+    (ReleaseSettings(hand="left"), "BALL is .* from the left hand"),
+])
+def test_a_marker_that_is_on_no_ball_in_the_hand(known, settings, said):
+    with pytest.raises(InputError, match=said):
+        release(known.trial, known.motion, settings)
+
+
+def test_a_marker_that_only_is_called_a_ball_is_left_aside(known):
+    swapped = known.trial.renamed({"BALL": "X1", "LASI": "BALL"})
+    found = release(swapped, known.motion)
+    assert found.how == "hand" and found.side == "right" and "from the" in found.notes[0]
+
+
+def test_markers_beside_the_motion_are_said(known):
+    with pytest.raises(InputError, match="beside the motion"):
+        release(known.trial.with_positions(known.trial.positions + [5.0, 0.0, 0.0]), known.motion)
+
+
 def test_no_throw_is_said(known):
     still = known.motion.frames(0, 1)
     standing = concatenate([still] * len(known.trial))
