@@ -31,7 +31,8 @@ class ReconstructSettings:
     """What may be chosen. marker_set: whose markers these are; None: the shipped set that fits. weights, limits,
     smoothness: of the pose (`markers.pose`). filter: one of FILTERS, at `cutoff` hertz. plant: standing feet are held.
     radius: metres of a ball that carries a marker, None where not known. hold_ball: its marker takes part in the pose
-    until the release. ball: its kind, one of `ball.physics.THROWN`. release: whether a throw's release is looked for; "auto": where a marker is on a ball."""
+    until the release. ball: its kind, one of `ball.physics.THROWN`. release: whether a throw's release is looked for;
+    "auto": where a marker is on a ball."""
 
     marker_set: object | None = None
     weights: bool = True
@@ -56,9 +57,10 @@ class Reconstruction:
     """What came out.
 
     motion: at the trial's rate, on the markers' own ground, only its height moved where the floor was not at 0 (`floor`
-    metres, which `trial` was moved by too). model: whose skeleton it has. trial: the markers as they were posed to, under
-    the set's names, cleaned. raw: as given. solved: the pose before filters. cleaned: what was mended. release: of a
-    throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds: of each step. warnings: lines.
+    metres, which `trial` was moved by too). model: whose skeleton it has. trial: the markers under the set's names,
+    cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters. cleaned: what was mended.
+    release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds: of each step. warnings:
+    lines.
     """
 
     motion: Motion
@@ -102,15 +104,15 @@ def reconstruct(
             _check_fits(model, seen)
         road.tell(_checked(seen, still, marker_set, model))
         cleaned = _tidied(seen, marker_set, model, road.inner(0.0, 0.1), cancelled)
-        tidy = cleaned.trial
+        tidy, told = cleaned.trial, cleaned.for_pose()  # long gaps are filled for the eye, not as evidence
         road.tell(cleaned.report.lines)
     with road.step("model", 0.45):
         if model is None:
-            still = None if still is None else _tidied(still, marker_set, None, None, cancelled).trial
-            model = _calibrated(marker_set, tidy, still, road.inner(0.1, 0.45), cancelled)
+            still = None if still is None else _tidied(still, marker_set, None, None, cancelled).for_pose()
+            model = _calibrated(marker_set, told, still, road.inner(0.1, 0.45), cancelled)
             road.tell(model.notes)
     with road.step("pose", 0.85):
-        solved = _posed(model, tidy, marker_set, settings, road, cancelled)
+        solved = _posed(model, told, marker_set, settings, road, cancelled)
         road.tell(solved.notes)
     with road.step("filter", 0.92):
         motion, held = _filtered(solved, model, seen, settings, road)
@@ -209,7 +211,8 @@ def modelled(
     marker_set = set_of(trial, None, settings)
     seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
     _checked(seen, still, marker_set, None)
-    tidy, still = (None if one is None else _tidied(one, marker_set, None, None, cancelled).trial for one in (seen, still))
+    tidy, still = (None if one is None else _tidied(one, marker_set, None, None, cancelled).for_pose()
+                   for one in (seen, still))
     return _calibrated(marker_set, tidy, still, progress, cancelled)
 
 
@@ -242,7 +245,8 @@ def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
     if len(lacking) > (1.0 - LEAST_MARKERS) * len(model.markers):
         some = ", ".join(lacking[:6]) + (", ..." if len(lacking) > 6 else "")
         raise InputError(
-            trial.name, f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some}",
+            trial.name,
+            f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some}",
             "a trial with the model's markers", "choose another model, or the marker set whose labels these are",
         )
 
@@ -339,7 +343,5 @@ def _release(trial, motion, marker_set, settings: ReconstructSettings, road: _Ro
     try:
         return release(trial, motion, ReleaseSettings(label, settings.radius, ball=settings.ball))
     except InputError as error:
-        if settings.release == "yes":
-            raise
         road.tell([f"no release found: {error}"])
         return None

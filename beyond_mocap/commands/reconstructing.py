@@ -52,8 +52,9 @@ def _add_posing(verb) -> None:
     verb.add_argument("--no-plant", action="store_true", help="do not hold standing feet")
     verb.add_argument("--no-limits", action="store_true", help="joints may turn as far as they like")
     verb.add_argument("--no-weights", action="store_true", help="all markers count alike")
-    verb.add_argument("--smoothness", type=partial(between, low=0.0, high=1e6, expected="0 or more"), default=0.0,
-                      metavar="NUMBER", help="solve the whole sequence as one that moves smoothly; default 0")  # fmt: skip
+    more = partial(between, low=0.0, high=1e6, expected="0 or more")
+    verb.add_argument("--smoothness", type=more, default=0.0, metavar="NUMBER",
+                      help="solve the whole sequence as one that moves smoothly; default 0")  # fmt: skip
 
 
 def _add_ball(verb) -> None:
@@ -106,6 +107,8 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
     except InputError as error:
         raise _with_file(error, options) from None
     made.seconds.update(load=loaded - begun, total=time.perf_counter() - begun)
+    if _is_throw(options.words) and made.release is None:
+        raise InputError(options.trial, "no release was found for a throw's words", "a throw", "leave --words out")
     if options.report:
         write_report(options.report, made.report())
     write(as_take(made), options.out)
@@ -114,10 +117,20 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
     notes = add_to_library(made, options.trial, options) if options.add_to else []
     told.end()
     lines = [f"{options.trial}: {line}" for line in (*trial.notes, *made.warnings)]
-    _tell(told, lines, options.report)
+    _tell(told, [*_upright_alike(options, trial, static), *lines], options.report)
     for note in notes:
         told.note(note)
     print(f"{options.out}: {summary(made)}")
+
+
+def _upright_alike(options, trial, static) -> list[str]:
+    """A line where two files of one kind are read with different axes up."""
+    if static is None or options.up or options.trial.suffix.lower() != options.static.suffix.lower():
+        return []
+    mine, other = ({line.split(",")[0] for line in one.notes if " is up" in line} for one in (trial, static))
+    if mine == other:
+        return []
+    return [f"{options.trial} and {options.static} disagree: {', '.join(sorted(mine | other))}; --up says which"]
 
 
 def _tell(told: Told, lines: list[str], report: Path | None) -> None:
@@ -205,7 +218,8 @@ def settings_of(options):
 
     release = "yes" if _is_throw(options.words) and options.release == "auto" else options.release
     return ReconstructSettings(
-        marker_set=options.marker_set and chosen_set(options.marker_set), weights=not options.no_weights, limits=not options.no_limits,
+        marker_set=options.marker_set and chosen_set(options.marker_set), weights=not options.no_weights,
+        limits=not options.no_limits,
         smoothness=options.smoothness, filter=options.filter, cutoff=options.cutoff, plant=not options.no_plant,
         radius=options.ball_radius, hold_ball=options.hold_ball, ball=options.ball_kind,
         release=release,

@@ -46,4 +46,5 @@ def add_clip(
     if words:
         keep(clip, folder, rows, motion.fps)
     strangers = sorted(set(words) - vocabulary_words())
-    return [f"{clip}: {' '.join(words) or 'without words'}", *(f"{word}: a word of this library's own" for word in strangers)]
+    told = [f"{clip}: {' '.join(words) or 'without words'}"]
+    return [*told, *(f"{word}: a word of this library's own" for word in strangers)]

@@ -34,13 +34,13 @@ def check(
 ) -> tuple[str, ...]:
     """Lines on what is odd about a trial and its static, or model; InputError where no skeleton can come of it.
 
-    clusters: segment -> labels. static, model: either may be missing. Raises where markers are mirrored or left and right
-    exchanged, where static or model are of another body, and where no marker is seen at all.
+    clusters: segment -> labels. static, model: either may be missing. Raises where markers are mirrored or left and
+    right exchanged, where static or model are of another body, and where no marker is seen at all.
     """
     labels = [label for group in clusters.values() for label in group if label in trial.labels]
     body = trial.only(labels)
     if not body.seen.any():
-        raise InputError(trial.name, "none of its body's markers is seen", "a recording of a body", "choose another file")
+        raise InputError(trial.name, "none of its body's markers is seen", "a recorded body", "choose another file")
     _check_sides(body, static, clusters)
     lines = list(_empty(body))
     if static is not None:
@@ -59,7 +59,8 @@ def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
     told = some(lacking)
     if len(lacking) > _LACKING * len(trial.labels):
         raise InputError(
-            static.name, f"has {len(trial.labels) - len(lacking)} of the trial's {len(trial.labels)} markers, not {told}",
+            static.name,
+            f"has {len(trial.labels) - len(lacking)} of the trial's {len(trial.labels)} markers, not {told}",
             "a static trial with the trial's markers", "choose another, or go without",
         )
     return [f"{static.name} lacks {told}: where these lie is told by the motion"]
@@ -78,7 +79,8 @@ def unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], others: Se
 
 
 def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:
-    mirrored = {one.name: handedness(one.labels, one.positions) < _MIRRORED for one in (trial, static) if one is not None}
+    both = [one for one in (trial, static) if one is not None]
+    mirrored = {one.name: handedness(one.labels, one.positions) < _MIRRORED for one in both}
     if not any(mirrored.values()):
         return
     name = next(name for name, is_so in mirrored.items() if is_so)
@@ -89,7 +91,8 @@ def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> No
             found, step = "left and right labels are exchanged", "exchange L and R in its labels"
         else:
             found, step = "its coordinates are mirrored", "read it with its axes right-handed"
-    raise InputError(name, f"the body stands mirrored: {found}", "a right-handed recording, left labels on the left", step)
+    expected = "a right-handed recording, left labels on the left"
+    raise InputError(name, f"the body stands mirrored: {found}", expected, step)
 
 
 def _crossed(bad: MarkerTrial, good: MarkerTrial, clusters) -> bool:

@@ -11,14 +11,14 @@ from .trial import MarkerTrial
 OVER_SOLE = 0.03
 """Metres from the sole up to the lowest marker of a foot that stands: some 3 cm on bare feet and on shoes."""
 AT_ZERO = (0.01, 0.09)
-"""Metres over height 0 of the lowest foot marker with which the floor is at 0: below, a marker would be in it; above are
-thicker soles than boots and skates have."""
+"""Metres over height 0 of the lowest foot marker with which the floor is at 0: below, a marker would be in it; above
+are thicker soles than boots and skates have."""
 _FEET = ("Foot", "ToeBase")
 
 
 def floor_under(model: MarkerModel, trial: MarkerTrial) -> float:
-    """Height in metres of the floor that the feet of a trial stand on, the lowest where it is uneven; 0 where that is as
-    near to 0 as can be told, or no marker is on a foot."""
+    """Height in metres of the floor that the feet of a trial stand on, the lowest where it is uneven; 0 where that is
+    as near to 0 as can be told, or no marker is on a foot."""
     names = model.skeleton.names
     feet = [i for i, joint in enumerate(model.joint) if names[joint].endswith(_FEET)]
     heights = seen_markers(model, trial)[:, feet, 2]

@@ -2,9 +2,9 @@
 
 The state of every coordinate is its last three values: it goes on with the same acceleration but for a random jerk, and
 is seen with noise. The smoothed course is the most likely one given all frames, before and after. Of such a model that
-is a least squares problem, sum w_t |x_t - seen_t|^2 + q sum |x_t - 3 x_t-1 + 3 x_t-2 - x_t-3|^2, whose Cholesky factor is
-found by the Kalman filter's pass from the first frame to the last, and whose back substitution is the smoother's pass
-of Rauch, Tung and Striebel from the last to the first. So it is solved as that: one banded system for a joint.
+is a least squares problem, sum w_t |x_t - seen_t|^2 + q sum |x_t - 3 x_t-1 + 3 x_t-2 - x_t-3|^2, whose Cholesky factor
+is found by the Kalman filter's pass from the first frame to the last, and whose back substitution is the smoother's
+pass of Rauch, Tung and Striebel from the last to the first. So it is solved as that: one banded system for a joint.
 
 Other than a filter of fixed shape it knows how much each frame is worth: a joint whose markers are not seen is told by
 the frames around.

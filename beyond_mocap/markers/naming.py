@@ -1,4 +1,4 @@
-"""A trial under its marker set's own names; markers that nobody named are put on the side of the body they move with."""
+"""A trial under its marker set's own names; markers that nobody named are put on the side they are near to."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from .trial import MarkerTrial
 def named_as(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
     """The trial under the set's names.
 
-    A set may say which unlabeled marker is which (`also LHAND: x52`), but recording software numbers these anew in every
-    trial: where both of a left and a right one have come so, each goes to the side whose markers it is
-    near to.
+    A set may say which unlabeled marker is which (`also LHAND: x52`), but recording software numbers these anew in
+    every trial: where both of a left and a right one have come so, each goes to the side whose markers it is near to.
     """
     names = marker_set.renaming(trial.labels)
     chance = {new: old for old, new in names.items() if UNLABELED.match(old)}

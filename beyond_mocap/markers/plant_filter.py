@@ -1,11 +1,11 @@
 """The foot-plant filter (Fredriksson §5.4): feet that stand are held at one place, without their slow floating.
 
 A window goes over the recording; where an ankle or a toe is on average at the same place in its first half as in its
-second, it stands. It is held there at its mean place, is let go along a Bezier curve, and the leg follows by IK, so that
-no bone changes its length.
+second, it stands. It is held there at its mean place, is let go along a Bezier curve, and the leg follows by IK, so
+that no bone changes its length.
 
-Two things are corrected. A foot that swings forth and back is also at the same mean place in both halves: it stands only
-where it also keeps near that place. And a body that shifts its feet by less than can be seen in one window goes
+Two things are corrected. A foot that swings forth and back is also at the same mean place in both halves: it stands
+only where it also keeps near that place. And a body that shifts its feet by less than can be seen in one window goes
 decimetres in a minute: what is held at one place is ended where it has gone further than `apart` from it.
 """
 
@@ -45,9 +45,9 @@ def plant_filter(
 ) -> PlantFiltered:
     """A motion whose ankles and toes stay where they stand.
 
-    window, ease: seconds. still, apart: metres, see the module. Only the joints of the legs of frames in which something
-    is held or let go are changed. Raises InputError for a skeleton without two legs or numbers that are not positive.
-    Source: Fredriksson §5.4.
+    window, ease: seconds. still, apart: metres, see the module. Only the joints of the legs of frames in which
+    something is held or let go are changed. Raises InputError for a skeleton without two legs or numbers that are not
+    positive. Source: Fredriksson §5.4.
     """
     if min(window, still, ease, apart) <= 0:
         raise InputError("foot plant", f"{window} s, {still} m, {ease} s, {apart} m", "positive numbers")
@@ -86,7 +86,8 @@ def stances(place: np.ndarray, half: int, still: float, apart: float) -> list[tu
         inside = place[begin : begin + 2 * half]
         if np.linalg.norm(inside - middle, axis=1).max() <= apart:
             marked[begin : begin + 2 * half] = True
-    return [piece for span in runs(marked) for piece in _near_one_place(place, *span, apart) if piece[1] - piece[0] >= half]
+    pieces = [piece for span in runs(marked) for piece in _near_one_place(place, *span, apart)]
+    return [(first, end) for first, end in pieces if end - first >= half]
 
 
 def _near_one_place(place: np.ndarray, first: int, end: int, apart: float) -> list[tuple[int, int]]:

@@ -2,9 +2,9 @@
 §5.2.3).
 
 A body's bones are the same on every day, only the markers lie elsewhere, and what is found of the bones differs by how
-they lay. Segment by segment, from the root down, the sessions' frames are turned onto each other where the centres of the
-joints below say that they differ; these centres are then averaged in the turned frames, those that are surer counting
-more; and the markers of each session go along with their segment.
+they lay. Segment by segment, from the root down, the sessions' frames are turned onto each other where the centres of
+the joints below say that they differ; these centres are then averaged in the turned frames, those that are surer
+counting more; and the markers of each session go along with their segment.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def _turn_onto(own: np.ndarray, mean: np.ndarray, worth: np.ndarray) -> np.ndarr
     single one, whose direction all frames share, as rest poses have it."""
     if len(own) < 2:
         return np.eye(3)
-    fit = rigid_fit(np.vstack([[0.0, 0.0, 0.0], own]), np.vstack([[0.0, 0.0, 0.0], mean]), np.r_[worth.max() * 100.0, worth])
+    joint, held = [[0.0, 0.0, 0.0]], np.r_[worth.max() * 100.0, worth]  # the joint itself stays
+    fit = rigid_fit(np.vstack([joint, own]), np.vstack([joint, mean]), held)
     return fit.rotation if fit.sound else np.eye(3)
 
 

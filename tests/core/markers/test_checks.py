@@ -29,7 +29,9 @@ def test_a_body_and_its_static_pass(known, clusters):
     assert check(known.trial, None, clusters) == ()
 
 
-@pytest.mark.parametrize("spoil, found", [(mirrored, "coordinates are mirrored"), (sides_exchanged, "labels are exchanged")])
+@pytest.mark.parametrize("spoil, found", [
+    (mirrored, "coordinates are mirrored"), (sides_exchanged, "labels are exchanged"),
+])
 def test_mirrored_is_told_from_exchanged_where_the_static_tells(known, clusters, spoil, found):
     with pytest.raises(InputError, match=found):
         check(spoil(known.trial), known.static, clusters)

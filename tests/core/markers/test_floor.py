@@ -17,7 +17,8 @@ def known():
 
 @pytest.fixture(scope="module")
 def model(known):
-    return model_from_frame(dict(zip(known.static.labels, known.static.positions.mean(axis=0))), chosen_set("plug_in_gait"))
+    frame = dict(zip(known.static.labels, known.static.positions.mean(axis=0)))
+    return model_from_frame(frame, chosen_set("plug_in_gait"))
 
 
 def at_height(trial, height):
