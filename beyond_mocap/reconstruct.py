@@ -196,11 +196,13 @@ def clusters_of(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> di
 
 def _checked(trial, still, marker_set, model) -> tuple[str, ...]:
     """Whether the markers are mirrored, or those of somebody else than the static's."""
-    from .markers.checks import check, unused
+    from .markers.checks import check, some, unused
 
     clusters = clusters_of(marker_set, model, trial)
     others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
-    return (*unused(trial, clusters, others), *check(trial, still, clusters, model))
+    lacking = () if marker_set is None or model is not None else marker_set.lacking(trial.labels)
+    gone = [f"of the set {marker_set.name} there is no {some(lacking)}"] if lacking else []
+    return (*gone, *unused(trial, clusters, others), *check(trial, still, clusters, model))
 
 
 def modelled(

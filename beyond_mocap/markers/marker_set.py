@@ -17,6 +17,7 @@ from .template import JOINTS
 
 UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")
 """Labels that recording software gives to markers that nobody has named."""
+_MOST = 0.8  # of a set's markers
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,11 @@ class MarkerSet:
         """Markers without which a trial is not of this set."""
         return frozenset(self.labels) - self.static - self.optional
 
+    def lacking(self, labels: Sequence[str]) -> tuple[str, ...]:
+        """Those of `needed` that are not among `labels`, in the set's order."""
+        present = {self.renaming(labels).get(label, label) for label in labels}
+        return tuple(label for label in self.labels if label in self.needed and label not in present)
+
     def segment_of(self, label: str) -> str | None:
         """The joint that carries a marker; None where it lies on nothing."""
         return next((joint for joint, group in self.segments.items() if label in group), None)
@@ -103,20 +109,21 @@ class MarkerSet:
 
 
 def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
-    """The set whose markers these are: the one that explains most of them among those of which nothing is missing.
+    """The set whose markers these are: of those of which most is there, the one that explains most of them.
 
-    labels: as recorded; those that nobody has named do not count. InputError where every set lacks markers: it names
-    the nearest and what is missing.
+    labels: as recorded; those that nobody has named do not count. Up to a fifth of a set's markers may be missing, as
+    those of an arm that was never seen. InputError where every set lacks more: it names the nearest and what is missing.
     """
     sets = list(sets)
     named = [label for label in labels if not UNLABELED.match(label)]
     judged = [(marker_set, _present(marker_set, named)) for marker_set in sets]
-    whole = [(len(present), -len(s.labels), s) for s, present in judged if s.needed <= present]
-    if whole:
-        return max(whole, key=lambda row: row[:2])[2]
+    share = [len(present & s.needed) / max(len(s.needed), 1) for s, present in judged]
+    there = [(len(present), part, -len(s.labels), s) for (s, present), part in zip(judged, share) if part >= _MOST]
+    if there:
+        return max(there, key=lambda row: row[:3])[3]
     if not sets:
         raise InputError("marker sets", "none given", "at least one")
-    nearest, present = max(judged, key=lambda row: len(row[1] & row[0].needed) / len(row[0].needed))
+    nearest, present = judged[share.index(max(share))]
     missing = sorted(nearest.needed - present)
     unknown = sorted(set(named) - set(nearest.renaming(named)) - set(nearest.labels))
     raise InputError(

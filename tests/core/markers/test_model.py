@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
+from beyond_mocap.files.marker_set_text import shipped_sets
 from beyond_mocap.markers.assemble import model_from_frame
 from beyond_mocap.markers.marker_set import MarkerSet, recognise
 from beyond_mocap.markers.template import LANDMARK_PLACES, PLACES
@@ -110,3 +111,18 @@ def test_labels_are_matched_whatever_their_case_and_by_aliases():
 def test_what_is_wrong_with_a_set_is_said(segments, landmarks, what):
     with pytest.raises(InputError, match=what):
         MarkerSet("own", segments, landmarks)
+
+
+def test_a_trial_that_lacks_an_arm_is_still_of_its_set():
+    sets = shipped_sets()
+    driveline = next(one for one in sets if one.name == "driveline")
+    arm = ("RUPA", "RELB", "RMELB", "RFRM", "RWRA", "RWRB", "RFIN")
+    labels = [label for label in driveline.labels if label not in arm]
+    assert recognise(labels, sets) is driveline
+    assert driveline.lacking(labels) == ("RELB", "RMELB", "RWRA", "RWRB", "RFIN")
+    assert recognise([label for label in driveline.labels if "MEL" not in label and "MKN" not in label
+                      and "MAN" not in label], sets).name == "plug_in_gait"  # fmt: skip
+
+
+def test_labels_under_other_names_are_not_lacking():
+    assert LARGE.lacking(["lasi", "R_ASI", "SACR"]) == ("LELB",)
