@@ -137,6 +137,7 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     hand = _throwing(hands, marker)
     _check_throws(hand, even.name)
     lies, notes = _in_hand(hand, marker, settings, ball)
+    notes += even.notes[len(trial.notes) :]
     found = None
     if marker is not None:
         found = _by_ball(hand, marker, lies, ball, settings, notes)

@@ -23,7 +23,7 @@ NEAR = 0.14
 _HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
 _PASSES = 4
 _LIFTS = sorted(np.arange(-40, 41) / 100.0, key=abs)  # m
-_BEHIND = 0.04  # m behind the wrist, where the forearm's markers begin
+_BEHIND = 0.02  # m nearer to the elbow than the wrist is, where the forearm's markers begin
 _KNUCKLES = (0.055, 0.115)  # m from the wrist: a marker there sits on the metacarpals' heads
 _REACH_OF_KNUCKLES = 2.22  # fingers are 1.22 times the third metacarpal, Buchholz et al. 1992 (see `without_ball`)
 _TORN = 4.0  # times the usual misfit of the hand's markers, above which one of them is not where it should be
@@ -36,8 +36,8 @@ class Hand:
 
     side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
     finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's
-    frame. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are, which the origin
-    has in it.
+    frame. elbow: (T, 3) m. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are,
+    which the origin has in it.
     """
 
     side: str
@@ -46,6 +46,7 @@ class Hand:
     rotation: np.ndarray
     finger: np.ndarray
     reach: float
+    elbow: np.ndarray
     markers: tuple[str, ...] = ()
     shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
@@ -74,7 +75,8 @@ def hand_of(motion: Motion, side: str) -> Hand:
     places, rotations = forward_kinematics(motion)
     finger, reach = _finger(motion, limb)
     return Hand(
-        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach
+        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach,
+        places[:, limb.lower_arm],
     )  # fmt: skip
 
 
@@ -85,7 +87,7 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
     the motion against the markers, as setting feet on the floor makes, is found and taken off.
     """
     lift = _lift(hand, trial, never)
-    names, seen = _near(replace(hand, origin=hand.origin + lift), trial, never)
+    names, seen = _near(replace(hand, origin=hand.origin + lift, elbow=hand.elbow + lift), trial, never)
     if not names:
         return hand
     shift = lift
@@ -93,7 +95,7 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
         local = np.einsum("tji,tmj->tmi", hand.rotation, seen - (hand.origin + shift)[:, None, :])
         places = np.nanmedian(local, axis=0)
         shift = shift + np.nanmedian(seen - _placed(hand, shift, places), axis=(0, 1))
-    moved = replace(hand, origin=hand.origin + shift, shift=shift)
+    moved = replace(hand, origin=hand.origin + shift, elbow=hand.elbow + shift, shift=shift)
     fit = rigid_fit(places, seen)
     tells = fit.sound & (fit.rms < max(_TORN * _usual(fit.rms), _STEADY))
     known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
@@ -146,6 +148,7 @@ def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
 def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     """Labels of the markers that stay with the hand, and their places (T, M, 3) m."""
     away = np.linalg.norm(trial.positions - hand.origin[:, None, :], axis=-1)
+    forearm = float(np.median(np.linalg.norm(hand.origin - hand.elbow, axis=-1)))
     kept = []
     for number, label in enumerate(trial.labels):
         known = np.isfinite(away[:, number])
@@ -153,8 +156,8 @@ def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple
             continue
         distance = away[known, number]
         spread = np.subtract(*np.percentile(distance, [90, 10]))
-        along = np.nanmedian(hand.taken_back(trial.positions[:, number]) @ hand.finger)
-        if np.median(distance) < NEAR and spread < 3.0 * _STEADY and along > -_BEHIND:
+        arm = np.median(np.linalg.norm(trial.positions[known, number] - hand.elbow[known], axis=-1))
+        if np.median(distance) < NEAR and spread < 3.0 * _STEADY and arm > forearm - _BEHIND:
             kept.append(number)
     return tuple(trial.labels[number] for number in kept), trial.positions[:, kept]
 

@@ -40,6 +40,8 @@ _SMOOTH = 0.014  # s, the window of the parabolas that velocities are taken from
 _NEAR = 0.1  # s about the frame in which the wrist is fastest when single frames are left aside
 _FINE = 8  # steps a frame
 _LATEST = 2.5  # times the rolling that the tips may be fastest after the wrist is
+_EARLIER, _AFTER = 4.0, 0.005  # times the rolling, and s, about the ball's fastest, between which the wrist's is
+_NEARLY = 0.95  # of the wrist's fastest there, what counts as its peak
 _ACCELERATES = 0.8  # of the tips' fastest speed, from where on their way tells the direction
 _ARC = 0.35  # rad by which a hand climbs or falls that goes over the top, without the ball doing so
 _LEAST_STEP = 0.25  # m between the feet along the throw, from where on they tell its direction
@@ -67,14 +69,15 @@ def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None)
     """
     course = _Course(hand)
     times, tips, grip = course.times, course.velocity(PAD), course.velocity(HOLD)
-    wrist = course.fastest(0.0, fastest(hand.origin, hand.fps))
-    aim = _aim(course, tips, wrist, stride)
     turning = _length(course.turn)
-    roll = np.arccosh(PAD / HOLD) / max(float(np.median(turning[_about(times, wrist, 0.01)])), 5.0)
+    gripped = course.fastest(HOLD, fastest(hand.carried(HOLD * hand.reach * hand.finger), hand.fps))
+    roll = _roll(float(np.median(turning[_about(times, gripped, 0.01)])))
+    wrist = _wrist(course, gripped, roll)
     last = int(np.searchsorted(times, times[wrist] + max(_LATEST * roll, 2.0 / hand.fps)))
+    aim = _aim(course, tips, wrist, last, stride)
     forward = tips[wrist : last + 1] @ aim
     k = wrist + int(np.argmax(forward))
-    rolled = np.arccosh(PAD / HOLD) / max(float(turning[k]), 5.0)
+    rolled = _roll(float(turning[k]))
     start = max(int(np.searchsorted(times, times[k] - rolled)), 0)
     push = _push(course, k, aim)
     velocity = grip[start] + ROLLS_WITH * (tips[k] - tips[start])
@@ -85,6 +88,21 @@ def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None)
         float(times[k]), position, velocity, time_sigma, SPEED_SIGMA * float(np.linalg.norm(velocity)),
         _swept(grip[_about(times, start, time_sigma)]), float(rolled),
     )  # fmt: skip
+
+
+def _roll(turning: float) -> float:
+    """s that a ball needs along the fingers of a hand that turns by `turning` rad/s."""
+    return float(np.arccosh(PAD / HOLD)) / max(turning, 5.0)
+
+
+def _wrist(course: _Course, gripped: int, roll: float) -> int:
+    """Which of the times is the one at which the wrist is fastest before the ball in it is: the first peak, for the arm
+    swings on after a throw, and the wrist may be as fast again."""
+    first, end = np.searchsorted(course.times, course.times[gripped] + [-_EARLIER * roll, _AFTER])
+    first = int(min(first, gripped))
+    speed = _length(course.velocity(0.0)[first : max(int(end), first + 1)])
+    falls = np.append(np.diff(speed) <= 0.0, True)
+    return first + int(np.argmax(falls & (speed >= _NEARLY * speed.max())))
 
 
 class _Course:
@@ -126,10 +144,10 @@ class _Course:
         return self._moves + share * self._swing
 
 
-def _aim(course: _Course, tips: np.ndarray, wrist: int, stride: np.ndarray | None) -> np.ndarray:
+def _aim(course: _Course, tips: np.ndarray, wrist: int, last: int, stride: np.ndarray | None) -> np.ndarray:
     """Unit (3,): where the throw goes: by the fingers' way while they are fast, and level also by the stride."""
     speed = _length(tips)
-    peak = wrist + int(np.argmax(speed[wrist : wrist + max(len(speed) // 50, 2)]))
+    peak = wrist + int(np.argmax(speed[wrist : last + 1]))
     first = peak
     while first > 0 and speed[first - 1] > _ACCELERATES * speed[peak]:
         first -= 1
