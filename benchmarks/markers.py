@@ -9,6 +9,7 @@ def section() -> list[str]:
 
     parts = (
         ("Markers planted on known motions", markers_planted.truth_table),
+        ("The same on bone", markers_planted.bone_table),
         ("Filters on planted markers", markers_planted.filter_table),
         ("Gaps, swaps, jumps and lost labels", markers_planted.fault_table),
         ("Frames a second", markers_planted.speed_table),
