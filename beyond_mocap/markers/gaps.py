@@ -10,11 +10,15 @@ import numpy as np
 from ..motion.runs import runs
 from .carriers import Carried, carried, helpers_of
 from .cluster_shape import Shape, mean_shape
+from .robust import quantile
 
-# a marker that strays this far from its place among its helpers rides on them softly, m
-_SOFT = 0.015
+# a marker that strays this far from its place among its helpers rides on them softly, m: as a rule; in a twentieth of
+# the frames
+_SOFT, _SOFT_AT_TIMES = 0.015, 0.03
 # over how much time the slope at a gap's edge is read, s
 _EDGE = 0.03
+# a curve is taken if over stretches as long it would have been this near, m; tried on so many
+_NEAR, _TRIES = 0.02, 24
 
 
 class Gap(NamedTuple):
@@ -68,34 +72,72 @@ def fill(
     shapes: dict[tuple[int, ...], Shape] = {one.helpers: one.shape for one in known.values() if one.helpers}
     for gap in gaps_of(positions, known):
         ask()
-        how, path = _by_helpers(positions, gap, soft, fps, longest, known[gap.marker], shapes) or ("spline", None)
-        if path is None and gap.frames <= longest.spline * fps:
-            path = bridge(positions[:, gap.marker], gap.first, gap.end, fps)
-        if path is None:
-            told.append(gap)
-            continue
-        out[gap.first : gap.end, gap.marker] = path
+        one = _carried_over(positions, gap, soft, known[gap.marker], shapes)
+        how, path = _firmly(one, gap, longest.cluster * fps) or _by_a_curve(positions, one, gap, fps, longest) or ("", None)
+        if how:
+            out[gap.first : gap.end, gap.marker] = path
         told.append(gap._replace(how=how))
     return out, told
 
 
-def _by_helpers(positions, gap, soft, fps, longest, one, shapes):
-    """(how, path (n, 3)) of a gap ridden over on the markers seen all through it, or None."""
+def _carried_over(positions, gap, soft, one, shapes):
+    """How the gap's marker is carried by markers seen all through the gap and at its edges; None where it is not."""
     low, high = max(gap.first - 1, 0), min(gap.end + 1, len(positions))
     there = np.isfinite(positions[low:high, :, 0]).all(axis=0)
     there[gap.marker] = False
-    if there.sum() < 3 or gap.frames > max(longest.cluster, longest.soft) * fps:
-        return None
     if not (one.helpers and there[list(one.helpers)].all() and one.trusted[gap.first : gap.end].all()):
         one = _others(positions, gap, soft, there, shapes)
-    if not one.helpers or not one.trusted[gap.first : gap.end].all():
+    return one if one.helpers and one.trusted[gap.first : gap.end].all() else None
+
+
+def _firmly(one, gap, longest):
+    """("cluster", path (n, 3)) of a marker that keeps its place among those that carry it, or None."""
+    if one is None or gap.frames > longest or one.sigma > _SOFT or quantile(one.away, 0.95) > _SOFT_AT_TIMES:
         return None
-    how = "cluster" if one.sigma <= _SOFT else "soft"
-    local = _between(one.local, gap, fps, how == "soft")
-    if local is None or gap.frames > getattr(longest, how) * fps:
+    begins, ends = gap.first > 0, gap.end < len(one.local)
+    before = one.local[gap.first - 1] if begins else one.local[gap.end]
+    after = one.local[gap.end] if ends else before
+    if np.isnan(before[0]) or np.isnan(after[0]):
         return None
+    share = np.arange(1, gap.frames + 1)[:, None] / (gap.frames + 1)
+    return "cluster", _in_the_world(one, gap, before + share * (after - before))
+
+
+def _by_a_curve(positions, one, gap, fps, longest):
+    """("soft", path) or ("spline", path) of a short gap: among its helpers, or in the world, whichever would have been
+    the nearer elsewhere in the trial; None where neither would have been near."""
+    ways = []
+    if one is not None and gap.frames <= longest.soft * fps:
+        ways.append(("soft", one.local))
+    if gap.frames <= longest.spline * fps:
+        ways.append(("spline", positions[:, gap.marker]))
+    tried = [(_expected(way, gap.frames, fps), how, way) for how, way in ways]
+    for expected, how, way in sorted(tried, key=lambda row: row[0]):
+        path = bridge(way, gap.first, gap.end, fps)
+        if path is not None and expected < _NEAR:
+            return how, _in_the_world(one, gap, path) if how == "soft" else path
+    return None
+
+
+def _expected(way, frames, fps):
+    """How far a curve over `frames` is off a way (T, 3) where it is seen, m: what nine in ten of some stretches keep to."""
+    seen = np.concatenate([[0], np.cumsum(np.isfinite(way[:, 0]))])
+    edge = max(4, int(round(_EDGE * fps)) + 1)
+    starts = np.arange(edge, len(way) - frames - edge)
+    starts = starts[seen[starts + frames + edge] - seen[starts - edge] == frames + 2 * edge] if len(starts) else starts
+    if len(starts) < 3:
+        return np.inf
+    off = []
+    for first in starts[np.unique(np.linspace(0, len(starts) - 1, _TRIES).astype(int))]:
+        curve = bridge(way, int(first), int(first) + frames, fps)
+        off.append(np.linalg.norm(curve - way[first : first + frames], axis=-1).max())
+    return float(np.quantile(off, 0.9))
+
+
+def _in_the_world(one, gap, local):
+    """Places (n, 3) m among the helpers, in the world, over the frames of a gap."""
     turn, shift = one.fit.rotation[gap.first : gap.end], one.fit.shift[gap.first : gap.end]
-    return how, np.einsum("tij,tj->ti", turn, local) + shift
+    return np.einsum("tij,tj->ti", turn, local) + shift
 
 
 def _others(positions, gap, soft, there, shapes):
@@ -106,22 +148,6 @@ def _others(positions, gap, soft, there, shapes):
     if helpers and helpers not in shapes:
         shapes[helpers] = mean_shape(positions[:, list(helpers)])
     return carried(positions, gap.marker, helpers, shapes.get(helpers))
-
-
-def _between(local, gap, fps, curved):
-    """The marker's way (n, 3) in its helpers' frame: from where it went to where it comes back, held at an open end."""
-    begins, ends = gap.first > 0, gap.end < len(local)
-    before = local[gap.first - 1] if begins else np.full(3, np.nan)
-    after = local[gap.end] if ends else np.full(3, np.nan)
-    if (begins and np.isnan(before[0])) or (ends and np.isnan(after[0])):
-        return None
-    if not (begins and ends):
-        # an open end of a soft marker would be a guess
-        return None if curved else np.repeat((before if begins else after)[None], gap.frames, axis=0)
-    if curved and (path := bridge(local, gap.first, gap.end, fps)) is not None:
-        return path
-    share = np.arange(1, gap.frames + 1)[:, None] / (gap.frames + 1)
-    return before + share * (after - before)
 
 
 def bridge(way: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | None:

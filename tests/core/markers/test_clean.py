@@ -234,3 +234,16 @@ def test_a_trial_that_hardly_sees_anything_says_nothing_on_the_terminal(walk):
     cleaned, _ = clean(walk.trial.with_positions(positions), clusters_of(walk))
     seen = np.isfinite(positions)
     assert np.mean(cleaned.positions[seen] == positions[seen]) > 0.95
+
+
+def test_what_no_cluster_carries_and_no_curve_would_meet_stays_open(walk):
+    foot = ("LANK", "LHEE", "LTOE")
+
+    def hide(positions, index):
+        positions[60:78, [index[label] for label in foot]] = np.nan
+        positions[120:123, [index[label] for label in foot]] = np.nan
+
+    cleaned, _ = clean(spoiled(walk, hide), clusters_of(walk), CleanSettings(longest_spline=0.25))
+    away = np.stack([off(walk, cleaned, label) for label in foot], axis=1)
+    assert not np.isnan(away[120:123]).any() and np.isnan(away[60:78]).any()
+    assert np.nanmax(away) < 0.03
