@@ -22,7 +22,7 @@ from .template import LANDMARK_PLACES, PLACES, TIPS
 MARKER_RADIUS = 0.007
 HALF_WIDTHS = {"knee": 0.052, "ankle": 0.036, "elbow": 0.036}
 """Half the breadth of a joint in metres, of an adult of 1.80 m; a marker's radius comes on top."""
-SIGMAS = {"both": 0.006, "one side": 0.012, "hip": 0.012, "shoulder": 0.015, "alone": 0.02, "trunk": 0.02}
+SIGMAS = {"both": 0.006, "one side": 0.012, "hip": 0.007, "shoulder": 0.015, "alone": 0.02, "trunk": 0.02}
 """How uncertain a predicted centre is, metres: the errors that the sources give, rounded."""
 _STRAIGHT = 0.14  # sine of the angle of an elbow (8 degrees) below which its plane says nothing
 _UPRIGHT = 0.35  # radians between the trunk and the vertical that still count as standing
