@@ -57,9 +57,14 @@ class Prior:
 
 @dataclass(eq=False)
 class Pull:
-    """Turns that are drawn to the rest pose: joint -> (3,) radians of play about its own X, Y, Z (inf: none)."""
+    """Turns that are drawn to the rest pose: joint -> (3,) radians of play about its own X, Y, Z (inf: none).
+
+    runs: joints between which no marker stands; they turn alike up to `uneven` radians.
+    """
 
     play: dict[int, np.ndarray]
+    runs: tuple[tuple[int, ...], ...] = ()
+    uneven: float = 0.12
 
 
 class Adjustment:
@@ -127,13 +132,13 @@ class Adjustment:
         away = np.linalg.norm(markers - self.seen, axis=-1) / self.sigma
         near = np.where(away < _HUBER, away**2, 2.0 * _HUBER * away - _HUBER**2)
         total = self.share * float(np.sum(near[self.there]))
-        total += sum(float(np.sum(error**2)) for error, _, _ in self._pulls(world)) * self.share
+        total += sum(float(np.sum(error**2)) for error, _ in self._pulls(world)) * self.share
         error, _ = self._priors()
         return total + float(np.sum(error**2))
 
     def _pulls(self, world: np.ndarray):
-        """Weighted errors (F,) of hinges and of turns drawn to rest, with joint and derivative (F, 3) by its turn."""
-        out = []
+        """Weighted errors (F,) of hinges and of turns drawn to rest, with [(joint, derivative (F, 3) by its turn)]."""
+        out = self._uneven(world)
         for joint, name in enumerate(self.body.names):
             part = name.removeprefix("Left").removeprefix("Right")
             parent = self.body.parents[joint]
@@ -143,12 +148,33 @@ class Adjustment:
                 for axis, play in ((square, _CARRY), (twist, _TWIST)):
                     if axis is not None:
                         own = world[:, joint, :, axis]
-                        out.append((np.einsum("fa,fa->f", above, own) / play, joint, np.cross(own, above) / play))
+                        out.append((np.einsum("fa,fa->f", above, own) / play, [(joint, np.cross(own, above) / play)]))
             if joint in self.pull.play:
-                turn = quaternion.to_rotation_vector(quaternion.from_matrix(self.local[:, joint]))
+                turn = self._turn(joint)
                 for axis, play in enumerate(self.pull.play[joint]):
                     if np.isfinite(play):
-                        out.append((turn[:, axis] / play, joint, world[:, parent, :, axis] / play))
+                        out.append((turn[:, axis] / play, [(joint, world[:, parent, :, axis] / play)]))
+        return out
+
+    def _turn(self, joint: int) -> np.ndarray:
+        """How far a joint is turned from rest, (F, 3) rotation vectors in radians."""
+        return quaternion.to_rotation_vector(quaternion.from_matrix(self.local[:, joint]))
+
+    def _uneven(self, world: np.ndarray):
+        """By how much the joints of runs turn otherwise than the run's mean, in the form of `_pulls`."""
+        out = []
+        for run in self.pull.runs:
+            turns = {joint: self._turn(joint) for joint in run}
+            mean = np.mean(list(turns.values()), axis=0)
+            for joint in run:
+                for axis in range(3):
+                    error = (turns[joint][:, axis] - mean[:, axis]) / self.pull.uneven
+                    slopes = [
+                        (other, world[:, self.body.parents[other], :, axis] / self.pull.uneven
+                         * ((other == joint) - 1.0 / len(run)))
+                        for other in run
+                    ]
+                    out.append((error, slopes))
         return out
 
     def _priors(self):
@@ -218,10 +244,11 @@ class Adjustment:
                         shape[:, at, columns.offset[joint, axis]] = root[:, marker, None] * world[:, parent, :, axis]
                 joint = parent
         scale = np.sqrt(self.share)
-        for index, (value, joint, slope) in enumerate(pulls):
+        for index, (value, slopes) in enumerate(pulls):
             row = 3 * len(body.joint) + index
             miss[:, row] = scale * value
-            pose[:, row, 3 + 3 * joint : 6 + 3 * joint] = scale * slope
+            for joint, slope in slopes:
+                pose[:, row, 3 + 3 * joint : 6 + 3 * joint] = scale * slope
         across = pose.transpose(0, 2, 1)
         own = across @ pose
         own[:, range(turns), range(turns)] += 1e-3 + damping * own[:, range(turns), range(turns)]

@@ -16,6 +16,7 @@ from ..motion.motion import Motion
 from .adjustment import Adjustment, Body, Prior, Pull
 from .assemble import model_from_frame
 from .calibration_frames import neutral_frames, unlike_frames
+from .chain import chain
 from .marker_set import MarkerSet
 from .model import MarkerModel
 from .pose import PoseSettings, Solved, solve
@@ -185,7 +186,9 @@ def _pull(model: MarkerModel) -> Pull:
                 row["XYZ".index(letter)] = np.radians(1.0)
         if np.isfinite(row).any():
             play[joint] = row
-    return Pull(play)
+    freedom = model.freedom
+    runs = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free).runs
+    return Pull(play, runs)
 
 
 def _sigmas(model: MarkerModel) -> np.ndarray:
