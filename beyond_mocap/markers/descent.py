@@ -82,7 +82,7 @@ class Arrived:
 
 
 @dataclass(eq=False)
-class _State:
+class State:
     """Poses with what follows from them, kept while they are the best known."""
 
     poses: Poses
@@ -93,17 +93,17 @@ class _State:
     gone: np.ndarray
     cost: np.ndarray
 
-    def take(self, other: "_State", where: np.ndarray) -> None:
+    def take(self, other: "State", where: np.ndarray) -> None:
         """Take the other's frames where (F,) is true, in place."""
         for mine, its in zip(self._arrays(), other._arrays()):
             np.copyto(mine, its, where=where)
 
-    def frames(self, chosen) -> "_State":
+    def frames(self, chosen) -> "State":
         """These frames only."""
         at = self.poses.frames(chosen)
         placed = Placed(at.root, *(a[..., chosen] for a in (self.placed.world, self.placed.joints, self.placed.markers)))
         more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.gone, self.cost))
-        return _State(at, placed, *more)
+        return State(at, placed, *more)
 
     def _arrays(self):
         at, put = self.poses, self.placed
@@ -114,7 +114,7 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
     """The poses nearest to the seen markers that lie downhill of `start`."""
     total = start.root.shape[-1]
     stops = limits.limited(task.chain)
-    best = _state(task, limits.held_back(task.chain, stops, start)[0])
+    best = state_of(task, limits.held_back(task.chain, stops, start)[0])
     out = Arrived(best.poses.copy(), best.cost.copy(), np.zeros(total, int), np.zeros((len(task.chain.skeleton), total), bool))
     live, done = np.arange(total), np.zeros(total, dtype=bool)
     damping, curved = np.full(total, _FIRST_DAMPING), np.zeros(total, dtype=bool)
@@ -140,13 +140,13 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
     return out
 
 
-def _write(out: Arrived, frames: np.ndarray, state: _State, held: np.ndarray) -> None:
+def _write(out: Arrived, frames: np.ndarray, state: State, held: np.ndarray) -> None:
     """Put finished frames into the result."""
     out.poses.put(frames, state.poses)
     out.cost[frames], out.held[:, frames] = state.cost, held
 
 
-def _state(task: Task, at: Poses) -> _State:
+def state_of(task: Task, at: Poses) -> State:
     """Poses and what follows from them."""
     placed = place(task.chain, at)
     away = placed.markers + (at.root - task.seen)
@@ -157,8 +157,8 @@ def _state(task: Task, at: Poses) -> _State:
     if task.lean is not None:
         cost += np.einsum("jf,jaf,jaf->f", task.leaning**2, gone, gone)
     if task.point:
-        cost += task.point.weight * _distance(task.point, placed)[2] ** 2
-    return _State(at, placed, away, bend, uneven, gone, 0.5 * cost)
+        cost += task.point.weight * distance(task.point, placed)[2] ** 2
+    return State(at, placed, away, bend, uneven, gone, 0.5 * cost)
 
 
 def _bend(chain: Chain, at: Poses) -> np.ndarray:
@@ -189,11 +189,11 @@ def _uneven(task: Task, at: Poses) -> np.ndarray:
     for run in task.chain.runs:
         vectors = logarithm(at.local[list(run)])
         for vector, gap in zip(vectors, vectors - vectors.mean(axis=0)):
-            out.append(np.stack([gap, _carried_to_turns(vector, gap)]))
+            out.append(np.stack([gap, carried_to_turns(vector, gap)]))
     return np.array(out) if out else np.zeros((0, 2, 3, at.root.shape[-1]))
 
 
-def _carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """A slope (3, F) by a joint's rotation vector (3, F) as one by small turns put before it."""
     angle = np.sqrt(np.einsum("af,af->f", vector, vector))
     near = np.maximum(angle, 1e-3)
@@ -202,7 +202,7 @@ def _carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return slope + 0.5 * once + factor * cross(vector, once)
 
 
-def _distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where the held point is (3, F), the unit direction (3, F) from the seen point to it, how much too far it is (F,)."""
     x = placed.joints[point.joint] + np.einsum("abf,b->af", placed.world[point.joint], point.place)
     gap = x + placed.origin - point.seen
@@ -210,7 +210,13 @@ def _distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray,
     return x, gap / np.maximum(length, 1e-9), length - point.radius
 
 
-def _step(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, _State]:
+def crosswise(away: np.ndarray, radius: float) -> np.ndarray:
+    """What a distance that is `away` (F,) m too long weighs crosswise, as a part of what it weighs along: as a rope does
+    that is pulled."""
+    return np.maximum(away, 0.0) / np.maximum(away + radius, 1e-9)
+
+
+def _step(task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
     """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and the
     state it leads to."""
     shift, turns, held = _solved(task, best, stops, damping, curved)
@@ -225,17 +231,18 @@ def _step(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: np
         shift[:, over], turns[..., over], held[:, over] = again
         further.put(over, limits.held_back(task.chain, stops, moved(task.chain, part.poses, *again[:2]))[0])
     size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
-    return size, held, _state(task, further)
+    return size, held, state_of(task, further)
 
 
-def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: np.ndarray, ahead=None):
+def _solved(task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray, ahead=None):
     """The root's shift (3, F), all turns (J, 3, F), and what limits held still (J, F); `ahead` as in `limits.hold`."""
     about = axes(task.chain, best.poses, best.placed)
     asked = elimination.bodies(task.chain, best.placed, best.away, task.weights)
     if task.point:
-        x, along, far = _distance(task.point, best.placed)
-        elimination.add_distance(asked, task.point.joint, x, along, task.point.weight, far)
-    own = _drawn(task, best)
+        x, along, far = distance(task.point, best.placed)
+        across = task.point.weight * crosswise(far, task.point.radius)
+        elimination.add_distance(asked, task.point.joint, x, along, task.point.weight, far, across)
+    own = wishes(task, best)
     slope = elimination.gradient(task.chain, best.placed, about, asked, own)
     held = limits.hold(task.chain, stops, best.poses, slope, own, ahead)
     bent = None
@@ -244,7 +251,7 @@ def _solved(task: Task, best: _State, stops: dict, damping: np.ndarray, curved: 
     return *elimination.step(task.chain, best.placed, about, asked, own, damping, bent), held
 
 
-def _drawn(task: Task, best: _State) -> elimination.Own:
+def wishes(task: Task, best: State) -> elimination.Own:
     """What the pull to the rest pose, and that to even runs, asks of each joint's turns.
 
     The derivative of half the squared length of a rotation vector by a small turn is the vector itself.

@@ -75,11 +75,16 @@ def _add_points(curvature, pull, x, w, r) -> None:
     pull[3:] += force
 
 
-def add_distance(asked: Bodies, joint: int, x: np.ndarray, along: np.ndarray, weight: np.ndarray, away: np.ndarray):
+def add_distance(asked: Bodies, joint: int, x: np.ndarray, along: np.ndarray, weight, away, across) -> None:
     """Add to what is asked, in place: a point x (3, F) of a joint's body is `away` (F,) m too far along unit directions
-    (3, F), of weight (F,)."""
-    lever = np.concatenate([cross(x, along), along])
-    asked.curvature[joint] += np.einsum("af,bf,f->abf", lever, lever, weight)
+    (3, F), of weight (F,); `across` (F,) is what it weighs crosswise, where the direction turns with it."""
+    arm = np.zeros((3, 6, x.shape[-1]))
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        arm[b, a], arm[a, b] = -x[c], x[c]
+        arm[a, 3 + a] = 1.0
+    lever = np.einsum("af,acf->cf", along, arm)
+    asked.curvature[joint] += np.einsum("af,bf,f->abf", lever, lever, weight - across)
+    asked.curvature[joint] += np.einsum("caf,cbf,f->abf", arm, arm, across)
     asked.pull[joint] += lever * (weight * away)
 
 

@@ -18,6 +18,7 @@ from .chain import Chain, Poses, chain, place
 from .descent import HeldPoint, Task, descend
 from .frames import placed as carried
 from .frames import rigid_fit
+from .smooth import smooth
 from .start import first_poses
 from .untold import between, missing
 
@@ -49,8 +50,8 @@ class HeldBall:
 
 @dataclass(frozen=True)
 class PoseSettings:
-    """weights: count deformed clusters' markers less (eq. 5.2). limits: keep joints within them. smoothness: seconds; 0:
-    each frame by itself. ball: a held ball that takes part."""
+    """weights: count deformed clusters' markers less (eq. 5.2). limits: keep joints within them. smoothness: seconds, as
+    `smooth` understands them; 0: each frame by itself. ball: a held ball that takes part."""
 
     weights: bool = True
     limits: bool = True
@@ -167,6 +168,19 @@ class _Solving:
         if len(others):
             self._solve_between(others, coarse)
         self._fill(known)
+        if self.settings.smoothness > 0.0:
+            self._smooth()
+
+    def _smooth(self) -> None:
+        """All frames together."""
+        def watch(part):
+            if self.cancelled():
+                raise Cancelled("reconstruction cancelled")
+            self.progress(part, "smoothing poses")
+
+        everything = np.arange(len(self.cost))
+        at, self.held = smooth(self._task(everything), self.poses, self.settings.smoothness, self.fps, watch)
+        self.poses.put(everything, at)
 
     def _solve_between(self, frames: np.ndarray, known: np.ndarray) -> None:
         """Solve frames from how those beside them stand; joints that miss markers lean on it."""

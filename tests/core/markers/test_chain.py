@@ -130,7 +130,7 @@ def test_a_distance_pulls_along_its_line_only():
     nothing = np.zeros((len(made.joint), 3, 2)), np.zeros((len(made.joint), 2))
     asked = elimination.bodies(made, placed, *nothing)
     along = np.array([[1.0, 0.0], [0.0, 0.6], [0.0, 0.8]])
-    elimination.add_distance(asked, 4, placed.joints[4], along, np.array([2.0, 1.0]), np.array([0.1, 0.2]))
+    elimination.add_distance(asked, 4, placed.joints[4], along, np.array([2.0, 1.0]), np.array([0.1, 0.2]), np.zeros(2))
     assert np.linalg.matrix_rank(asked.curvature[4][..., 0]) == 1
     assert asked.pull[4][3:, 1] == pytest.approx([0.0, 0.12, 0.16])
 
