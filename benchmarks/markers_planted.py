@@ -160,8 +160,8 @@ def fault_table() -> list[str]:
     """What was planted and what of it was found and mended."""
     lines = [
         "Hidden: share of the samples that are hidden; filled: of the hidden ones that have a place again, how far "
-        "they are from where the marker was. Mended: planted faults after which the samples are right; false: what is told "
-        "of where nothing was planted; off afterwards: how far all samples are from the truth.", "",
+        "they are from where the marker was. Mended: planted faults after which the samples are right; false: what is "
+        "told of where nothing was planted; off afterwards: how far all samples are from the truth.", "",
         *markdown.head([
             "clip", "markers", "hidden", "filled", "off mm rms, p95", "swaps mended", "jumps mended", "unlabeled back",
             "false swaps, jumps", "off afterwards mm p99", "frames/s",
