@@ -35,6 +35,8 @@ SLOWEST = 1.5
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
 _NEARBY = 0.3  # s before a hand is fastest: the ball is in it
+_TELLS, _LARGER = 10, 1.25  # frames of flight that tell a circle, and radii beyond which it is another ball's
+_AIR = 0.25  # of what the air makes, how uncertain it is
 _REACHES = 0.35  # m from the palm, within which a marker may be on a ball that the hand holds
 _BESIDE = 1.5  # m, between the middle of the markers and that of the joints
 _LONGEST = 8.0  # s of flight until the ground
@@ -46,8 +48,8 @@ class ReleaseSettings:
     """What is known beforehand.
 
     ball_marker: label, None to find one named as a ball, "" for none. radius: m, None for the kind's, or fitted where
-    the markers tell it. hand: "left", "right" or None for the one that throws. ball: one of `THROWN`. window: s about the
-    first guess that are searched. centre: (3,) m, the ball's centre in the hand's frame where other throws told it.
+    the markers tell it. hand: "left", "right" or None for the one that throws. ball: one of `THROWN`. window: s about
+    the first guess that are searched. centre: (3,) m, the ball's centre in the hand's frame where other throws told it.
     """
 
     ball_marker: str | None = None
@@ -141,18 +143,23 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     found = None
     if marker is not None:
         found = _by_ball(hand, marker, lies, ball, settings, notes)
-        found = _believed(found, hand, marker, label, settings, even.name, notes)
+        found = _believed(found, hand, marker, label, lies.radius, settings, even.name, notes)
     found = found or _by_hand(hand, motion, lies, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
     return _result(found, hand, motion, lies, seen, even.name, notes)
 
 
-def _believed(found: _Found | None, hand: Hand, marker, label, settings: ReleaseSettings, name: str, notes):
+def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
     """What the marker told, None where it was on no ball in this hand. InputError where the user said that it was."""
     away = _away(hand, marker, found)
     if away <= _REACHES:
         if found is None:
             notes.append(f"{label} is not seen in flight: the hand alone tells of the release")
+        elif found.frames >= _TELLS and found.circle > _LARGER * radius:
+            notes.append(
+                f"{label} goes round {1000.0 * found.circle:.0f} mm from the ball's centre, and a {settings.ball} is "
+                "smaller: say its radius or kind"
+            )
         return found
     said = f"{label} is {away:.2f} m from the {hand.side} hand"
     if settings.ball_marker or settings.hand:
@@ -209,6 +216,7 @@ class _Found:
     way_sigma: float
     residual: float = float("nan")
     frames: int = 0
+    circle: float = 0.0
 
 
 def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, name: str, notes) -> Release:
@@ -334,8 +342,10 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     if not sure:
         notes.append("the ball's marker is not seen in the hand: the release is where the flight meets the hand")
     launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
-    way_sigma = fit.speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
-    return _Found(launch, ball, "ball", fit.time_sigma, fit.speed_sigma, way_sigma, fit.residual, fit.frames)
+    air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
+    speed_sigma = float(np.hypot(fit.speed_sigma, _AIR * air))
+    way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
+    return _Found(launch, ball, "ball", fit.time_sigma, speed_sigma, way_sigma, fit.residual, fit.frames, fit.circle)
 
 
 def _without_air(ball: Ball) -> Ball:

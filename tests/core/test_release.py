@@ -71,6 +71,17 @@ def test_a_moved_motion_serves(known):
     assert np.allclose(rise, [0.0, 0.0, 0.03], atol=0.01)
 
 
+def test_a_ball_that_is_larger_than_said_is_told():
+    made = throw((12.0, 0.0, 1.0), 18.0, fps=200.0)
+    known = planted(made.motion, "driveline", ball=PlantedBall(made.release, radius=0.094, turns=6.0))
+    told = release(known.trial, known.motion)
+    assert any("is smaller" in note for note in told.notes)
+    right = release(known.trial, known.motion, ReleaseSettings(ball="handball"))
+    assert not any("is smaller" in note for note in right.notes)
+    assert abs(right.speed / known.ball.speed - 1.0) < 0.02
+    assert abs(right.time - made.release) < 1.0 / 200.0
+
+
 @pytest.mark.parametrize("settings, said", [
     (ReleaseSettings(ball_marker="PUCK"), "no marker 'PUCK'"),
     (ReleaseSettings(ball="melon"), "ball 'melon'"),

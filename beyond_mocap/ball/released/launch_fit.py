@@ -52,7 +52,8 @@ class LaunchFit:
     """How the ball left.
 
     time: s from frame 0. position: (3,) m of its centre then. velocity: (3,) m/s. spin: (3,) rad/s, zero where not
-    told. offset: (3,) m, from centre to marker at the release. residual: m, root mean square of the marker in flight.
+    told. offset: (3,) m, from centre to marker at the release. circle: m, of the circle on which the marker goes round:
+    no ball is smaller. residual: m, root mean square of the marker in flight.
     time_sigma: s and speed_sigma: m/s, one standard deviation each. frames: of flight that were seen. seconds: of
     flight that were used.
     """
@@ -62,6 +63,7 @@ class LaunchFit:
     velocity: np.ndarray
     spin: np.ndarray
     offset: np.ndarray
+    circle: float
     residual: float
     time_sigma: float
     speed_sigma: float
@@ -226,8 +228,8 @@ class _Search:
         spin, offset, centre = self._turning(flight, t0)
         sigma = float(np.hypot(np.mean(sides), 0.2 / self.fps))
         return LaunchFit(
-            float(t0), centre, flight.velocity, spin, offset, flight.residual, sigma, flight.speed_sigma, flight.frames,
-            seconds,
+            float(t0), centre, flight.velocity, spin, offset, float(np.linalg.norm(flight.circle[0])), flight.residual,
+            sigma, flight.speed_sigma, flight.frames, seconds,
         )  # fmt: skip
 
 
