@@ -22,6 +22,7 @@ _GUESSED = ("mm", "m", "cm", "in")
 _USUAL = 1.5  # metres that the markers of a standing body span
 _GUESS_RANGE = (0.5, 2.6)
 _BODY_RANGE = (0.1, 10.0)
+_HEIGHT_RANGE = (0.25, 2.8)  # from the feet to the head, or to the pelvis where nothing above is marked
 _GIVEN_RANGE = (0.01, 100.0)
 _SAY = "say --unit (metres per unit, or mm, cm, m, in)"
 
@@ -49,8 +50,9 @@ def given(path: str | os.PathLike, unit: float | str, positions: np.ndarray) -> 
     return metres, f"unit {metres:g} m, as given"
 
 
-def decided(path: str | os.PathLike, said: str, positions: np.ndarray) -> tuple[float, str]:
-    """(metres per unit, line on how it was found). said: as the header has it; positions: (T, M, 3) in the file's unit.
+def decided(path: str | os.PathLike, said: str, positions: np.ndarray, height: float = 0.0) -> tuple[float, str]:
+    """(metres per unit, line on how it was found). said: as the header has it; positions: (T, M, 3) in the file's unit;
+    height: from feet to head (or pelvis) in it, 0 where unknown.
 
     InputError, which names --unit, where neither header nor size tell, or where the body is impossibly large or small
     by what the header says.
@@ -58,6 +60,9 @@ def decided(path: str | os.PathLike, said: str, positions: np.ndarray) -> tuple[
     known = NAMES.get(said.strip().lower())
     span = body_span(positions)
     if known is not None:
+        if height > 0 and not _HEIGHT_RANGE[0] <= height * known <= _HEIGHT_RANGE[1]:
+            raise InputError(path, f"a body of {height * known:.4g} m in the header's unit {said.strip()!r}", "a body",
+                             _SAY)  # fmt: skip
         if span > 0 and not _BODY_RANGE[0] <= span * known <= _BODY_RANGE[1]:
             raise InputError(path, f"markers that span {span * known:.4g} m in the header's unit {said.strip()!r}",
                              "a body", _SAY)  # fmt: skip

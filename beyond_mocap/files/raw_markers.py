@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..markers.trial import MarkerEvent, MarkerTrial
-from ..markers.upright import handedness, up_axis
+from ..markers.upright import handedness, tall, up_axis
 from . import marker_labels, marker_unit
 
 _FARTHEST = 1000.0  # metres from the origin: a mark for "not seen", or damage
@@ -60,7 +60,8 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
     residuals = None if raw.residuals is None else np.array(raw.residuals[:, chosen], dtype=float)
     positions[(positions == 0).all(axis=-1)] = np.nan
     known = unit is not None
-    metres, how = marker_unit.given(path, unit, positions) if known else marker_unit.decided(path, raw.unit, positions)
+    metres, how = (marker_unit.given(path, unit, positions) if known
+                   else marker_unit.decided(path, raw.unit, positions, tall(labels, positions)))  # fmt: skip
     notes.insert(0, how)
     positions *= metres
     far = (np.abs(positions) > _FARTHEST).any(axis=-1)

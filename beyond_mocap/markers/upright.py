@@ -31,6 +31,17 @@ def up_axis(labels: Sequence[str], positions: np.ndarray) -> tuple[int, int] | N
     return (axis, 1 if along[axis] > 0 else -1) if abs(along[axis]) > _DECISIVE else None
 
 
+def tall(labels: Sequence[str], positions: np.ndarray) -> float:
+    """How far heads (or pelvis) usually lie from the feet, in the unit of the positions (T, M, 3); 0 where the names do
+    not tell."""
+    for high in (HIGH, MIDDLE):
+        apart = _apart(labels, positions, LOW, high)
+        length = np.linalg.norm(apart, axis=-1) if apart is not None else np.zeros(0)
+        if np.isfinite(length).any():
+            return float(np.nanmedian(length))
+    return 0.0
+
+
 def handedness(labels: Sequence[str], positions: np.ndarray) -> float:
     """How surely the body is as bodies are: near +1 where ahead, left and up, as the names of markers tell them, form a
     right-handed frame; near -1 where it is mirrored (its coordinates, or its left and right labels); 0 where unknown.
@@ -61,12 +72,18 @@ def _few(positions: np.ndarray) -> np.ndarray:
 
 def _between(labels, positions, start: re.Pattern, end: re.Pattern) -> np.ndarray | None:
     """(t, 3) unit directions from the middle of some markers to that of others; None where there are none."""
-    few = _few(positions)
+    apart = _apart(labels, positions, start, end)
+    direction = None if apart is None else _unit(apart)
+    return None if direction is None or not np.isfinite(direction).any() else direction
+
+
+def _apart(labels, positions, start: re.Pattern, end: re.Pattern) -> np.ndarray | None:
+    """(t, 3) from the middle of some markers to that of others, in some frames; None where no labels are such."""
     ends = [[i for i, label in enumerate(labels) if pattern.search(label)] for pattern in (start, end)]
     if not all(ends):
         return None
-    direction = _unit(_mean(few[:, ends[1]], axis=1) - _mean(few[:, ends[0]], axis=1))
-    return direction if np.isfinite(direction).any() else None
+    few = _few(positions)
+    return _mean(few[:, ends[1]], axis=1) - _mean(few[:, ends[0]], axis=1)
 
 
 def _sides(labels) -> list[tuple[int, int]]:

@@ -100,10 +100,13 @@ def test_units(body, read, unit, factor):
 
 def test_a_unit_that_cannot_be(body, read):
     data = body.c3d(body.positions, body.labels, unit="mm")
-    with pytest.raises(InputError, match="span 0.0016.* m in the header's unit 'mm'.*--unit"):
+    with pytest.raises(InputError, match="a body of 0.00.* m in the header's unit 'mm'.*--unit"):
         read(data)
     np.testing.assert_allclose(read(data, unit=1).positions, body.positions, atol=1e-6)
     np.testing.assert_allclose(read(data, unit="m").positions, body.positions, atol=1e-6)
+    for said, true in (("mm", 100), ("cm", 1000), ("in", 1000), ("m", 1 / 0.0254)):  # centimetres called mm ...
+        with pytest.raises(InputError, match="a body of .*--unit"):
+            read(body.c3d(body.positions * true, body.labels, unit=said))
     with pytest.raises(InputError, match="no unit, and markers that span .*--unit"):
         read(body.c3d(body.positions * 1e6, body.labels, unit=""))
     with pytest.raises(InputError, match="--unit: unit 'parsec'"):
