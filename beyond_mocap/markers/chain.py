@@ -34,8 +34,8 @@ class Chain:
     """J joints, M markers on them, and what each joint may do.
 
     joint: (M,) which joint carries the marker. places: (M, 3) m in its frame. order: J orders of intrinsic angles,
-    permutations of XYZ. free: (J, 3) bool by place in the order; an angle that is not free stays 0. low, high: (J, 3) rad,
-    -inf and inf where there is no limit, 0 where not free. stiffness: (J, 3) m per radian, how strongly a
+    permutations of XYZ. free: (J, 3) bool by place in the order; an angle that is not free stays 0. low, high: (J, 3)
+    rad, -inf and inf where there is no limit, 0 where not free. stiffness: (J, 3) m per radian, how strongly a
     joint is drawn to its rest pose: a radian away counts as much as a marker so many metres off.
     """
 
@@ -89,12 +89,13 @@ class Chain:
 def chain(
     skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None
 ) -> Chain:
-    """A chain of these arrays (see `Chain`), whatever is None free of limits and of stiffness. InputError where shapes do
-    not fit."""
+    """A chain of these arrays (see `Chain`), whatever is None free of limits and of stiffness. InputError where shapes
+    do not fit."""
     count = len(skeleton)
     joint, places = np.asarray(joint, dtype=int), np.asarray(places, dtype=float)
     if places.shape != (*joint.shape, 3) or joint.ndim != 1 or np.any((joint < 0) | (joint >= count)):
-        raise InputError("marker model", f"joints {joint.shape}, places {places.shape}", "(M,) joint indices and (M, 3)")
+        found = f"joints {joint.shape}, places {places.shape}"
+        raise InputError("marker model", found, "(M,) joint indices and (M, 3)")
     order = ("XYZ",) * count if order is None else tuple(order)
     if len(order) != count or any(sorted(one) != ["X", "Y", "Z"] for one in order):
         raise InputError("marker model", f"axis orders {order}", f"{count} permutations of XYZ")
@@ -207,15 +208,15 @@ def place(chain: Chain, at: Poses) -> Placed:
 
 
 def axes(chain: Chain, at: Poses, placed: Placed) -> np.ndarray:
-    """The world axes (J, 3, 3, F) about which a step turns each joint: [joint, component, axis]; zero where not free."""
+    """The world axes (J, 3, 3, F) about which a step turns each joint: [joint, component, axis]; 0 where not free."""
     out = np.empty_like(placed.world)
     for joint, parent in enumerate(chain.skeleton.parents):
         above = np.eye(3)[:, :, None] if parent < 0 else placed.world[parent]
         if chain.turning[joint]:
             out[joint] = above
         else:
-            np.einsum("abf,bcf->acf", np.broadcast_to(above, out[joint].shape), own_axes(chain, joint, at.angles[joint]),
-                      out=out[joint])
+            own = own_axes(chain, joint, at.angles[joint])
+            np.einsum("abf,bcf->acf", np.broadcast_to(above, own.shape), own, out=out[joint])
     return out
 
 

@@ -46,9 +46,9 @@ class HeldPoint:
 class Task:
     """What F poses are to come near to.
 
-    seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. drawn: (J, 3) m per radian, how strongly a joint is drawn
-    to its rest pose (in place of the chain's stiffness). lean: poses to be drawn to besides, or None; leaning: (J, F) m
-    per radian, how strongly. point: a held point, or None.
+    seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. drawn: (J, 3) m per radian, how strongly a joint is
+    drawn to its rest pose (in place of the chain's stiffness). lean: poses to be drawn to besides, or None; leaning:
+    (J, F) m per radian, how strongly. point: a held point, or None.
     even: m per radian, how strongly the joints of a run (`Chain.runs`) are held to turn alike.
     """
 
@@ -72,8 +72,8 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Arrived:
-    """Poses; cost: (F,) m2, half the weighted squares; steps: (F,) how many were taken; held: (J, F) whether a joint stands
-    at a limit against the markers."""
+    """Poses; cost: (F,) m2, half the weighted squares; steps: (F,) how many were taken; held: (J, F) whether a joint
+    stands at a limit against the markers."""
 
     poses: Poses
     cost: np.ndarray
@@ -100,14 +100,15 @@ class State:
 
     def frames(self, chosen) -> "State":
         """These frames only."""
-        at = self.poses.frames(chosen)
-        placed = Placed(at.root, *(a[..., chosen] for a in (self.placed.world, self.placed.joints, self.placed.markers)))
+        at, put = self.poses.frames(chosen), self.placed
+        placed = Placed(at.root, *(a[..., chosen] for a in (put.world, put.joints, put.markers)))
         more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.gone, self.cost))
         return State(at, placed, *more)
 
     def _arrays(self):
         at, put = self.poses, self.placed
-        return at.root, at.local, at.angles, put.world, put.joints, put.markers, self.away, self.bend, self.uneven, self.gone, self.cost
+        placed = at.root, at.local, at.angles, put.world, put.joints, put.markers
+        return *placed, self.away, self.bend, self.uneven, self.gone, self.cost
 
 
 def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
@@ -115,7 +116,8 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
     total = start.root.shape[-1]
     stops = limits.limited(task.chain)
     best = state_of(task, limits.held_back(task.chain, stops, start)[0])
-    out = Arrived(best.poses.copy(), best.cost.copy(), np.zeros(total, int), np.zeros((len(task.chain.skeleton), total), bool))
+    none = np.zeros((len(task.chain.skeleton), total), dtype=bool)
+    out = Arrived(best.poses.copy(), best.cost.copy(), np.zeros(total, dtype=int), none)
     live, done = np.arange(total), np.zeros(total, dtype=bool)
     damping, curved = np.full(total, _FIRST_DAMPING), np.zeros(total, dtype=bool)
     for _ in range(most_steps):
@@ -180,8 +182,8 @@ def _gone(task: Task, at: Poses) -> np.ndarray:
 
 
 def _uneven(task: Task, at: Poses) -> np.ndarray:
-    """Of every joint of a run how far its rotation vector is from the run's mean, and the derivative of half its square by
-    the joint's turns: (joints, 2, 3, F) rad.
+    """Of every joint of a run how far its rotation vector is from the run's mean, and the derivative of half its square
+    by the joint's turns: (joints, 2, 3, F) rad.
 
     The mean's own derivative adds nothing, since the distances from it cancel out.
     """
@@ -203,7 +205,8 @@ def carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 def distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the held point is (3, F), the unit direction (3, F) from the seen point to it, how much too far it is (F,)."""
+    """Where the held point is (3, F), the unit direction (3, F) from the seen point to it, how much too far it is (F,).
+    """
     x = placed.joints[point.joint] + np.einsum("abf,b->af", placed.world[point.joint], point.place)
     gap = x + placed.origin - point.seen
     length = np.sqrt(np.einsum("af,af->f", gap, gap))
@@ -211,20 +214,23 @@ def distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, 
 
 
 def crosswise(away: np.ndarray, radius: float) -> np.ndarray:
-    """What a distance that is `away` (F,) m too long weighs crosswise, as a part of what it weighs along: as a rope does
-    that is pulled."""
+    """What a distance that is `away` (F,) m too long weighs crosswise, as a part of what it weighs along: as a rope
+    does that is pulled."""
     return np.maximum(away, 0.0) / np.maximum(away + radius, 1e-9)
 
 
-def _step(task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
-    """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and the
-    state it leads to."""
+def _step(
+    task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, State]:
+    """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and
+    the state it leads to."""
     shift, turns, held = _solved(task, best, stops, damping, curved)
     further = moved(task.chain, best.poses, shift, turns)
     further, ahead = limits.held_back(task.chain, stops, further)
     for joint in task.chain.hinges:
         ahead[joint] = best.poses.angles[joint] + turns[joint]
-    over = np.flatnonzero(np.any((ahead > task.chain.high[..., None]) | (ahead < task.chain.low[..., None]), axis=(0, 1)))
+    outside = (ahead > task.chain.high[..., None]) | (ahead < task.chain.low[..., None])
+    over = np.flatnonzero(outside.any(axis=(0, 1)))
     if len(over):
         part = best.frames(over)
         again = _solved(task.frames(over), part, stops, damping[over], curved[over], ahead[..., over])

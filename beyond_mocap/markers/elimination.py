@@ -3,8 +3,8 @@
 The markers of a body enter its equations only as a rigid body would: a turn w and a shift v of all space move a marker
 at x by w x x + v, so that what they ask of (w, v) is one 6x6 matrix and one vector, as the inertia and force of a body.
 A joint passes on to its parent what is left when its own turns are free to follow: the elimination of Featherstone's
-articulated bodies (Rigid Body Dynamics Algorithms, 2008, ch. 7), here with the second derivative of squared distances in
-the place of masses. The cost grows with the number of joints, not with its cube, and every operation is one on long
+articulated bodies (Rigid Body Dynamics Algorithms, 2008, ch. 7), with the second derivative of squared distances in the
+place of masses. The cost grows with the number of joints, not with its cube, and every operation is one on long
 runs of frames.
 
 Beside the products of first derivatives (Gauss and Newton) there are the second derivatives: a turn about a carries on
@@ -32,8 +32,8 @@ class Bodies(NamedTuple):
 
 
 class Bends(NamedTuple):
-    """The second derivatives. inner: (J, 3, 3, F), between a joint's own turns; above: (J, 3, 3, F), between a turn of all
-    that is above it (rows) and its own turns."""
+    """The second derivatives. inner: (J, 3, 3, F), between a joint's own turns; above: (J, 3, 3, F), between a turn of
+    all that is above it (rows) and its own turns."""
 
     inner: np.ndarray
     above: np.ndarray

@@ -6,8 +6,8 @@ after each step. A step that would lead over a limit is solved again so that it 
 direction held still: the other directions then find their best beside it. At a limit a joint stays held as long as the
 markers pull over it (an active set, as in Bertsekas 1982, projected Newton methods).
 
-Within some degrees of the pole of its axis order a joint's outer angles mean nothing; only the middle one's limit counts
-there.
+Within some degrees of the pole of its axis order a joint's outer angles mean nothing; only the middle one's limit
+counts there.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def _bring_back(chain, joint, frames, local, angles, before) -> None:
 
 
 def _read(q: np.ndarray, order: str) -> np.ndarray:
-    """Angles (..., 3, F) rad of rotations (..., 4, F), the middle one within a quarter turn; at the pole as they come."""
+    """Angles (..., 3, F) rad of rotations (..., 4, F), the middle within a quarter turn; at the pole as they come."""
     i, j, k = (_AXES[letter] for letter in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     w, v = q[..., 0, :], [q[..., 1 + axis, :] for axis in (i, j, k)]

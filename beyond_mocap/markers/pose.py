@@ -26,7 +26,7 @@ _CHUNK = 512
 _COARSE_SECONDS = 1.0 / 60.0
 _ENOUGH = 0.3  # part of the markers that a frame must show to be solved
 _FEWEST = 4
-_DEAR, _FAR = 1.5, np.radians(40.0)  # a start is doubted that costs so many times its neighbour, or turns a joint so far
+_DEAR, _FAR = 1.5, np.radians(40.0)  # doubted: costs so many times its neighbour, or turns a joint so far
 _EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
 _LEANING = 0.02  # m per radian: how strongly a joint that misses markers leans on how it stands before and after
 _LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
@@ -50,8 +50,8 @@ class HeldBall:
 
 @dataclass(frozen=True)
 class PoseSettings:
-    """weights: count deformed clusters' markers less (eq. 5.2). limits: keep joints within them. smoothness: seconds, as
-    `smooth` understands them; 0: each frame by itself. ball: a held ball that takes part."""
+    """weights: count deformed clusters' markers less (eq. 5.2). limits: keep joints within them. smoothness: seconds,
+    as `smooth` understands them; 0: each frame by itself. ball: a held ball that takes part."""
 
     weights: bool = True
     limits: bool = True

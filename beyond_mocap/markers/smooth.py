@@ -128,7 +128,8 @@ def _columns(task: Task, best: State) -> tuple[np.ndarray, np.ndarray, np.ndarra
     chain, at = task.chain, best.poses
     point = task.point
     if point is not None:
-        chain = replace(chain, joint=np.append(chain.joint, point.joint), places=np.append(chain.places, point.place[None], 0))
+        joint, places = np.append(chain.joint, point.joint), np.append(chain.places, point.place[None], axis=0)
+        chain = replace(chain, joint=joint, places=places)
     # each frame's own numbers side by side, for the products to come
     exact = np.ascontiguousarray(marker_derivative(chain, at)) * np.concatenate([np.ones(3), chain.free.ravel()])
     frames, count = len(exact), len(task.chain.joint)
@@ -148,8 +149,8 @@ def _columns(task: Task, best: State) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def _banded(blocks: np.ndarray, right: np.ndarray, strength: np.ndarray, given: int) -> np.ndarray:
-    """Solve the frames' blocks (F, N, N) together with the second differences of each of the N coordinates: (F, N), zero
-    for the first `given` frames."""
+    """Solve the frames' blocks (F, N, N) together with the second differences of each of the N coordinates: (F, N),
+    zero for the first `given` frames."""
     from scipy.linalg import solveh_banded
 
     frames, size = right.shape

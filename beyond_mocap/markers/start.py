@@ -1,7 +1,7 @@
 """A first pose from the markers of one frame alone: from the root outward, each joint as its own markers say.
 
-It only has to lie in the right valley: `pose` goes on from there. The paper found poses by single segments too uneven to
-start every frame from (§5.3.3); here they start some frames, and the others start from what is solved beside them.
+It only has to lie in the right valley: `pose` goes on from there. The paper found poses by single segments too uneven
+to start every frame from (§5.3.3); here they start some frames, and the others start from what is solved beside them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from ..motion import quaternion
 from .chain import Chain, Poses, angles_of, matrices, multiply, within
 
-_BEYOND = 0.01  # how much the markers of the next joint count beside a joint's own; those behind it this much less again
+_BEYOND = 0.01  # how much the next joint's markers count beside a joint's own; those behind it this much less again
 _FAITH = 4e-4  # m2: how much the parent's direction counts, for what markers leave open
 
 
@@ -28,7 +28,7 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
     lean = local.copy() if guess is None else guess.local
     angles = np.zeros((len(skeleton), 3, frames))
     share = weights * _BEYOND ** distance[0][:, None]
-    world, root = [_whole(rest, seen, share)], None
+    world = [_whole(rest, seen, share)]
     middle = _mean(rest, share), _mean(seen, share)
     root = middle[1] - np.einsum("abf,bf->af", matrices(world[0]), middle[0])
     local[0], joints = world[0], [root]
@@ -58,7 +58,7 @@ def _joint_rest(chain: Chain) -> np.ndarray:
 
 
 def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
-    """Markers in the rest pose (M, 3) m, and how many joints (J, M) they lie below each joint, inf where they do not."""
+    """Markers in the rest pose (M, 3) m, and how many joints (J, M) they lie below each joint, inf where not."""
     distance = np.full((len(chain.skeleton), len(chain.joint)), np.inf)
     for marker, joint in enumerate(chain.joint):
         steps = 0

@@ -24,9 +24,11 @@ def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
     return out
 
 
-def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray, frames: np.ndarray) -> tuple[Poses, np.ndarray]:
-    """The poses of `frames` (N,) that lie between solved ones, each joint between those that tell it, and of which joints
-    any do: (J,) bool.
+def between(
+    chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray, frames: np.ndarray
+) -> tuple[Poses, np.ndarray]:
+    """The poses of `frames` (N,) that lie between solved ones, each joint between those that tell it, and of which
+    joints any do: (J,) bool.
 
     solved: poses of all T frames, of which `known` (K,) count. told: (K, J) bool. Before the first and after the last
     telling frame a joint stays as it is there.

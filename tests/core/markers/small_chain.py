@@ -20,8 +20,9 @@ def small_chain(seed=0, per_joint=3, stiffness=0.0, **limits) -> Chain:
     joint = np.repeat(np.arange(len(SKELETON)), per_joint)
     free = np.ones((len(SKELETON), 3), dtype=bool)
     free[HINGE, 1:], free[SADDLE, 2] = False, False
+    orders = ("XZY", "YXZ", "ZXY", "ZXY", "XYZ", "YXZ", "YXZ")
     return chain(
-        SKELETON, joint, rng.normal(0.0, 0.08, (len(joint), 3)), ("XZY", "YXZ", "ZXY", "ZXY", "XYZ", "YXZ", "YXZ"), free,
+        SKELETON, joint, rng.normal(0.0, 0.08, (len(joint), 3)), orders, free,
         stiffness=np.full(len(SKELETON), stiffness), **limits,
     )
 

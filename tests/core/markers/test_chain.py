@@ -101,7 +101,7 @@ def test_with_second_derivatives_a_step_is_newtons():
     def half_cost(steps):
         """At steps (N, columns) from there."""
         shift, turns = steps[:, :3].T, np.moveaxis(steps[:, 3:].reshape(len(steps), -1, 3), 0, -1)
-        start = poses(made, np.repeat(at.root.T, len(steps), axis=0), np.repeat(np.moveaxis(at.local, -1, 0), len(steps), 0))
+        start = at.frames(np.zeros(len(steps), dtype=int))
         away = markers_at(made, moved(made, start, shift, turns)) - seen
         return 0.5 * np.einsum("mf,maf,maf->f", np.repeat(weights, len(steps), axis=1), away, away)
 

@@ -130,7 +130,8 @@ def test_a_spine_that_is_too_long_does_not_flip(run):
 
 def test_a_joint_whose_markers_are_hidden_goes_on_between_its_neighbours(run):
     positions = run.trial.positions.copy()
-    hidden = [index for index, label in enumerate(run.trial.labels) if run.segments[label] in ("LeftForeArm", "LeftHand")]
+    arm = ("LeftForeArm", "LeftHand")
+    hidden = [index for index, label in enumerate(run.trial.labels) if run.segments[label] in arm]
     positions[60:75, hidden] = np.nan
     solved = solve(model_of(run), replace(run.trial, positions=positions))
     errors = world_errors(run, solved, "LeftForeArm")[:, 0]
