@@ -25,6 +25,8 @@ from .unlabeled import assign, unlabeled
 
 # a marker this much farther from its place than its tolerance for this long is told, s
 _STRAYED, _FOR = 1.5, 0.1
+# within so many frames of a leap or a gap
+_NEAR_BREAK = 3
 
 
 @dataclass(frozen=True)
@@ -199,13 +201,17 @@ def _gaps(work, settings):
 
 
 def _strayed(work):
-    """Markers that stay far from where their helpers say: fallen off, pushed aside, or labelled wrongly throughout."""
+    """Markers that lie far from where their helpers say after a leap or a gap, or until one: put on anew, or labelled
+    wrongly. Where they go smoothly it is the body that moves."""
+    leaping = leaps(work.positions, work.carried, work.trial.fps)
+    broken = np.pad(leaping | np.isnan(work.positions[..., 0]), ((_NEAR_BREAK, _NEAR_BREAK), (0, 0)))
     for marker, one in work.carried.items():
         if not one.helpers:
             continue
         far = np.nan_to_num(one.away) > np.maximum(_STRAYED * one.tolerance, 0.06)
         for first, end in runs(far):
-            if end - first >= _FOR * work.trial.fps:
+            edges = broken[first : first + 2 * _NEAR_BREAK + 1, marker], broken[end : end + 2 * _NEAR_BREAK + 1, marker]
+            if end - first >= _FOR * work.trial.fps and any(edge.any() for edge in edges):
                 yield work.stretch([marker], first, end, "", float(np.median(one.away[first:end])))
 
 

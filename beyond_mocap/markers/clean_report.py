@@ -53,7 +53,7 @@ class CleanReport:
         return (
             *(_swapped(swap) for swap in self.swaps),
             *(_timed(f"{one.labels[0]} taken for {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
-            *_by_label(self.jumps, "frames that jump taken out"),
+            *_by_label(self.jumps, "jumping frames taken out"),
             *_by_label(self.strayed, "frames far from where the markers around it say"),
             *_by_label(self.left, "frames not seen and left open"),
             *_by_label(self.gaps, "frames not seen and filled"),

@@ -1,4 +1,4 @@
-"""Jumps: samples, single ones or a few together, that lie where the marker cannot have been (ghosts, reflections)."""
+"""Jumps: samples, single ones or whole stretches, that lie where the marker cannot have been (ghosts, reflections)."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from .robust import quantile
 _BURST = 0.08
 # and how far off its way it lies at least, m, and as a part of what the marker moves meanwhile
 _LEAST_BURST, _LEAST_SHARE = 0.015, 0.3
+# a longer stretch is a ghost if it lies at least this far from where its helpers say, m
+_GHOST = 0.06
 # a single sample is off if it leaves the way by this much, m (as its helpers see it; in the world), by more than limbs
 # can do in a frame, m/s^2, and by this many times what nine tenths of the samples around it do
 _OFF_LOCAL, _OFF_WORLD, _TIMES = 0.006, 0.015, 3.0
@@ -37,7 +39,7 @@ class Jump(NamedTuple):
 def take_out(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> tuple[np.ndarray, list[Jump]]:
     """(positions (T, M, 3) m without the samples that jump, which become NaN, the jumps)."""
     out, found = positions.copy(), []
-    for jump in _bursts(positions, carried, fps):
+    for jump in [*_bursts(positions, carried, fps), *_ghosts(positions, carried, fps)]:
         out[jump.first : jump.end, jump.marker] = np.nan
         found.append(jump)
     for jump in _spikes(out, carried, fps):
@@ -67,6 +69,23 @@ def _bursts(positions, carried, fps):
         if off > allowed:
             seen[first:end, marker] = False
             yield Jump(marker, first, end, off)
+
+
+def _ghosts(positions, carried, fps):
+    """Longer pieces that begin or end in a leap and lie all along far from where the markers around them say."""
+    leaping = leaps(positions, carried, fps)
+    most = max(3, int(round(_BURST * fps)))
+    seen = np.isfinite(positions[..., 0])
+    for marker, first, end in pieces(positions, leaping):
+        one = carried.get(marker)
+        leapt = leaping[first, marker] or (end < len(positions) and leaping[end, marker])
+        if one is None or not one.helpers or not leapt or end - first <= most:
+            continue
+        away = one.away[first:end]
+        near = float(np.nan_to_num(quantile(away, 0.05)))
+        told = np.isfinite(away).mean() > 0.5 and 2 * (end - first) < seen[:, marker].sum()
+        if told and near > max(_GHOST, 2.0 * one.tolerance):
+            yield Jump(marker, first, end, near)
 
 
 def _off(way, seen, piece, most, fps):

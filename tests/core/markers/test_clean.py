@@ -247,3 +247,22 @@ def test_what_no_cluster_carries_and_no_curve_would_meet_stays_open(walk):
     away = np.stack([off(walk, cleaned, label) for label in foot], axis=1)
     assert not np.isnan(away[120:123]).any() and np.isnan(away[60:78]).any()
     assert np.nanmax(away) < 0.03
+
+
+def test_a_stretch_in_which_a_label_lies_on_a_ghost_is_taken_out(walk):
+    def haunt(positions, index):
+        positions[60:110, index["LFHD"]] = positions[60:110, index["C7"]] + [0.3, 0.4, 0.1]
+
+    cleaned, report = clean(spoiled(walk, haunt), clusters_of(walk))
+    assert [(jump.labels, jump.frames) for jump in report.jumps] == [(("LFHD",), 50)]
+    assert off(walk, cleaned, "LFHD").max() < 0.005
+
+
+def test_a_marker_that_was_put_on_anew_is_told_and_one_that_the_body_moves_is_not(walk):
+    def move(positions, index):
+        positions[130:, index["LFHD"]] += [0.0, 0.0, 0.09]
+        positions[128:131, index["LFHD"]] = np.nan
+
+    _, report = clean(spoiled(walk, move), clusters_of(walk), CleanSettings(jumps=False))
+    assert {one.labels for one in report.strayed} == {("LFHD",)}
+    assert clean(walk.trial, clusters_of(walk)).report.strayed == ()
