@@ -14,6 +14,7 @@ from ..markers.trial import MarkerEvent, MarkerTrial
 from ..markers.upright import handedness, tall, up_axis
 from . import marker_labels, marker_unit
 
+_WILD = 1e9  # in any unit
 _FARTHEST = 1000.0  # metres from the origin: a mark for "not seen", or damage
 _UP = {
     (2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)),
@@ -59,12 +60,14 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
     positions = np.array(raw.positions[:, chosen], dtype=float)
     residuals = None if raw.residuals is None else np.array(raw.residuals[:, chosen], dtype=float)
     positions[(positions == 0).all(axis=-1)] = np.nan
+    wild = (np.abs(positions) > _WILD).any(axis=-1)
+    positions[wild] = np.nan
     known = unit is not None
     metres, how = (marker_unit.given(path, unit, positions) if known
                    else marker_unit.decided(path, raw.unit, positions, tall(labels, positions)))  # fmt: skip
     notes.insert(0, how)
     positions *= metres
-    far = (np.abs(positions) > _FARTHEST).any(axis=-1)
+    far = wild | (np.abs(positions) > _FARTHEST).any(axis=-1)
     if far.any():
         notes.append(f"{far.sum()} places farther than {_FARTHEST:.0f} m from the origin, taken as not seen")
         positions[far] = np.nan

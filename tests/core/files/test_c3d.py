@@ -83,7 +83,7 @@ def test_zeros_and_no_numbers_are_not_seen(body, read):
     assert not read(bytes(data)).seen[3, 0]
     start = 512 * (struct.unpack_from("<H", data, 16)[0] - 1)
     struct.pack_into("<f", data, start + 16, float("nan"))
-    struct.pack_into("<f", data, start + 32, 1e30)
+    struct.pack_into("<f", data, start + 32, 1e38)
     trial = read(bytes(data))
     assert not trial.seen[0, 1] and not trial.seen[0, 2] and trial.seen[0, 3]
     assert any("farther than" in note for note in trial.notes)
