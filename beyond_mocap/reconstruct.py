@@ -22,6 +22,7 @@ FILTERS = ("butterworth", "kalman", "none")
 RELEASES = ("auto", "yes", "no")
 LEAST_MARKERS = 0.5
 """Share of a model's markers that a trial must have."""
+_FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
 
 Progress = Callable[[float, str], None]
 
@@ -113,7 +114,7 @@ def reconstruct(
             road.tell(model.notes)
     with road.step("pose", 0.85):
         solved = _posed(model, told, marker_set, settings, road, cancelled)
-        road.tell(solved.notes)
+        road.tell([*solved.notes, *_far_off(solved, model)])
     with road.step("filter", 0.92):
         motion, held = _filtered(solved, model, seen, settings, road)
     with road.step("floor", 0.94):
@@ -270,6 +271,22 @@ def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _
     held = np.arange(len(trial)) < found.frame
     ball = HeldBall(hand, found.centre, found.radius, trial.positions[:, trial.index(label)], held)
     return solve(model, trial, replace(how, ball=ball), road.inner(0.65, 0.85), cancelled)
+
+
+def _far_off(solved: Solved, model: MarkerModel) -> list[str]:
+    """A line where markers and model do not fit together, or a part of them does not."""
+    seen = np.isfinite(solved.residual)
+    if not seen.any():
+        return []
+    mean = float(solved.residual[seen].mean())
+    count = np.maximum(seen.sum(axis=0), 1)
+    each = np.where(seen, solved.residual, 0.0).sum(axis=0) / count
+    worst = [i for i in np.argsort(-each)[:4] if each[i] > _FAR_MARKER]
+    if mean <= _FAR_MEAN and not worst:
+        return []
+    told = ", ".join(f"{model.markers[i]} {1000.0 * each[i]:.0f}" for i in worst)
+    off = f"markers are {1000.0 * mean:.0f} mm off on average" + (f" (mm: {told})" if told else "")
+    return [f"{off}: model, static or marker set may be another's, or labels exchanged"]
 
 
 def _ball_label(marker_set, trial: MarkerTrial) -> str | None:

@@ -75,6 +75,15 @@ def test_a_floor_that_is_not_at_zero_is_told(known, made):
     assert np.allclose(out.motion.root_positions[:, :2], made.motion.root_positions[:, :2], atol=2e-3)
 
 
+def test_a_model_that_does_not_fit_is_told(known, made):
+    assert not any("on average" in line for line in made.warnings)
+    places = np.array(made.model.places)
+    places[made.model.markers.index("LFIN")] += [0.0, 0.0, 0.12]
+    places[made.model.markers.index("LELB")] += [0.0, 0.0, 0.12]
+    out = reconstruct(known.trial, model=replace(made.model, places=places))
+    assert any("on average" in line and "LELB" in line for line in out.warnings)
+
+
 def test_it_can_be_stopped(known):
     with pytest.raises(Cancelled):
         reconstruct(known.trial, known.static, cancelled=lambda: True)
