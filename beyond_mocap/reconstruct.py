@@ -22,6 +22,7 @@ FILTERS = ("butterworth", "kalman", "none")
 RELEASES = ("auto", "yes", "no")
 LEAST_MARKERS = 0.5
 """Share of a model's markers that a trial must have."""
+_TOLD_FLOOR = 0.02  # metres
 _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
 
 Progress = Callable[[float, str], None]
@@ -31,9 +32,10 @@ Progress = Callable[[float, str], None]
 class ReconstructSettings:
     """What may be chosen. marker_set: whose markers these are; None: the shipped set that fits. weights, limits,
     smoothness: of the pose (`markers.pose`). filter: one of FILTERS, at `cutoff` hertz. plant: standing feet are held.
+    floor: motion and markers are moved up or down so that the feet stand at height 0.
     radius: metres of a ball that carries a marker, None where not known. hold_ball: its marker takes part in the pose
     until the release. ball: its kind, one of `ball.physics.THROWN`. release: whether a throw's release is looked for;
-    "auto": where a marker is on a ball."""
+    "auto": where a marker is on a ball, or the file's name tells a throw's speed."""
 
     marker_set: object | None = None
     weights: bool = True
@@ -42,6 +44,7 @@ class ReconstructSettings:
     filter: str = "butterworth"
     cutoff: float = CUTOFF
     plant: bool = True
+    floor: bool = False
     radius: float | None = None
     hold_ball: bool = False
     ball: str = "baseball"
@@ -57,9 +60,9 @@ class ReconstructSettings:
 class Reconstruction:
     """What came out.
 
-    motion: at the trial's rate, on the markers' own ground, only its height moved where the floor was not at 0 (`floor`
-    metres, which `trial` was moved by too). model: whose skeleton it has. trial: the markers under the set's names,
-    cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters. cleaned: what was mended.
+    motion: at the trial's rate, where the markers are. floor: height in metres of the floor that its feet stood on when
+    it was recorded; motion and trial are moved by that where `grounded`. model: whose skeleton it has. trial: the
+    markers under the set's names, cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters. cleaned: what was mended.
     release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds: of each step. warnings:
     lines.
     """
@@ -73,8 +76,13 @@ class Reconstruction:
     release: object | None = None
     held: np.ndarray | None = None
     floor: float = 0.0
+    grounded: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    def on_floor(self) -> Motion:
+        """The motion with its floor at height 0, as clips of a library stand."""
+        return self.motion if self.grounded else moved_down(self.motion, self.floor)
 
     def report(self) -> dict:
         """The figures, for JSON."""
@@ -118,11 +126,14 @@ def reconstruct(
     with road.step("filter", 0.92):
         motion, held = _filtered(solved, model, seen, settings, road)
     with road.step("floor", 0.94):
-        motion, tidy, floor = _grounded(motion, model, tidy, road)
+        floor = _floor(model, tidy, settings, road)
+        down = floor if settings.floor else 0.0
+        motion, tidy, seen = moved_down(motion, down), _lowered(tidy, down), _lowered(seen, down)
     with road.step("release", 1.0):
-        found = _release(_lowered(seen, floor), motion, marker_set, settings, road)
+        found = _release(seen, motion, marker_set, settings, road)
     return Reconstruction(
-        motion, model, tidy, trial, solved, cleaned, found, held, floor, road.seconds, tuple(road.warnings)
+        motion, model, tidy, trial, solved, cleaned, found, held, floor, settings.floor, road.seconds,
+        tuple(road.warnings),
     )
 
 
@@ -336,16 +347,20 @@ def _has_legs(motion: Motion) -> bool:
     return True
 
 
-def _grounded(motion: Motion, model: MarkerModel, trial: MarkerTrial, road: _Road):
-    """Motion and markers with the floor at height 0, and by how much they were lowered for that."""
+def _floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, road: _Road) -> float:
+    """Height in metres of the floor, told where it is not at 0."""
     from .markers.floor import floor_under
 
     floor = floor_under(model, trial)
-    if not floor:
-        return motion, trial, 0.0
-    road.tell([f"the floor lay at {floor:+.3f} m; markers and motion were moved so that it is at 0"])
-    down = np.array([0.0, 0.0, floor])
-    return replace(motion, root_positions=motion.root_positions - down), _lowered(trial, floor), floor
+    if abs(floor) > _TOLD_FLOOR:
+        done = "markers and motion were moved so that it is at 0" if settings.floor else "--floor moves it to 0"
+        road.tell([f"the floor lies at {floor:+.3f} m; {done}"])
+    return floor
+
+
+def moved_down(motion: Motion, by: float) -> Motion:
+    """The motion lower by so many metres."""
+    return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, by]) if by else motion
 
 
 def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
@@ -354,8 +369,11 @@ def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
 
 def _release(trial, motion, marker_set, settings: ReconstructSettings, road: _Road):
     """When and how the ball left the hand, where that is asked for."""
+    from .ball.released.radar import radar_speed
+
     label = _ball_label(marker_set, trial)
-    if settings.release == "no" or (settings.release == "auto" and label is None):
+    told = label is not None or radar_speed(trial.name) is not None
+    if settings.release == "no" or (settings.release == "auto" and not told):
         return None
     from .release import ReleaseSettings, release
 

@@ -50,6 +50,7 @@ def _add_posing(verb) -> None:
     verb.add_argument("--cutoff", type=partial(between, low=0.1, high=1000.0, expected="0.1 to 1000 hertz"),
                       default=13.4, metavar="HERTZ", help="of the filter; default 13.4")  # fmt: skip
     verb.add_argument("--no-plant", action="store_true", help="do not hold standing feet")
+    verb.add_argument("--floor", action="store_true", help="move the motion up or down so that the feet stand at 0")
     verb.add_argument("--no-limits", action="store_true", help="joints may turn as far as they like")
     verb.add_argument("--no-weights", action="store_true", help="all markers count alike")
     more = partial(between, low=0.0, high=1e6, expected="0 or more")
@@ -221,6 +222,7 @@ def settings_of(options):
         marker_set=options.marker_set and chosen_set(options.marker_set), weights=not options.no_weights,
         limits=not options.no_limits,
         smoothness=options.smoothness, filter=options.filter, cutoff=options.cutoff, plant=not options.no_plant,
+        floor=options.floor,
         radius=options.ball_radius, hold_ball=options.hold_ball, ball=options.ball_kind,
         release=release,
     )  # fmt: skip
@@ -285,4 +287,4 @@ def add_to_library(made, trial: Path, options) -> list[str]:
     key = None
     if _is_throw(options.words) and made.release is not None:
         key = made.release.frame / made.motion.fps
-    return add_clip(options.add_to, trial.stem, made.motion, options.words, key)
+    return add_clip(options.add_to, trial.stem, made.on_floor(), options.words, key)

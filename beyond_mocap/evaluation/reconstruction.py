@@ -23,7 +23,7 @@ def figures(made) -> dict:
         "frames": len(motion), "duration_s": motion.duration, "seconds": dict(made.seconds),
         "residual_mm": residual_figures(made), "weighted_se": weighted_squares(solved),
         "frames_per_second": len(motion) / posing if posing else None, "bones_change_m": bones_change(motion),
-        "skate": skate(motion), "limits": limit_shares(solved, motion.skeleton.names), "floor_m": made.floor,
+        "skate": skate(motion), "limits": limit_shares(solved, motion.skeleton.names), "floor_m": made.floor, "grounded": made.grounded,
         "held_share": None if made.held is None else float(made.held.any(axis=(1, 2)).mean()),
         **made.cleaned.report.as_dict(), "release": None if made.release is None else made.release.report(),
         "warnings": list(made.warnings),

@@ -36,7 +36,7 @@ def joints_off(made, known):
     """Metres (T, J) between the found and the true centres of the limbs' joints."""
     places, _ = forward_kinematics(made.motion)
     names = [side + limb for side in ("Left", "Right") for limb in LIMBS]
-    found = places[:, [made.motion.skeleton.index(name) for name in names]] + [0.0, 0.0, made.floor]
+    found = places[:, [made.motion.skeleton.index(name) for name in names]]
     return np.linalg.norm(found - np.stack([known.centre(name) for name in names], axis=1), axis=-1)
 
 
@@ -68,11 +68,16 @@ def test_the_same_input_gives_the_same_bits(made, known):
     assert np.array_equal(again.motion.rotations, made.motion.rotations)
 
 
-def test_a_floor_that_is_not_at_zero_is_told(known, made):
-    up = [0.0, 0.0, 0.8]
-    out = reconstruct(known.trial.with_positions(known.trial.positions + up), model=made.model)
-    assert out.floor == pytest.approx(0.8 + made.floor, abs=0.03) and any("floor" in line for line in out.warnings)
-    assert np.allclose(out.motion.root_positions[:, :2], made.motion.root_positions[:, :2], atol=2e-3)
+def test_the_motion_stays_where_the_markers_are_unless_a_floor_is_asked_for(known, made):
+    lifted = known.trial.with_positions(known.trial.positions + [0.0, 0.0, 0.8])
+    out = reconstruct(lifted, model=made.model)
+    assert out.floor == pytest.approx(0.8, abs=0.05) and any("--floor" in line for line in out.warnings)
+    assert np.allclose(out.motion.root_positions - made.motion.root_positions, [0.0, 0.0, 0.8], atol=5e-3)
+    moved = reconstruct(lifted, model=made.model, settings=ReconstructSettings(floor=True))
+    lowered = out.trial.positions - [0.0, 0.0, out.floor]
+    assert moved.grounded and np.allclose(moved.trial.positions, lowered, equal_nan=True)
+    assert np.allclose(moved.motion.root_positions, out.on_floor().root_positions)
+    assert moved.report()["residual_mm"]["output_mean"] == pytest.approx(out.report()["residual_mm"]["output_mean"])
 
 
 def test_a_model_that_does_not_fit_is_told(known, made):
