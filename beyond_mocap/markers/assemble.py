@@ -59,17 +59,13 @@ def model_from_centres(
         on.append(axes[index].T @ (np.asarray(frame[label], dtype=float) - places[index]))
     if not labels:
         raise InputError("model", "no marker on any joint", "markers of the set", "check labels and marker set")
-    notes = list(centres.notes)
-    absent = sorted(set(marker_set.labels) - set(labels) - marker_set.optional)
-    if absent:
-        notes.append(f"not on the model, since unseen where it was taken: {', '.join(absent)}")
     counts = {name: joints.count(index) for index, name in enumerate(names)}
     freedom, stiffness = freedom_of(names, skeleton.parents, counts)
     return MarkerModel(
         skeleton=skeleton, markers=tuple(labels), joint=np.array(joints), places=np.array(on),
         sigma=np.full(len(labels), SIGMA), edge_sigma=np.full(len(labels), np.nan), freedom=freedom,
         stiffness=stiffness, centre_sigma=np.array([centres.sigma[name] for name in names]), subject=subject,
-        sessions=(session,) if session else (), set_name=marker_set.name, notes=tuple(notes),
+        sessions=(session,) if session else (), set_name=marker_set.name, notes=tuple(centres.notes),
     )
 
 

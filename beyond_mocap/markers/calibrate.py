@@ -17,6 +17,7 @@ from .adjustment import Adjustment, Body, Prior, Pull
 from .assemble import model_from_frame
 from .calibration_frames import neutral_frames, unlike_frames
 from .chain import chain
+from .late_markers import with_late_markers
 from .marker_set import MarkerSet
 from .model import MarkerModel
 from .pose import PoseSettings, Solved, solve
@@ -57,6 +58,10 @@ def calibrate(
     if stopped():
         raise Cancelled("calibration cancelled")
     tell(0.2, "refining the model")
+    model = with_late_markers(model, marker_set, trial, stopped)
+    absent = sorted(set(marker_set.labels) - set(model.markers) - marker_set.optional - marker_set.static)
+    if absent:
+        model = replace(model, notes=(*model.notes, f"seen nowhere, so not on the model: {', '.join(absent)}"))
     return refined(model, trial, static, stopped)
 
 
@@ -134,8 +139,11 @@ def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, 
 
 def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
     """Without the frames that fit far worse than most: swapped markers, or a pose that was not found."""
-    away = np.sqrt(np.nanmean(solved.residual**2, axis=1))
-    good = np.flatnonzero(away <= _FAR * np.nanmedian(away) + _FAR_BESIDE)
+    known = np.isfinite(solved.residual)
+    square = np.where(known, solved.residual, 0.0) ** 2
+    away = np.sqrt(square.sum(axis=1) / np.maximum(known.sum(axis=1), 1))
+    away[~known.any(axis=1)] = np.inf
+    good = np.flatnonzero(away <= _FAR * np.median(away[np.isfinite(away)]) + _FAR_BESIDE)
     motion = solved.motion
     kept = Motion(motion.skeleton, motion.root_positions[good], motion.rotations[good], motion.fps)
     return kept, part.with_positions(part.positions[good])

@@ -60,12 +60,15 @@ def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarra
     if len(frames) <= count:
         return frames
     positions = trial.positions[frames]
-    own = positions[:, root]
+    own = positions[:, root] if len(root) else positions
     reference = own[int(np.argmax(np.isfinite(own).all(axis=-1).sum(axis=1)))]
     fit = rigid_fit(reference, own)
     pose = np.einsum("fba,fmb->fma", fit.rotation, positions - fit.shift[:, None])
-    middle = np.nan_to_num(np.nanmean(np.where(np.isfinite(pose), pose, np.nan), axis=0))
-    pose = np.where(np.isfinite(pose), pose, middle).reshape(len(frames), -1)
+    known = np.isfinite(pose)
+    middle = np.where(known, pose, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    pose = np.where(known, pose, middle).reshape(len(frames), -1)
+    if not pose.any():  # the pelvis is never seen: nothing tells poses apart
+        return frames[np.unique(np.linspace(0, len(frames) - 1, count).astype(int))]
     chosen = [int(np.argmin(np.linalg.norm(pose - pose.mean(axis=0), axis=1)))]
     nearest = np.full(len(frames), np.inf)
     while len(chosen) < count:

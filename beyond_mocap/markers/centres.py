@@ -86,11 +86,16 @@ def body_size(points: Mapping[str, np.ndarray]) -> float:
     return float(np.clip(np.median(ratios), 0.4, 1.6)) if ratios else 1.0
 
 
-def _fit(joint: str, points: Mapping[str, np.ndarray], size: float):
-    """The typical body's segment laid on its landmarks: rotation (3, 3) and shift, or None where they do not tell."""
+def _fit(joint: str, points: Mapping[str, np.ndarray], size: float, beside: tuple[str, ...] = ()):
+    """The typical body's segment laid on its landmarks: rotation (3, 3) and shift, or None where they do not tell.
+
+    beside: landmarks of other segments that are taken in where there are too few of its own.
+    """
     names = [name for name, (carrier, _) in LANDMARK_PLACES.items() if carrier == joint and name in points]
     firm = [name for name in names if not name.endswith("scapula")]
     names = firm if len(firm) >= 3 else names
+    if len(names) < 3:
+        names += [name for name in beside if name in points]
     if len(names) < 3:
         return None
     typical = size * np.array([LANDMARK_PLACES[name][1] for name in names])
@@ -152,7 +157,7 @@ def _harrington(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray] | Non
 
 
 def _thorax(out: Centres, points: Mapping[str, np.ndarray]) -> None:
-    fit = _fit("Chest", points, out.size)
+    fit = _fit("Chest", points, out.size, ("left_acromion", "right_acromion"))
     if fit is None:
         raise InputError("thorax", "fewer than three landmarks, or all on one line",
                          "for instance c7, jugular_notch and t10", "name the thorax' markers in the marker set")
@@ -212,19 +217,20 @@ def between_axes(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarray, float] | None:
     """A knee's, ankle's or elbow's centre, the unit direction from its middle to the outside, and the uncertainty.
 
-    above: the centre (3,) of the joint above. hint: (3,) roughly outwards, where only the lateral side is marked.
+    above: the centre (3,) of the joint above. hint: (3,) roughly outwards, where only one side is marked.
     """
     lateral, medial = points.get(f"{side}_{joint}_lateral"), points.get(f"{side}_{joint}_medial")
-    if lateral is None:
+    if lateral is None and medial is None:
         return None
-    if medial is not None:
+    if lateral is not None and medial is not None:
         return 0.5 * (lateral + medial), unit(lateral - medial), SIGMAS["both"]
+    marker, inwards = (lateral, -1.0) if medial is None else (medial, 1.0)
     half = out.size * HALF_WIDTHS[joint] + MARKER_RADIUS
-    length = max(float(np.linalg.norm(above - lateral)), 1e-6)
-    up = (above - lateral) / length
+    length = max(float(np.linalg.norm(above - marker)), 1e-6)
+    up = (above - marker) / length
     outwards = unit(hint - (hint @ up) * up)
     sine = min(half / length, 0.9)  # so that the centre lies square below the joint above
-    return lateral + half * (sine * up - np.sqrt(1.0 - sine**2) * outwards), outwards, SIGMAS["one side"]
+    return marker + half * (sine * up + inwards * np.sqrt(1.0 - sine**2) * outwards), outwards, SIGMAS["one side"]
 
 
 def _leg(out: Centres, points: Mapping[str, np.ndarray], side: str, standing: bool) -> None:
@@ -301,8 +307,9 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
     out.put(f"{name}Scapula", acromion - 0.25 * drop * chest[:, 2], chest, SIGMAS["one side"])
     wrist, radial = _wrist(points, side)
     elbow = None
-    if f"{side}_elbow_lateral" in points:
-        plain = _outwards_plainly(chest, shoulder, points[f"{side}_elbow_lateral"], sign)
+    marker = points.get(f"{side}_elbow_lateral", points.get(f"{side}_elbow_medial"))
+    if marker is not None:
+        plain = _outwards_plainly(chest, shoulder, marker, sign)
         if wrist is None or radial is not None:
             elbow = _elbow(out, points, side, sign, shoulder, wrist, radial, plain)
         else:
@@ -352,7 +359,7 @@ def _elbow_and_wrist(out, points, side, sign, shoulder, marker, plain):
 
 def _elbow(out, points, side, sign, shoulder, wrist, radial, plain):
     """An elbow's centre, the direction from its medial to its lateral side, and the uncertainty."""
-    lateral = points[f"{side}_elbow_lateral"]
+    lateral = points.get(f"{side}_elbow_lateral", points.get(f"{side}_elbow_medial"))
     if wrist is not None and f"{side}_elbow_medial" not in points:
         half = out.size * HALF_WIDTHS["elbow"] + MARKER_RADIUS
         outwards = _plane_beside(lateral, shoulder, wrist, half, -sign)

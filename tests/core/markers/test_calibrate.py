@@ -63,6 +63,18 @@ def test_bones_of_limbs_stay_along_their_axes(walk):
         assert np.abs(offset).max() < 1e-9
 
 
+def test_a_marker_that_the_static_trial_lacks_is_placed_by_the_motion(walk):
+    marker_set = chosen_set("plug_in_gait")
+    rest = [label for label in walk.static.labels if label not in ("LFIN", "RTIB")]
+    model = calibrate(marker_set, walk.trial, walk.static.only(rest))
+    whole = calibrate(marker_set, walk.trial, walk.static)
+    assert model.freedom.free[model.skeleton.index("LeftHand")].any()
+    for label in ("LFIN", "RTIB"):
+        place, wanted = (m.places[m.markers.index(label)] for m in (model, whole))
+        assert np.linalg.norm(place - wanted) < 0.02
+    assert any("LFIN" in note for note in model.notes)
+
+
 def test_a_static_trial_without_a_pelvis_is_refused(walk):
     marker_set = chosen_set("plug_in_gait")
     rest = [label for label in walk.static.labels if label[1:] not in ("ASI", "PSI")]

@@ -67,6 +67,21 @@ def test_a_lone_lateral_marker_finds_the_knee_half_a_width_inside():
         assert length == pytest.approx(0.43, abs=0.008)
 
 
+def test_a_lone_medial_marker_does_as_well():
+    frame = {name: place for name, place in typical(0.4).items()
+             if not name.endswith(("knee_lateral", "ankle_lateral", "elbow_lateral"))}
+    skeleton = model_from_frame(frame, everything()).skeleton
+    for name, length in (("LeftLeg", 0.43), ("RightFoot", 0.435), ("LeftForeArm", 0.30)):
+        assert np.linalg.norm(skeleton.offsets[skeleton.index(name)]) == pytest.approx(length, abs=0.012)
+
+
+def test_shoulders_stand_in_for_a_thorax_that_is_hardly_marked():
+    frame = {name: place for name, place in typical().items()
+             if LANDMARK_PLACES[name][0] != "Chest" or name in ("jugular_notch", "t7")}
+    skeleton = model_from_frame(frame, everything()).skeleton
+    assert np.linalg.norm(skeleton.offsets[skeleton.index("LeftForeArm")]) == pytest.approx(0.30, abs=0.012)
+
+
 def test_legs_alone_make_a_body_of_legs_alone():
     below = {name: place for name, place in typical().items()
              if any(part in LANDMARK_PLACES[name][0] for part in ("Hips", "Leg", "Foot", "Toe"))}
