@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from beyond_mocap.files.marker_set_text import chosen_set
@@ -35,8 +33,7 @@ def planted_table() -> list[str]:
         ball = PlantedBall(thrown.release, side=arm.title(), turns=turns)
         known = planted(thrown.motion, "driveline", seed=7, ball=ball)
         chosen = ReconstructSettings(marker_set=chosen_set("driveline"), release="no")
-        body = reconstruct(known.trial, known.static, settings=chosen)
-        motion = replace(body.motion, root_positions=body.motion.root_positions + [0.0, 0.0, body.floor])
+        motion = reconstruct(known.trial, known.static, settings=chosen).motion
         name = f"{speed:g} m/s {arm} {style}, {fps:g} Hz"
         for how, trial in _ways(known):
             lines.append(_row(name, how, known, trial, motion))
