@@ -80,6 +80,11 @@ class Reconstruction:
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
+    @property
+    def lowered(self) -> float:
+        """Metres by which motion and trial stand lower than the markers were recorded."""
+        return self.floor if self.grounded else 0.0
+
     def on_floor(self) -> Motion:
         """The motion with its floor at height 0, as clips of a library stand."""
         return self.motion if self.grounded else moved_down(self.motion, self.floor)

@@ -94,7 +94,7 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
     played = replace(made.motion, fps=made.motion.fps * slowed)
     channels.discard(thing, MADE)
     action.write(thing, played, scene, clouds.start_frame(cloud), cloud.name, generated=True)[MADE] = True
-    thing.matrix_world = cloud.matrix_world @ Matrix.Translation((0.0, 0.0, made.floor * units_per_metre(scene)))
+    thing.matrix_world = cloud.matrix_world @ Matrix.Translation((0.0, 0.0, made.lowered * units_per_metre(scene)))
     bake.lengthen(scene, clouds.start_frame(cloud) + played.duration * frames_per_second(scene))
     kept.made, kept.figures, kept.told = store.keep(made), "\n".join(figures(made)), "\n".join(made.warnings)
     models.onto(cloud, made.model)
@@ -130,4 +130,4 @@ def add(order: Order, made: "Reconstruction") -> list[str]:
     from ...beyond_mocap.library.add_clip import add_clip
 
     throw = made.release is not None and any(word.startswith("throw") for word in order.words)
-    return add_clip(order.add.parent, order.add.stem, made.motion, order.words, made.release.time if throw else None)
+    return add_clip(order.add.parent, order.add.stem, made.on_floor(), order.words, made.release.time if throw else None)

@@ -37,7 +37,7 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "Mar
     marked = [row.name for row in kept.labels if row.role == "BALL" and row.name in made.raw.labels]
     hand = None if chosen.hand == "AUTO" else chosen.hand
     asked = ReleaseSettings(marked[0] if marked else None, chosen.radius or None, hand, chosen.thrown)
-    trial = made.raw.with_positions(made.raw.positions - [0.0, 0.0, made.floor])
+    trial = made.raw.with_positions(made.raw.positions - [0.0, 0.0, made.lowered])
     return cloud.name, trial, made.motion, asked
 
 
