@@ -225,7 +225,7 @@ def _step(
     """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and
     the state it leads to."""
     shift, turns, held = _solved(task, best, stops, damping, curved)
-    further = moved(task.chain, best.poses, shift, turns)
+    further = limits.along(task.chain, held, best.poses, turns, moved(task.chain, best.poses, shift, turns))
     further, ahead = limits.held_back(task.chain, stops, further)
     for joint in task.chain.hinges:
         ahead[joint] = best.poses.angles[joint] + turns[joint]
@@ -235,7 +235,8 @@ def _step(
         part = best.frames(over)
         again = _solved(task.frames(over), part, stops, damping[over], curved[over], ahead[..., over])
         shift[:, over], turns[..., over], held[:, over] = again
-        further.put(over, limits.held_back(task.chain, stops, moved(task.chain, part.poses, *again[:2]))[0])
+        onto = limits.along(task.chain, again[2], part.poses, again[1], moved(task.chain, part.poses, *again[:2]))
+        further.put(over, limits.held_back(task.chain, stops, onto)[0])
     size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
     return size, held, state_of(task, further)
 

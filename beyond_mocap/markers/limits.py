@@ -124,6 +124,19 @@ def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> Non
     own.pull[joint][:, frames] += np.einsum("naf,nf->af", rates, strength * short)
 
 
+def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further: Poses) -> Poses:
+    """`further`, in place, with joints that limits hold (J, F) moved along the limit: their angles grow by what the turns
+    (J, 3, F) rad say, where a turn about a fixed axis would leave it."""
+    for joint in np.flatnonzero(held.any(axis=1)):
+        if chain.turning[joint]:
+            frames = np.flatnonzero(held[joint])
+            angles = at.angles[joint][:, frames]
+            rates = _inverse(own_axes(chain, joint, angles))
+            there = angles + np.einsum("naf,af->nf", rates, turns[joint][:, frames])
+            further.local[joint][:, frames] = quaternion.from_euler(there.T, chain.order[joint]).T
+    return further
+
+
 def _inverse(basis: np.ndarray) -> np.ndarray:
     """How each angle grows with a turn: (3 angles, 3 components, F), the inverse of the axes (3 components, 3, F)."""
     columns = basis[:, 0], basis[:, 1], basis[:, 2]
