@@ -18,46 +18,78 @@ OWN = "own"
 
 
 def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
-    """The marker set that a cloud's labels describe. InputError where no segment has a marker, or names are wrong."""
+    """The marker set that a cloud's labels describe, with what its static trial and the set that was applied say of
+    markers that the cloud itself lacks. InputError where no segment has a marker, or names are wrong."""
     from ...beyond_mocap.markers.marker_set import MarkerSet
 
     kept = cloud.beyond_mocap_cloud
-    carried, marked = {}, {}
-    rows = [row for row in kept.labels if row.role not in ("BALL", "OTHER") and row.segment.strip()]
-    for row in rows:
-        carried.setdefault(row.segment.strip(), []).append(row.name)
-        for landmark in filter(None, (part.strip() for part in row.landmark.split(","))):
-            marked.setdefault(landmark, []).append(row.name)
-    if not rows:
+    told = {row.name: (row.segment.strip(), row.landmark, row.role) for row in kept.labels}
+    if not any(segment for segment, *_ in told.values()):
         raise InputError(
             cloud.name, "no marker belongs to a segment", "some that do",
             "load a marker set, or select markers in Edit Mode and press Assign",
         )
+    before = _applied(cloud)
+    if is_cloud(kept.static):
+        told = {row.name: (row.segment.strip(), row.landmark, "STATIC") for row in kept.static.beyond_mocap_cloud.labels
+                if row.role not in ("BALL", "OTHER") and row.segment.strip()} | told  # fmt: skip
+    told = _rows_of(before) | told if before is not None else told
+    carried, marked = {}, {}
+    for label, (segment, landmark, how) in told.items():
+        if segment and how not in ("BALL", "OTHER"):
+            carried.setdefault(segment, []).append(label)
+            for point in filter(None, (part.strip() for part in landmark.split(","))):
+                marked.setdefault(point, []).append(label)
+    on_body = [label for labels in carried.values() for label in labels]
+    having = {how: [label for label, row in told.items() if row[2] == how] for how in ("STATIC", "OPTIONAL")}
     return MarkerSet(
-        name or kept.set_name or OWN, carried, marked,
-        static=frozenset(row.name for row in rows if row.role == "STATIC"),
-        optional=frozenset(row.name for row in rows if row.role == "OPTIONAL"),
-        ball=tuple(row.name for row in kept.labels if row.role == "BALL"),
-        other=tuple(row.name for row in kept.labels if row.role == "OTHER"),
+        name or kept.set_name or OWN, carried, marked, before.aliases if before is not None else {},
+        static=frozenset(having["STATIC"]) & frozenset(on_body),
+        optional=frozenset(having["OPTIONAL"]) & frozenset(on_body),
+        ball=tuple(label for label, row in told.items() if row[2] == "BALL"),
+        other=tuple(label for label, row in told.items() if row[2] == "OTHER"),
     )
 
 
-def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
-    """Give a cloud's labels the names, segments and roles of a marker set; returns lines about what does not fit."""
-    kept = cloud.beyond_mocap_cloud
-    names = marker_set.renaming([row.name for row in kept.labels])
+def _applied(cloud: bpy.types.Object) -> "MarkerSet | None":
+    """The marker set that was applied to a cloud last."""
+    from ...beyond_mocap.files.marker_set_text import parse_marker_set
+
+    text = cloud.beyond_mocap_cloud.set_text
+    return parse_marker_set(text, cloud.name) if text else None
+
+
+def _rows_of(marker_set: "MarkerSet") -> dict[str, tuple[str, str, str]]:
+    """Segment, landmarks and role of every label of a set."""
+    marks = _marks(marker_set)
+    labels = (*marker_set.labels, *marker_set.ball, *marker_set.other)
+    return {
+        label: (marker_set.segment_of(label) or "", ", ".join(marks.get(label, ())), role(marker_set, label))
+        for label in labels
+    }  # fmt: skip
+
+
+def _marks(marker_set: "MarkerSet") -> dict[str, list[str]]:
+    """Label -> the landmarks that it marks."""
     marks = {}
     for landmark, labels in marker_set.landmarks.items():
         for label in labels:
             marks.setdefault(label, []).append(landmark)
+    return marks
+
+
+def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
+    """Give a cloud's labels the names, segments and roles of a marker set; returns lines about what does not fit."""
+    from ...beyond_mocap.files.marker_set_text import marker_set_text
+
+    kept = cloud.beyond_mocap_cloud
+    names, rows = marker_set.renaming([row.name for row in kept.labels]), _rows_of(marker_set)
     with lines.at_once():
         for row in kept.labels:
             row.name = names.get(row.name, row.name)
-            row.segment = marker_set.segment_of(row.name) or ""
-            row.landmark = ", ".join(marks.get(row.name, ()))
-            row.role = role(marker_set, row.name)
+            row.segment, row.landmark, row.role = rows.get(row.name, ("", "", "NEEDED"))
     lines.draw(cloud)
-    kept.set_name = marker_set.name
+    kept.set_name, kept.set_text = marker_set.name, marker_set_text(marker_set)
     there = {row.name for row in kept.labels}
     missing = sorted(marker_set.needed - there)
     return [f"{marker_set.name}: {', '.join(missing[:8])} missing in {cloud.name}"] if missing else []

@@ -105,6 +105,9 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
         name="File", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, description="The recording's file"
     )
     set_name: StringProperty(name="Marker Set", description="The marker set that the labels belong to")
+    set_text: StringProperty(
+        name="Applied Set", options={"HIDDEN"}, description="The marker set that was applied last, as text"
+    )
     static: PointerProperty(
         name="Static Trial", type=bpy.types.Object, poll=a_cloud,
         description="A recording of the same body standing still, from which its joints are found; none: from the "

@@ -168,6 +168,20 @@ def test_a_marker_set_goes_to_a_file_and_comes_back(walk, tmp_path):
     assert kept.set_name == "mine"
 
 
+def test_markers_that_only_the_static_trial_has_are_of_the_set(core):
+    sets = importlib.import_module(f"{EXTENSION}.scene.markers.sets")
+    thing = imported(worlds.SAMPLE.parent / "markers" / "throw.c3d")
+    known = {one.name: one for one in core("files.marker_set_text").shipped_sets()}["driveline"]
+    made = sets.of_cloud(thing)
+    assert {joint: set(labels) for joint, labels in made.segments.items()} == {
+        joint: set(labels) for joint, labels in known.segments.items()
+    }
+    assert made.static == known.static and made.optional == known.optional and dict(made.aliases) == dict(known.aliases)
+    assert {key: set(labels) for key, labels in made.landmarks.items()} == {
+        key: set(labels) for key, labels in known.landmarks.items()
+    }
+
+
 def test_selected_vertices_are_assigned_to_a_segment(walk):
     thing = imported(walk)
     labels = thing.beyond_mocap_cloud.labels
