@@ -81,9 +81,12 @@ def _marks(marker_set: "MarkerSet") -> dict[str, list[str]]:
 def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
     """Give a cloud's labels the names, segments and roles of a marker set; returns lines about what does not fit."""
     from ...beyond_mocap.files.marker_set_text import marker_set_text
+    from ...beyond_mocap.markers.naming import named_as
+    from .cloud import read
 
-    kept = cloud.beyond_mocap_cloud
-    names, rows = marker_set.renaming([row.name for row in kept.labels]), _rows_of(marker_set)
+    kept, rows = cloud.beyond_mocap_cloud, _rows_of(marker_set)
+    trial = read(cloud, bpy.context.scene)
+    names = dict(zip(trial.labels, named_as(trial, marker_set).labels))
     with lines.at_once():
         for row in kept.labels:
             row.name = names.get(row.name, row.name)

@@ -171,19 +171,20 @@ def check_optical_markers():
     assert bpy.ops.beyond_mocap.reconstruct_markers() == bpy.ops.beyond_mocap.find_release() == {"FINISHED"}
     scene.frame_set(25)
     view = window.area("VIEW_3D").spaces.active.region_3d
-    view.view_perspective, view.view_distance = "PERSP", 5.0
-    view.view_location, view.view_rotation = (1.1, 0.0, 1.1), Euler((1.45, 0.0, 0.3)).to_quaternion()
+    view.view_perspective, view.view_distance = "PERSP", 3.6
+    view.view_location, view.view_rotation = (1.1, 0.0, 1.0), Euler((1.45, 0.0, 0.3)).to_quaternion()
     panel, = (cls for cls in panels("VIEW_3D") if "PT_markers" in cls.__name__)
     area = window.area("VIEW_3D")
     solo([panel], "VIEW_3D")
     yield from window.open_tab(area, TAB)
     fold, look = unfold(panel), bpy.context.preferences.view
-    look.ui_scale = 0.75  # it is longer than the window
+    look.ui_scale = 0.7  # it is longer than the window
     yield 1
     yield from picture_of_tab("panel-markers", area)
     look.ui_scale = 1.0
     fold()
     scene.beyond_mocap_markers.names = False
+    cloud.beyond_mocap_cloud.size = 0.014
     cloud.select_set(False)
     yield from picture_of_view("markers")
 
