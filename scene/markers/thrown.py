@@ -71,9 +71,11 @@ def mark(scene: bpy.types.Scene, name: str, frame: float) -> None:
 def lines(found: "Release") -> list[str]:
     """Lines "name: value" for the panel."""
     told = [
-        f"Speed: {found.speed:.1f} ± {found.speed_sigma:.1f} m/s ({3.6 * found.speed:.0f} km/h)",
+        f"Speed: {found.speed:.1f} ± {found.speed_sigma:.1f} m/s",
+        f"That is: {3.6 * found.speed:.0f} km/h",
         f"Released: {found.time:.3f} s ± {1000.0 * found.time_sigma:.0f} ms",
-        f"By: {found.side} hand, told by the {found.how}",
+        f"Hand: {found.side}",
+        f"Told by: {found.how}",
     ]
     if found.radar is not None:
         told.append(f"Radar: {found.radar:.1f} m/s, {100.0 * (found.speed / found.radar - 1.0):+.1f} %")
