@@ -7,6 +7,9 @@ from dataclasses import asdict, dataclass, field
 
 from ..errors import TimedLine
 
+# where more markers than this have something to tell, one line tells it for all
+_MOST_LINES = 6
+
 
 @dataclass(frozen=True)
 class Stretch:
@@ -56,7 +59,7 @@ class CleanReport:
             *_by_label(self.jumps, "jumping frames taken out"),
             *_by_label(self.strayed, "frames far from where the markers around it say"),
             *_by_label(self.left, "frames not seen and left open"),
-            *_by_label(self.gaps, "frames not seen and filled"),
+            *_summed(self.gaps, "frames not seen and filled"),
         )
 
     def as_dict(self) -> dict:
@@ -71,18 +74,32 @@ def _swapped(swap):
 
 
 def _by_label(stretches, what):
-    """One line for each label, and one for all that share all their stretches."""
+    """One line for each label, and one for all that share all their stretches; one in all where these are many."""
     own: dict[str, list] = {}
     for stretch in stretches:
         own.setdefault(stretch.labels[0], []).append(stretch)
     alike: dict[tuple, list[str]] = {}
     for label, ones in own.items():
         alike.setdefault(tuple((one.start, one.frames) for one in ones), []).append(label)
+    if len(alike) > _MOST_LINES:
+        yield from _summed(stretches, what)
+        return
     for labels in alike.values():
         ones = own[labels[0]]
         count = sum(one.frames for one in ones)
         shown = ", ".join(one.when() for one in ones[:3]) + (f" and {len(ones) - 3} more" if len(ones) > 3 else "")
         yield _timed(f"{_named(labels)}: {count} {what if count != 1 else what.replace('frames', 'frame')}: {shown}", ones)
+
+
+def _summed(stretches, what):
+    """One line for all of them: how many frames, of which markers most."""
+    count: dict[str, int] = {}
+    for stretch in stretches:
+        count[stretch.labels[0]] = count.get(stretch.labels[0], 0) + stretch.frames
+    most = sorted(count, key=lambda label: -count[label])
+    shown = ", ".join(f"{label} {count[label]}" for label in most[:5]) + (", ..." if len(most) > 5 else "")
+    if count:
+        yield _timed(f"{sum(count.values())} {what}: {shown}", stretches)
 
 
 def _named(labels):

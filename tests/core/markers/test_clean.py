@@ -266,3 +266,13 @@ def test_a_marker_that_was_put_on_anew_is_told_and_one_that_the_body_moves_is_no
     _, report = clean(spoiled(walk, move), clusters_of(walk), CleanSettings(jumps=False))
     assert {one.labels for one in report.strayed} == {("LFHD",)}
     assert clean(walk.trial, clusters_of(walk)).report.strayed == ()
+
+
+def test_what_many_markers_have_in_common_is_one_line(walk):
+    def hide(positions, index):
+        for number, label in enumerate(("LFHD", "RFHD", "C7", "LASI", "RASI", "LPSI", "CLAV", "STRN")):
+            positions[10 + 15 * number : 14 + 15 * number, index[label]] = np.nan
+
+    _, report = clean(spoiled(walk, hide), clusters_of(walk))
+    assert len(report.gaps) == 8 and len(report.lines) == 1
+    assert report.lines[0].startswith("32 frames not seen and filled: ") and len(spans_of(report.lines[0])) == 8
