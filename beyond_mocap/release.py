@@ -25,6 +25,7 @@ from .ball.released.without_ball import HOLD, release_by_hand
 from .errors import InputError
 from .markers.frame_times import evenly
 from .markers.trial import MarkerTrial
+from .motion.contacts import ground_height
 from .motion.humanoid import identify
 from .motion.motion import Motion, forward_kinematics, resample
 from .take import BallPath
@@ -71,7 +72,7 @@ class Release:
     residual: m of its marker in flight, NaN without. flight_frames: in which it was seen to fly. radar: m/s that the
     file's name tells, or None. centre: (3,) m in the hand's frame, radius: m. path: the ball in all frames. impact:
     (3,) m, where it first meets the ground, or None. hips: (3,) m in the first frame. notes: lines for people. All
-    places are in the motion's space, with its floor at 0, from which markers may be shifted.
+    places are in the motion's space, over its own floor; markers may be shifted from it.
     """
 
     time: float
@@ -251,9 +252,10 @@ def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, nam
     """The launch in the motion's space, with all that follows from it."""
     launch = replace(found.launch, position=found.launch.position - hand.shift)
     home = replace(hand, origin=hand.origin - hand.shift)
-    places = carried_and_thrown(home, lies.centre, launch, found.ball)
-    bounces = fly(launch, found.ball, _LONGEST)
-    impact = bounces.at(bounces.bounces[:1])[0] * [1.0, 1.0, 0.0] if len(bounces.bounces) else None
+    ground = ground_height(motion)
+    places = carried_and_thrown(home, lies.centre, launch, found.ball, ground)
+    way = fly(launch, found.ball, _LONGEST, ground)
+    impact = way.at(way.bounces[:1])[0] - [0.0, 0.0, found.ball.radius] if len(way.bounces) else None
     hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
     return Release(
         launch.time, int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)), launch.position, launch.velocity,

@@ -68,6 +68,7 @@ def test_a_moved_motion_serves(known):
     assert abs(found.time - straight.time) < 0.005
     assert np.linalg.norm(found.position - straight.position - [0.0, 0.0, 0.03]) < 0.06
     held = slice(0, found.frame - 30)
+    assert abs(found.impact[2] - straight.impact[2] - 0.03) < 1e-6
     rise = np.median(found.path.positions[held] - straight.path.positions[held], axis=0)
     assert np.allclose(rise, [0.0, 0.0, 0.03], atol=0.01)
 
