@@ -38,7 +38,8 @@ def draw(cloud: bpy.types.Object) -> None:
     shape.verts.ensure_lookup_table()
     segments = [labels[vertex[which]].segment if vertex[which] < len(labels) else "" for vertex in shape.verts]
     for vertex, segment in zip(shape.verts, segments):
-        vertex[colours] = side(segment)
+        thing = vertex[which] < len(labels) and labels[vertex[which]].role in ("BALL", "OTHER")
+        vertex[colours] = 0 if thing else side(segment)
     for edge in list(shape.edges):
         shape.edges.remove(edge)
     for one, other in edges(np.array([vertex.co for vertex in shape.verts]), segments):

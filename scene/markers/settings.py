@@ -67,7 +67,9 @@ class BeyondMocapMarker(bpy.types.PropertyGroup):
         name="Lies on", search=landmarks,
         description="The anatomical point that it lies on, by which joints are found; several with commas between",
     )
-    role: EnumProperty(name="Role", items=ROLES, default="NEEDED", description="Whether it may be missing")
+    role: EnumProperty(
+        name="Role", items=ROLES, default="NEEDED", update=redraw, description="Whether it may be missing"
+    )
     seen: FloatProperty(name="Seen", subtype="PERCENTAGE", max=100.0, description="Share of the samples with it")
 
 

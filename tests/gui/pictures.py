@@ -169,10 +169,10 @@ def check_optical_markers():
     bpy.ops.beyond_mocap.import_markers(filepath=str(sample() / "markers" / "throw.c3d"))
     cloud = bpy.context.object
     assert bpy.ops.beyond_mocap.reconstruct_markers() == bpy.ops.beyond_mocap.find_release() == {"FINISHED"}
-    scene.frame_set(25)
+    scene.frame_set(24)
     view = window.area("VIEW_3D").spaces.active.region_3d
-    view.view_perspective, view.view_distance = "PERSP", 3.6
-    view.view_location, view.view_rotation = (1.1, 0.0, 1.0), Euler((1.45, 0.0, 0.3)).to_quaternion()
+    view.view_perspective, view.view_distance = "PERSP", 2.6
+    view.view_location, view.view_rotation = (0.85, 0.0, 0.95), Euler((1.45, 0.0, 0.3)).to_quaternion()
     panel, = (cls for cls in panels("VIEW_3D") if "PT_markers" in cls.__name__)
     area = window.area("VIEW_3D")
     solo([panel], "VIEW_3D")
@@ -183,8 +183,12 @@ def check_optical_markers():
     yield from picture_of_tab("panel-markers", area)
     look.ui_scale = 1.0
     fold()
-    scene.beyond_mocap_markers.names = False
-    cloud.beyond_mocap_cloud.size = 0.014
+    kept = cloud.beyond_mocap_cloud
+    kept.size = 0.02
+    for child in kept.body.children:
+        child.hide_set(True)  # so that markers are seen
+    kept.body.hide_set(False)
+    kept.body.data.display_type, kept.body.show_in_front = "OCTAHEDRAL", False
     cloud.select_set(False)
     yield from picture_of_view("markers")
 
