@@ -27,6 +27,7 @@ _COARSE_SECONDS = 1.0 / 60.0
 _ENOUGH = 0.3  # part of the markers that a frame must show to be solved
 _FEWEST = 4
 _DEAR, _FAR = 1.5, np.radians(40.0)  # doubted: costs so many times its neighbour, or turns a joint so far
+_FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # a jump in one frame; how long what lies between two of them may last
 _EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
 _LEANING = 0.02  # m per radian: how strongly a joint that misses markers leans on how it stands before and after
 _LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
@@ -167,9 +168,32 @@ class _Solving:
         others = np.setdiff1d(known, coarse)
         if len(others):
             self._solve_between(others, coarse)
+        self._unflip(known)
         self._fill(known)
         if self.settings.smoothness > 0.0:
             self._smooth()
+
+    def _unflip(self, known: np.ndarray) -> None:
+        """Short stretches that jump away and back again (a straight elbow can be turned out two ways) are solved again
+        from the frames around them, and kept where that costs about as little."""
+        local = self.poses.local[..., known]
+        near = np.abs(np.einsum("jaf,jaf->jf", local[..., 1:], local[..., :-1]))
+        jumps = np.flatnonzero(np.any(near < np.cos(0.5 * _FLIP), axis=0))
+        suspect = np.zeros(len(known), dtype=bool)
+        for first, last in zip(jumps[:-1], jumps[1:]):
+            if known[last] - known[first] <= _FLIP_SECONDS * self.fps:
+                suspect[first + 1 : last + 1] = True
+        if not suspect.any() or suspect.all():
+            return
+        frames, around = known[suspect], known[~suspect]
+        every = np.ones((len(around), len(self.chain.skeleton)), dtype=bool)
+        start = between(self.chain, self.poses, around, every, frames)[0]
+        leaning = np.full((len(self.chain.skeleton), len(frames)), _LEANING)
+        leaning[0] = 0.0
+        for part in self._chunks(frames):
+            here = frames[part]
+            task = self._task(here, start.frames(part), leaning[:, part])
+            self._accept(here, descend(task, start.frames(part)), 1.5, 1e-5)
 
     def _smooth(self) -> None:
         """All frames together."""
@@ -233,12 +257,16 @@ class _Solving:
         """Solve frames again from other frames' solutions, and keep what comes out clearly nearer."""
         for part in self._chunks(frames):
             arrived = descend(self._task(frames[part]), self.poses.frames(source[part]))
-            better = arrived.cost < 0.999 * self.cost[frames[part]] - 1e-9
-            if better.any():
-                chosen = frames[part][better]
-                self.poses.put(chosen, arrived.poses.frames(better))
-                self.cost[chosen], self.held[:, chosen] = arrived.cost[better], arrived.held[:, better]
-            self.steps[frames[part]] += arrived.steps
+            self._accept(frames[part], arrived, 0.999, -1e-9)
+
+    def _accept(self, frames: np.ndarray, arrived, share: float, more: float) -> None:
+        """Keep what costs less than this share of what is there, and a little more."""
+        better = arrived.cost < share * self.cost[frames] + more
+        if better.any():
+            chosen = frames[better]
+            self.poses.put(chosen, arrived.poses.frames(better))
+            self.cost[chosen], self.held[:, chosen] = arrived.cost[better], arrived.held[:, better]
+        self.steps[frames] += arrived.steps
 
     def _fill(self, known: np.ndarray) -> None:
         """Frames with hardly any markers lie between those beside them."""

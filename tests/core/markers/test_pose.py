@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import Cancelled, InputError
+from beyond_mocap.markers import pose
 from beyond_mocap.markers.joint_freedom import freedom_of
 from beyond_mocap.markers.model import MarkerModel
 from beyond_mocap.markers.planted import planted
@@ -139,3 +140,21 @@ def test_a_joint_whose_markers_are_hidden_goes_on_between_its_neighbours(run):
     arm = solved.motion.rotations[58:78, run.motion.skeleton.index("LeftForeArm")]
     steps = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(arm[:-1]), arm[1:]))
     assert np.degrees(np.linalg.norm(steps, axis=-1)).max() < 6.0
+
+
+def test_a_short_flip_is_solved_again_from_the_frames_around(run, monkeypatch):
+    model = model_of(run)
+    arm = run.motion.skeleton.index("LeftArm")
+    right, flipped = pose._Solving._unflip, []
+
+    def flip_first(solving, known):
+        """Turn the arm out for three frames, as if that cost no more."""
+        turned = solving.poses.local[arm, :, 60:63]
+        solving.poses.local[arm, :, 60:63] = quaternion.multiply(
+            turned.T, quaternion.from_rotation_vector(np.array([0.0, 1.8, 0.0]))).T
+        flipped.append(known)
+        right(solving, known)
+
+    monkeypatch.setattr(pose._Solving, "_unflip", flip_first)
+    solved = solve(model, run.trial)
+    assert flipped and world_errors(run, solved, "LeftArm")[59:64].max() < 1.0
