@@ -1,10 +1,10 @@
-"""A model and its poses in many frames, adjusted together: all markers of all frames tell joint centres, bone lengths and
-the markers' places, weighed against what was known before.
+"""A model and its poses in many frames, adjusted together: all markers of all frames tell joint centres, bone lengths
+and the markers' places, weighed against what was known before.
 
-This is how surveyors and photographs' cameras are adjusted. The unknowns of one frame (its pose) touch that frame alone,
-so they are eliminated frame by frame (Schur's complement), and what is left is one small system for the body. Where the
-motion turns a joint far, its centre follows from the motion, as in functional methods; where it does not, the predicted
-centre stays: each counts by its uncertainty.
+This is how surveyors and photographs' cameras are adjusted. The unknowns of one frame (its pose) touch that frame
+alone, so they are eliminated frame by frame (Schur's complement), and what is left is one small system for the body.
+Where the motion turns a joint far, its centre follows from the motion, as in functional methods; where it does not, the
+predicted centre stays: each counts by its uncertainty.
 
 Pose unknowns are small turns about the world's axes and a shift of the root; a marker x below a joint at p moves by
 turn x (x - p).
@@ -45,8 +45,8 @@ class Body:
 
 @dataclass(eq=False)
 class Prior:
-    """What was known before: offsets (J, 3) m with sigma (J,), places (M, 3) m with sigma (M,), and by how much the bones
-    of both sides may differ (m)."""
+    """What was known before: offsets (J, 3) m with sigma (J,), places (M, 3) m with sigma (M,), and by how much the
+    bones of both sides may differ (m)."""
 
     offsets: np.ndarray
     offset_sigma: np.ndarray
@@ -78,7 +78,6 @@ class Adjustment:
         self.sigma = sigma
         self.share = min(worth / max(len(seen), 1), 1.0)
         self.columns = _Columns(body)
-        self.below = _below(body.parents)
 
     def start(self, motion: Motion) -> None:
         """Begin from these poses of F frames."""
@@ -179,91 +178,90 @@ class Adjustment:
 
     def _priors(self):
         """Errors (N,) of what was known before, and their derivative (N, columns)."""
-        body, prior, columns = self.body, self.prior, self.columns
-        errors, rows = [], []
-
-        def add(error, entries):
-            row = np.zeros(columns.count)
+        body, prior = self.body, self.prior
+        known: list[tuple[float, list[tuple[int, float]]]] = []
+        for joint, axis in zip(*np.nonzero(self.columns.offset >= 0)):
+            weight = 1.0 / prior.offset_sigma[joint]
+            gap = body.offsets[joint, axis] - prior.offsets[joint, axis]
+            known.append((weight * gap, [(self.columns.offset[joint, axis], weight)]))
+        known += self._alike()
+        for marker, sigma in enumerate(prior.place_sigma):
+            for axis in range(3):
+                gap = body.places[marker, axis] - prior.places[marker, axis]
+                known.append((gap / sigma, [(self.columns.place[marker, axis], 1.0 / sigma)]))
+        rows = np.zeros((len(known), self.columns.count))
+        for row, (_, entries) in enumerate(known):
             for column, value in entries:
-                if column >= 0:
-                    row[column] += value
-            errors.append(error)
-            rows.append(row)
+                rows[row, column] = value
+        return np.array([error for error, _ in known]), rows
 
-        for joint in range(1, len(body.names)):
-            for axis in range(3):
-                column = columns.offset[joint, axis]
-                if column >= 0:
-                    weight = 1.0 / prior.offset_sigma[joint]
-                    add(weight * (body.offsets[joint, axis] - prior.offsets[joint, axis]), [(column, weight)])
-            name = body.names[joint]
-            if name.startswith("Left") and name.replace("Left", "Right") in body.names:
-                other = body.names.index(name.replace("Left", "Right"))
-                for axis, sign in enumerate((1.0, -1.0, 1.0)):
-                    ends = columns.offset[joint, axis], columns.offset[other, axis]
-                    if max(ends) >= 0:
-                        weight = 1.0 / prior.sides
-                        gap = body.offsets[joint, axis] - sign * body.offsets[other, axis]
-                        add(weight * gap, [(ends[0], weight), (ends[1], -sign * weight)])
-        for marker in range(len(body.joint)):
-            weight = 1.0 / prior.place_sigma[marker]
-            for axis in range(3):
-                error = body.places[marker, axis] - prior.places[marker, axis]
-                add(weight * error, [(columns.place[marker, axis], weight)])
-        return np.array(errors), np.array(rows)
+    def _alike(self) -> list[tuple[float, list[tuple[int, float]]]]:
+        """By how much the bones of both sides differ, with the derivative by their columns."""
+        body, out = self.body, []
+        for joint, name in enumerate(body.names):
+            twin = name.replace("Left", "Right")
+            if twin == name or twin not in body.names:
+                continue
+            other, weight = body.names.index(twin), 1.0 / self.prior.sides
+            for axis, sign in enumerate((1.0, -1.0, 1.0)):
+                ends = self.columns.offset[joint, axis], self.columns.offset[other, axis]
+                if min(ends) >= 0:
+                    gap = body.offsets[joint, axis] - sign * body.offsets[other, axis]
+                    out.append((weight * gap, [(ends[0], weight), (ends[1], -sign * weight)]))
+        return out
 
     def _step(self, damping: float) -> float:
         """One Gauss-Newton step; the largest move of an offset or place, m."""
-        body, columns = self.body, self.columns
         world, joints, markers = self.placed()
-        frames, count = len(self.root), len(body.names)
         error, rows = self._priors()
         normal, right = rows.T @ rows, rows.T @ error
+        pose, shape, miss = self._equations(world, joints, markers)
+        across = pose.transpose(0, 2, 1)
+        own, mixed = across @ pose, across @ shape
+        diagonal = range(own.shape[-1])
+        own[:, diagonal, diagonal] += 1e-3 + damping * own[:, diagonal, diagonal]
+        slope = np.einsum("fra,fr->fa", pose, miss)
+        solved = np.linalg.solve(own, np.concatenate([mixed, slope[..., None]], axis=-1))
+        flat = _joined(shape)
+        normal = normal + flat.T @ flat - _joined(mixed).T @ _joined(solved[..., :-1])
+        right = right + flat.T @ miss.reshape(-1) - np.einsum("fap,fa->p", mixed, solved[..., -1])
+        self.normal = normal.copy()
+        diagonal = range(self.columns.count)
+        normal[diagonal, diagonal] *= 1.0 + damping
+        change = -np.linalg.solve(normal, right)
+        self._move(world, change, -solved[..., -1] - np.einsum("fap,p->fa", solved[..., :-1], change))
+        return float(np.abs(change).max())
+
+    def _equations(self, world, joints, markers):
+        """Weighted derivatives of all frames' errors by the pose (F, R, 3 + 3 J) and by the body (F, R, columns), and
+        the errors (F, R): three rows a marker, then one a pull."""
+        body, columns, frames = self.body, self.columns, len(self.root)
         away = markers - self.seen
         far = np.linalg.norm(away, axis=-1) / self.sigma
-        weight = self.share * self.there / self.sigma**2 * np.minimum(1.0, _HUBER / np.maximum(far, 1e-9))
-        root = np.sqrt(weight)
+        root = np.sqrt(self.share * self.there * np.minimum(1.0, _HUBER / np.maximum(far, 1e-9))) / self.sigma
         pulls = self._pulls(world)
-        turns = 3 + 3 * count
-        pose = np.zeros((frames, 3 * len(body.joint) + len(pulls), turns))
-        shape = np.zeros((frames, pose.shape[1], columns.count))
-        miss = np.zeros((frames, pose.shape[1]))
+        count = 3 * len(body.joint) + len(pulls)
+        pose = np.zeros((frames, count, 3 + 3 * len(body.names)))
+        shape, miss = np.zeros((frames, count, columns.count)), np.zeros((frames, count))
         for marker, carrier in enumerate(body.joint):
-            at = slice(3 * marker, 3 * marker + 3)
-            miss[:, at] = root[:, marker, None] * away[:, marker]
-            pose[:, at, :3] = root[:, marker, None, None] * np.eye(3)
-            shape[:, at, columns.place[marker]] = root[:, marker, None, None] * world[:, carrier]
+            at, weight = slice(3 * marker, 3 * marker + 3), root[:, marker, None, None]
+            miss[:, at] = weight[..., 0] * away[:, marker]
+            pose[:, at, :3] = weight * np.eye(3)
+            shape[:, at, columns.place[marker]] = weight * world[:, carrier]
             joint = int(carrier)
             while joint >= 0:
                 if not body.held[joint]:
                     arm = markers[:, marker] - joints[:, joint]
-                    pose[:, at, 3 + 3 * joint : 6 + 3 * joint] = root[:, marker, None, None] * _skew(-arm)
+                    pose[:, at, 3 + 3 * joint : 6 + 3 * joint] = weight * _skew(-arm)
                 parent = body.parents[joint]
-                for axis in range(3):
-                    if columns.offset[joint, axis] >= 0:
-                        shape[:, at, columns.offset[joint, axis]] = root[:, marker, None] * world[:, parent, :, axis]
+                for axis in np.flatnonzero(columns.offset[joint] >= 0):
+                    shape[:, at, columns.offset[joint, axis]] = weight[..., 0] * world[:, parent, :, axis]
                 joint = parent
-        scale = np.sqrt(self.share)
-        for index, (value, slopes) in enumerate(pulls):
-            row = 3 * len(body.joint) + index
-            miss[:, row] = scale * value
+        for row, (value, slopes) in enumerate(pulls, start=3 * len(body.joint)):
+            miss[:, row] = np.sqrt(self.share) * value
             for joint, slope in slopes:
-                pose[:, row, 3 + 3 * joint : 6 + 3 * joint] = scale * slope
-        across = pose.transpose(0, 2, 1)
-        own = across @ pose
-        own[:, range(turns), range(turns)] += 1e-3 + damping * own[:, range(turns), range(turns)]
-        mixed = across @ shape
-        slope = np.einsum("fra,fr->fa", pose, miss)
-        solved = np.linalg.solve(own, np.concatenate([mixed, slope[..., None]], axis=-1))
-        flat = shape.reshape(-1, columns.count)
-        normal = normal + flat.T @ flat - _joined(mixed).T @ _joined(solved[..., :-1])
-        right = right + flat.T @ miss.reshape(-1) - np.einsum("fap,fa->p", mixed, solved[..., -1])
-        self.normal = normal.copy()
-        normal[range(columns.count), range(columns.count)] *= 1.0 + damping
-        change = -np.linalg.solve(normal, right)
-        pose_change = -solved[..., -1] - np.einsum("fap,p->fa", solved[..., :-1], change)
-        self._move(world, change, pose_change)
-        return float(np.abs(change).max())
+                pose[:, row, 3 + 3 * joint : 6 + 3 * joint] = np.sqrt(self.share) * slope
+        return pose, shape, miss
 
     def _move(self, world, change, pose_change) -> None:
         body, columns = self.body, self.columns
@@ -308,13 +306,6 @@ class _Columns:
 def _joined(blocks: np.ndarray) -> np.ndarray:
     """(F, A, B) as (F A, B)."""
     return blocks.reshape(-1, blocks.shape[-1])
-
-
-def _below(parents) -> list[list[int]]:
-    out = [[joint] for joint in range(len(parents))]
-    for joint in range(len(parents) - 1, 0, -1):
-        out[parents[joint]] += out[joint]
-    return out
 
 
 def _skew(v: np.ndarray) -> np.ndarray:

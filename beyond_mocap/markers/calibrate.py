@@ -1,13 +1,13 @@
 """A subject's model from recordings: built on the static trial or on upright frames of the motion, then refined by the
 motion (Fredriksson §5.2.2).
 
-Landmarks predict all joint centres (`centres`). The motion then refines them by adjusting the model and its poses in many
-frames together (`adjustment`). This takes the place of sphere fits joint by joint (the [14] and [19] of Fredriksson
-§3.2.4): it too finds the point that stands still in both segments, but for all joints at once, with the bones between
-them as long in every frame, and it says how sure each centre is. So hips, knees, ankles, shoulders, elbows and marked
-wrists are functional as far as the motion turns them, and stay predicted where it does not; spine, neck and toes are
-predicted, with little play. Axes of knees and elbows come out of it as well: they are where these joints bend like
-hinges.
+Landmarks predict all joint centres (`centres`). The motion then refines them by adjusting the model and its poses in
+many frames together (`adjustment`). This takes the place of sphere fits joint by joint (the [14] and [19] of
+Fredriksson §3.2.4): it too finds the point that stands still in both segments, but for all joints at once, with the
+bones between them as long in every frame, and it says how sure each centre is. So hips, knees, ankles, shoulders,
+elbows and marked wrists are functional as far as the motion turns them, and stay predicted where it does not; spine,
+neck and toes are predicted, with little play. Axes of knees and elbows come out of it as well: they are where these
+joints bend like hinges.
 """
 
 from __future__ import annotations

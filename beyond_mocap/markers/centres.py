@@ -4,7 +4,8 @@ Hips after Harrington et al. 2007 ("Prediction of the hip joint centre in adults
 palsy based on magnetic resonance imaging", J Biomech 40:595): regressions on the width and depth of the pelvis. Knees,
 ankles and elbows lie midway between their epicondyles and malleoli (Wu et al. 2002, 2005), or half a width away from
 the lateral one, square to the limb (Davis et al. 1991). Shoulders lie 15 % of the distance between the acromia below
-them (17 % in Rab et al. 2002, from markers' middles to heads of the humerus that lie lower with hanging arms). Pelvis, thorax and head are turned as the typical body's landmarks (`template`) fit them best.
+them (17 % in Rab et al. 2002, from markers' middles to heads of the humerus that lie lower with hanging arms). Pelvis,
+thorax and head are turned as the typical body's landmarks (`template`) fit them best.
 """
 
 from __future__ import annotations

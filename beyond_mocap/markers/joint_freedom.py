@@ -1,8 +1,8 @@
 """How joints of the body may turn: axis orders, which angles are free, limits, and the pull of joints that markers
 hardly tell.
 
-Limits follow the ranges of living adults (Kapandji; Boone and Azen 1979) with a margin: they stop what no body does, and
-leave throwers what they do (an upper arm laid back far beyond a clinic's table).
+Limits follow the ranges of living adults (Kapandji; Boone and Azen 1979) with a margin: they stop what no body does,
+and leave throwers what they do (an upper arm laid back far beyond a clinic's table).
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Markers that the static trial, or the frames that a model began with, did not show: placed where the motion has them."""
+"""Markers that the static trial, or the frames that a model began with, did not show: placed where the motion has
+them."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ def with_late_markers(
     places, carriers, found = [], [], []
     for label in late:
         joint = model.skeleton.index(marker_set.segment_of(label))
-        local = quaternion.rotate(quaternion.inverse(turns[:, joint]), part.positions[:, part.index(label)] - joints[:, joint])
+        away = part.positions[:, part.index(label)] - joints[:, joint]
+        local = quaternion.rotate(quaternion.inverse(turns[:, joint]), away)
         local = local[np.isfinite(local).all(axis=-1)]
         if len(local):
             found.append(label)

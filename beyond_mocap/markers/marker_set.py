@@ -1,7 +1,7 @@
 """Which markers a recording has on which part of the body, and which anatomical points they mark.
 
-A set knows no coordinates. Its segments say which joint carries a marker; its landmarks say what the marker lies on, and
-that is all that joint centres are found from (`centres`): a set of one's own needs no rules, only names.
+A set knows no coordinates. Its segments say which joint carries a marker; its landmarks say what the marker lies on,
+and that is all that joint centres are found from (`centres`): a set of one's own needs no rules, only names.
 """
 
 from __future__ import annotations
@@ -112,7 +112,8 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
     """The set whose markers these are: of those of which most is there, the one that explains most of them.
 
     labels: as recorded; those that nobody has named do not count. Up to a fifth of a set's markers may be missing, as
-    those of an arm that was never seen. InputError where every set lacks more: it names the nearest and what is missing.
+    those of an arm that was never seen. InputError where every set lacks more: it names the nearest and what is
+    missing.
     """
     sets = list(sets)
     named = [label for label in labels if not UNLABELED.match(label)]

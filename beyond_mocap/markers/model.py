@@ -60,8 +60,8 @@ class MarkerModel:
     place (root mean square a coordinate). edge_sigma: (M,), root of eq. 5.4 for the marker's cluster: how far, as a
     share of their length, its edges stray (Fredriksson §5.3.2); NaN for a lone marker. freedom: how the joints turn.
     stiffness: (J,) metres per radian, a pull towards the rest pose: the cost of a pose is the sum over the markers of
-    weight x distance^2, plus that over the joints of (stiffness x angle)^2. Zero for joints that markers tell; small for
-    spine and neck, whose joints share out evenly what only their ends show (§5.3.1). centre_sigma: (J,) m, how
+    weight x distance^2, plus that over the joints of (stiffness x angle)^2. Zero for joints that markers tell; small
+    for spine and neck, whose joints share out evenly what only their ends show (§5.3.1). centre_sigma: (J,) m, how
     uncertain the centre of the joint is. ball: the ball's marker, if there is one. subject, sessions, set_name: whose
     model it is, out of which recordings and of which marker set. notes: lines for people on how it was found.
     """
@@ -97,7 +97,8 @@ class MarkerModel:
         if not len(self.joint) == len(self.places) == len(self.sigma) == len(self.edge_sigma) == count:
             raise InputError("model", f"{count} markers, {len(self.places)} places, {len(self.joint)} joints of them")
         if not len(self.freedom.order) == len(self.stiffness) == len(self.centre_sigma) == joints:
-            raise InputError("model", f"{joints} joints, {len(self.freedom.order)} freedoms, {len(self.stiffness)} pulls")
+            found = f"{joints} joints, {len(self.freedom.order)} freedoms, {len(self.stiffness)} pulls"
+            raise InputError("model", found)
         if len(set(self.markers)) != count:
             raise InputError("model", "two markers of one name", "unique labels")
         if self.joint.min() < 0 or self.joint.max() >= joints:

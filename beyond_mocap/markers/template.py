@@ -1,12 +1,12 @@
 """The skeleton that markers are fitted to, and a typical body on it: where joints and landmarks of an adult lie.
 
-Joints are named as Mixamo and LAFAN1 do. In the rest pose the body stands in a T-pose facing +X, thumbs forward, and all
-joints' frames are the world's: X forward, Y left, Z up. Thus an arm's long axis is Y (left: outwards), a leg's -Z, knees
-and ankles bend about Y, elbows about Z.
+Joints are named as Mixamo and LAFAN1 do. In the rest pose the body stands in a T-pose facing +X, thumbs forward, and
+all joints' frames are the world's: X forward, Y left, Z up. Thus an arm's long axis is Y (left: outwards), a leg's -Z,
+knees and ankles bend about Y, elbows about Z.
 
-The typical body is an adult of 1.80 m: lengths after Drillis and Contini 1966 (in Winter 2009, fig. 4.1), hips behind and
-below the iliac spines after Harrington et al. 2007, the lumbar joint after Reed et al. 1999. It serves where a set of
-markers does not reach (a head without markers), to tell how a pelvis or a thorax is turned from whichever of its
+The typical body is an adult of 1.80 m: lengths after Drillis and Contini 1966 (in Winter 2009, fig. 4.1), hips behind
+and below the iliac spines after Harrington et al. 2007, the lumbar joint after Reed et al. 1999. It serves where a set
+of markers does not reach (a head without markers), to tell how a pelvis or a thorax is turned from whichever of its
 landmarks are marked, and as what joint centres are compared with.
 """
 
