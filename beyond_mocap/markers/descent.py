@@ -14,7 +14,7 @@ import numpy as np
 from . import elimination, limits
 from .chain import Chain, Placed, Poses, axes, cross, logarithm, moved, multiply, place
 
-MOST_STEPS = 40
+MOST_STEPS = 24
 _NEAR = 0.1  # a step that gains a smaller part of the cost is near enough for second derivatives to help
 _STILL = 1e-5  # radians (and metres): a frame whose step is smaller has arrived
 _NO_GAIN = 1e-7  # as has one whose cost falls by a smaller part

@@ -88,7 +88,7 @@ def hold(
     low, high = chain.low[..., None], chain.high[..., None]
     stops = np.zeros(at.angles.shape, dtype=bool)
     bound = np.where(at.angles > 0.5 * (np.maximum(low, -9.0) + np.minimum(high, 9.0)), high, low)
-    touching = (at.angles >= high - _AT) | (at.angles <= low + _AT)
+    touching = ((at.angles >= high - _AT) | (at.angles <= low + _AT)) & chain.free[..., None]
     if ahead is not None:
         over, under = ahead > high, ahead < low
         stops |= over | under
