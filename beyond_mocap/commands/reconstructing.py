@@ -53,9 +53,9 @@ def _add_posing(verb) -> None:
     verb.add_argument("--floor", action="store_true", help="move the motion up or down so that the feet stand at 0")
     verb.add_argument("--no-limits", action="store_true", help="joints may turn as far as they like")
     verb.add_argument("--no-weights", action="store_true", help="all markers count alike")
-    more = partial(between, low=0.0, high=2.0, expected="0 to 2 seconds")
+    more = partial(between, low=0.0, high=0.2, expected="0 to 0.2 seconds")
     verb.add_argument("--smoothness", type=more, default=0.0, metavar="SECONDS",
-                      help="solve the whole sequence as one that moves smoothly; default 0: every frame alone")  # fmt: skip
+                      help="solve the whole sequence as one that moves smoothly: 0.02 for a walk, 0.004 for a throw; default 0")  # fmt: skip
 
 
 def _add_ball(verb) -> None:
