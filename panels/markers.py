@@ -106,7 +106,7 @@ def pose(panel, layout, context, kept) -> None:
     column.prop(settings, "filter")
     if settings.filter != "none":
         column.prop(settings, "cutoff")
-    for name in ("plant", "weights", "limits", "smoothness", "dressed", "add"):
+    for name in ("plant", "floor", "weights", "limits", "smoothness", "dressed", "add"):
         column.prop(settings, name)
     if settings.add:
         column.prop(settings, "words")

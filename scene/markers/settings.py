@@ -155,6 +155,7 @@ class BeyondMocapMarkers(bpy.types.PropertyGroup):
         description="Seconds over which the whole sequence is solved as one that moves smoothly: 0.003 to 0.005 for "
         "throws, 0.02 for noisy walks; 0: each frame for itself",
     )
+    floor: BoolProperty(name="Floor at 0", description="Move the body so that its lowest foot stands at height 0")
     dressed: BoolProperty(name="Make Body", default=True, description="Give the armature a simple body")
     add: BoolProperty(name="Add to Library", description="Write the motion with its words into the library's folder too")
     words: StringProperty(name="Words", default="throwb", description="The words of the clip that is added")

@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from ...beyond_mocap.errors import InputError
 from .. import action, armature, bake, body, channels, linked
-from ..measure import frames_per_second, units_per_metre
+from ..measure import frames_per_second
 from ..settings import absolute
 from . import cloud as clouds
 from . import kept as store
@@ -64,7 +64,7 @@ def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) ->
     return ReconstructSettings(
         marker_set=sets.of_cloud(cloud) if assigned else None, weights=chosen.weights, limits=chosen.limits,
         smoothness=chosen.smoothness, filter=chosen.filter, cutoff=chosen.cutoff, plant=chosen.plant,
-        radius=chosen.radius or None, release="yes" if throw else "auto",
+        floor=chosen.floor, radius=chosen.radius or None, release="yes" if throw else "auto",
     )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
     played = replace(made.motion, fps=made.motion.fps * slowed)
     channels.discard(thing, MADE)
     action.write(thing, played, scene, clouds.start_frame(cloud), cloud.name, generated=True)[MADE] = True
-    thing.matrix_world = cloud.matrix_world @ Matrix.Translation((0.0, 0.0, made.lowered * units_per_metre(scene)))
+    thing.matrix_world = cloud.matrix_world
     bake.lengthen(scene, clouds.start_frame(cloud) + played.duration * frames_per_second(scene))
     kept.made, kept.figures, kept.told = store.keep(made), "\n".join(figures(made)), "\n".join(made.warnings)
     models.onto(cloud, made.model)
