@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from .content import content
 from .decimal_text import read_table
 
 POSITIONS = ("Xposition", "Yposition", "Zposition")
@@ -78,16 +79,7 @@ def parse_data(path: Path, data: bytes) -> BvhText:
 
 def _content(path: Path) -> bytes:
     """The file's bytes, line ends unified; InputError where it cannot be read or is no text."""
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "a BVH file", "check the path") from None
-    except IsADirectoryError:
-        raise InputError(path, "a folder", "a BVH file", "name a file in it") from None
-    except (OSError, ValueError) as error:
-        raise InputError(
-            path, f"cannot be read ({getattr(error, 'strerror', None) or error})", "a readable BVH file"
-        ) from None
+    data = content(path, "a BVH file")
     if not data or data.isspace():
         raise InputError(path, "empty file", "a BVH file", _EXPORT_AGAIN)
     if data.startswith(b"\xef\xbb\xbf"):

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..markers.trial import FEWEST_FPS, MOST_FPS, MarkerTrial
+from .content import opened
 from .raw_markers import RawMarkers, as_trial
 
 BLOCK = 512
@@ -39,25 +40,13 @@ def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: 
     InputError where the file is missing, damaged, cut off or no C3D file, and as `raw_markers.as_trial`.
     """
     path = Path(path)
-    with _opened(path) as handle:
+    with opened(path, "a C3D file") as handle:
         size = os.fstat(handle.fileno()).st_size
         parameters = _parameters(path, handle, size)
         layout = _layout(path, parameters, size)
         words = _words(path, handle, layout)
     positions, residuals = _points(words, layout, parameters)
     return as_trial(_raw(path, parameters, layout, positions, residuals), path, unit, subject, up)
-
-
-def _opened(path: Path):
-    try:
-        return open(path, "rb")
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "a C3D file", "check the path") from None
-    except IsADirectoryError:
-        raise InputError(path, "a folder", "a C3D file", "name a file in it") from None
-    except (OSError, ValueError) as error:
-        found = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise InputError(path, found, "a readable C3D file") from None
 
 
 # -- header and parameters

@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..markers.landmarks import LANDMARKS
 from ..markers.marker_set import MarkerSet
 from ..markers.template import JOINTS
+from .content import utf8
 from .whole import atomic_write
 
 SHIPPED = Path(__file__).resolve().parents[1] / "markers" / "sets"
@@ -38,15 +39,7 @@ def chosen_set(named: str) -> MarkerSet:
 
 def read_marker_set(path: str | os.PathLike) -> MarkerSet:
     """The set that a file holds. InputError, with the line, for whatever is wrong."""
-    try:
-        size = os.stat(path).st_size
-        if size > LARGEST:
-            raise InputError(path, f"{size} bytes", "a marker set of some kilobytes", "choose another file")
-        text = Path(path).read_bytes().decode("utf-8-sig")
-    except (OSError, ValueError) as error:
-        found = "no text in UTF-8" if isinstance(error, UnicodeError) else getattr(error, "strerror", "") or str(error)
-        raise InputError(path, found, "a marker set", "check the path") from None
-    return parse_marker_set(text, str(path))
+    return parse_marker_set(utf8(path, "a marker set", LARGEST), str(path))
 
 
 def write_marker_set(marker_set: MarkerSet, path: str | os.PathLike) -> None:

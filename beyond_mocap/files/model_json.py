@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from ..errors import InputError
 from ..markers.model import BallMarker, Freedom, MarkerModel
 from ..markers.trial import repeated
 from ..motion.skeleton import Skeleton
+from .content import utf8
 from .json_values import check_names, entries, number, numbers, object_of, text, truth
 from .whole import atomic_write
 
@@ -30,17 +30,7 @@ _WHOLE = ("version", "subject", "sessions", "marker_set", "notes", "joints", "ti
 
 def read_model(path: str | os.PathLike) -> MarkerModel:
     """The model that a file holds. InputError, which names the file and the place in it, for whatever is wrong."""
-    try:
-        size = os.stat(path).st_size
-        if size > LARGEST:
-            raise InputError(path, f"{size} bytes", "a model of some kilobytes", "choose another file")
-        said = Path(path).read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(path, "no text", "JSON in UTF-8", "choose a MODEL.json") from None
-    except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or "cannot be read"
-        raise InputError(path, found, "a MODEL.json", "check the path") from None
-    return parse_model(said, str(path))
+    return parse_model(utf8(path, "a MODEL.json", LARGEST), str(path))
 
 
 def write_model(model: MarkerModel, path: str | os.PathLike) -> None:

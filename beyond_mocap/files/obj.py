@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
+from .content import content
 
 _FARTHEST = 1e5  # metres
 
@@ -55,10 +55,7 @@ def _lines(path) -> Iterator[tuple[str, list[str]]]:
 
 
 def _text(path) -> str:
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(path, error.strerror or "cannot be read", "an OBJ file", "check the path") from None
+    data = content(path, "an OBJ file")
     if not data.strip():
         raise InputError(path, "an empty file", "an OBJ file", "export it again")
     if b"\0" in data:

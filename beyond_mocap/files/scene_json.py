@@ -7,11 +7,11 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
-from pathlib import Path
 
 from ..ball.contact import Tool
 from ..ball.pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ..errors import InputError
+from .content import utf8
 from .json_values import check_names, check_object, number, numbers, object_of, shown, text, truth, whole_number
 
 LARGEST = 10_000_000
@@ -22,16 +22,7 @@ _OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "erro
 
 def read_scene(path: str | os.PathLike) -> PassScene:
     """The scene that a file holds. InputError, which names the file and the place in it, for whatever is wrong."""
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(path, error.strerror or "cannot be read", "a SCENE.json", "check the path") from None
-    if len(data) > LARGEST:
-        raise InputError(path, f"{len(data)} bytes", "a scene of some kilobytes", "give the scene, not what came of it")
-    try:
-        return parse_scene(data.decode("utf-8-sig"), str(path))
-    except UnicodeDecodeError:
-        raise InputError(path, "no text", "JSON in UTF-8", "save it as UTF-8") from None
+    return parse_scene(utf8(path, "a SCENE.json", LARGEST), str(path))
 
 
 def parse_scene(said: str | dict, name: str = "scene") -> PassScene:

@@ -13,7 +13,6 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -21,6 +20,7 @@ import numpy as np
 from ..errors import InputError
 from ..motion.skeleton import frozen_array
 from ..take import BallPath, Take
+from .content import content
 from .whole import atomic_write
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
@@ -176,10 +176,7 @@ def number(text: str, name: str, place: str, blank: bool = False) -> float:
 
 
 def _text(path: str | os.PathLike) -> str:
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(path, error.strerror or "cannot be read", "a CSV file", "check the path") from None
+    data = content(path, "a CSV file")
     if not data.strip():
         raise InputError(path, "an empty file", "a CSV file with a header", "export it again")
     try:

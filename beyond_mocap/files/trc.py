@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..markers.trial import FEWEST_FPS, MOST_FPS, MarkerTrial
+from .content import content
 from .raw_markers import RawMarkers, as_trial
 
 _MISSING = {"", "nan", "-", "na", "n/a", "null", "none", "inf", "-inf"}
@@ -45,17 +46,7 @@ def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: 
 
 def _lines(path: Path) -> list[str]:
     """The lines of the file, ends and blanks at the end taken off."""
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(path, f"{path.stat().st_size} bytes", "a TRC file", "export fewer frames")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "a TRC file", "check the path") from None
-    except IsADirectoryError:
-        raise InputError(path, "a folder", "a TRC file", "name a file in it") from None
-    except (OSError, ValueError) as error:
-        found = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise InputError(path, found, "a readable TRC file") from None
+    data = content(path, "a TRC file", _LARGEST)
     if not data.strip():
         raise InputError(path, "an empty file", "a TRC file", _EXPORT_AGAIN)
     if b"\0" in data[:4096]:

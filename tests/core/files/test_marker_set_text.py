@@ -99,7 +99,7 @@ def test_what_is_missing_is_told(text, said):
 
 def test_files_that_are_none(tmp_path):
     (tmp_path / "binary").write_bytes(b"\xff\xfe\0\0")
-    for name, said in (("missing", "No such file"), (".", "directory"), ("binary", "UTF-8")):
+    for name, said in (("missing", "no such file"), (".", "a folder"), ("binary", "UTF-8")):
         with pytest.raises(InputError, match=said):
             read_marker_set(tmp_path / name)
 

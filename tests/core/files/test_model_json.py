@@ -100,7 +100,7 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "a").write_bytes(b"\xff\xfe")
     (tmp_path / "b").write_text("[" * 100000)
     (tmp_path / "c").write_text('{"version": 1,\n "joints"')
-    for name, said in (("missing", "No such file"), (".", "directory"), ("a", "no text"), ("b", "b"), ("c", "c:2:10")):
+    for name, said in (("missing", "no such file"), (".", "a folder"), ("a", "no text"), ("b", "b"), ("c", "c:2:10")):
         with pytest.raises(InputError, match=said) as told:
             read_model(tmp_path / name)
         assert "\n" not in str(told.value)

@@ -114,7 +114,7 @@ def test_files_that_are_no_table_are_refused(tmp_path):
     (tmp_path / "b.csv").write_bytes(bytes(range(256)))
     with pytest.raises(InputError, match="binary"):
         read_track_csv(tmp_path / "b.csv")
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file"):
         read_track_csv(tmp_path / "none.csv")
     with pytest.raises(InputError):
         read_track_csv(tmp_path)
