@@ -38,6 +38,7 @@ the timeline"""
         if not is_cloud(thing):
             self.report({"WARNING"}, f"{name} is gone: nothing was written")
             return
-        thrown.show(bpy.context, thing, found)
+        with self.within(scene):
+            thrown.show(bpy.context, thing, found)
         for line in thrown.lines(found):
             self.report({"INFO"}, f"{name}: {line}")

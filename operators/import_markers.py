@@ -42,7 +42,8 @@ set know their segments at once"""
         if not paths:
             raise InputError("import", "no file given", "a .c3d or .trc file", "choose one")
         unit = self.unit or context.scene.beyond_mocap_markers.unit or None
-        trials = [(path, read_markers(path, unit, self.subject or None, None if self.up == "AUTO" else self.up)) for path in paths]
+        how = unit, self.subject or None, None if self.up == "AUTO" else self.up
+        trials = [(path, read_markers(path, *how)) for path in paths]
         for _, trial in trials:
             cloud.check(trial)
         made = [self.add(context, path, trial) for path, trial in trials]

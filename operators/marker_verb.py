@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
+import bpy
+
 from ..scene import linked
 from ..scene.markers.settings import cloud_meant
 
@@ -21,3 +25,10 @@ class OnMarkers:
         thing = cloud_meant(context)
         linked.refuse(thing, thing.data)
         return thing
+
+    @staticmethod
+    def within(scene):
+        """The context of the scene that the work began in, also where the window shows another one by now."""
+        if bpy.context.scene == scene:
+            return nullcontext()
+        return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-
 import bpy
 
 from ..scene.markers import solve
@@ -40,8 +38,7 @@ clip of the library where asked for"""
             self.report({"WARNING"}, f"{order.cloud} is gone: nothing was written")
             return
         notes = solve.add(order, made)
-        elsewhere = bpy.context.scene != scene
-        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]) if elsewhere else nullcontext():
+        with self.within(scene):
             body = solve.show(bpy.context, thing, made)
         for line in (*made.warnings, *notes):
             self.report({"INFO"}, f"{thing.name}: {line}")

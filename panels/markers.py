@@ -39,8 +39,9 @@ class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
         layout, cloud = self.layout, cloud_meant(context)
         layout.operator("beyond_mocap.import_markers", icon="IMPORT")
         settings = context.scene.beyond_mocap_markers
-        if cloud is None:
+        if cloud is None or settings.unit:
             split(layout).prop(settings, "unit")
+        if cloud is None:
             return
         kept = cloud.beyond_mocap_cloud
         row = layout.row(align=True)

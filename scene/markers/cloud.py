@@ -49,7 +49,8 @@ def create(
 
 
 def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
-    """Let a cloud play other trajectories, or the same ones mended; labels and segments stay by name."""
+    """Let a cloud play other trajectories, or the same ones mended, as fast as it did; what is known of a label stays by
+    name."""
     linked.refuse(cloud, cloud.data)
     check(trial)
     if cloud.data.is_editmode:
@@ -59,18 +60,20 @@ def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene)
         _relabel(cloud, trial.labels)
     for label, share in zip(kept.labels, trial.seen.mean(axis=0)):
         label.seen = 100.0 * float(share)
+    modifier = nodes.modifier_of(cloud)
+    usual = trial.fps / frames_per_second(scene)
+    step = nodes.get(modifier, "Step") * trial.fps / kept.fps if kept.fps else usual
     kept.fps, kept.start, kept.subject = trial.fps, trial.start, trial.subject
     kept.events.clear()
     for event in trial.events:
         row = kept.events.add()
         row.name, row.side, row.seconds = event.label, event.side, event.seconds
     places = held(trial.positions) * units_per_metre(scene)
-    modifier = nodes.modifier_of(cloud)
     before = nodes.get(modifier, "Trajectories")
     nodes.put(modifier, "Trajectories", _trajectories(cloud.name, places, trial.seen))
     nodes.put(modifier, "Markers", len(trial.labels))
     nodes.put(modifier, "Samples", len(trial))
-    nodes.put(modifier, "Step", trial.fps / frames_per_second(scene))
+    nodes.put(modifier, "Step", step)
     if before is not None and before.users == 0:
         mesh = before.data
         bpy.data.objects.remove(before)
@@ -87,11 +90,10 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     from ...beyond_mocap.markers.trial import MarkerEvent, MarkerTrial
 
     modifier = nodes.modifier_of(cloud) if is_cloud(cloud) else None
-    held_by = nodes.get(modifier, "Trajectories") if modifier is not None else None
-    if held_by is None:
+    mesh = _samples(modifier)
+    if mesh is None:
         raise InputError(cloud.name, "no trajectories", "a cloud of markers", "import the recording again")
     kept, count, samples = cloud.beyond_mocap_cloud, nodes.get(modifier, "Markers"), nodes.get(modifier, "Samples")
-    mesh = held_by.data
     if len(mesh.vertices) != count * samples or len(kept.labels) != count or not samples:
         found = f"{len(mesh.vertices)} places for {count} markers and {samples} samples"
         raise InputError(cloud.name, found, "one for each", "import the recording again")
@@ -103,31 +105,50 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     events = tuple(MarkerEvent(row.seconds, row.name, row.side) for row in kept.events)
     names = tuple(label.name.strip() for label in kept.labels)
     trial = MarkerTrial(names, places, kept.fps, None, events, kept.start, cloud.name, kept.subject)
-    there = np.sort(markers(cloud))
+    there = np.unique(markers(cloud))
     return trial if len(there) == count else trial.only([trial.labels[i] for i in there])
 
 
 def start_frame(cloud: bpy.types.Object) -> float:
-    """The scene frame of the first sample."""
-    return float(nodes.get(nodes.modifier_of(cloud), "Start"))
+    """The scene frame of the first sample. InputError where nothing plays the cloud."""
+    return float(nodes.get(_player(cloud), "Start"))
 
 
 def played_rate(cloud: bpy.types.Object, scene: bpy.types.Scene) -> float:
-    """Samples a second as the scene plays them: another than the recording's where the user slows it down."""
-    return float(nodes.get(nodes.modifier_of(cloud), "Step")) * frames_per_second(scene)
+    """Samples a second as the scene plays them: another than the recording's where the user slows it down. InputError
+    where nothing plays the cloud, or where it stands still or runs backwards."""
+    step = float(nodes.get(_player(cloud), "Step"))
+    if step <= 0.0:
+        raise InputError(cloud.name, f"a Step of {step:g}", "samples in a frame, above 0", "set it in the modifier")
+    return step * frames_per_second(scene)
+
+
+def _player(cloud: bpy.types.Object) -> bpy.types.Modifier:
+    """The modifier that plays a cloud. InputError where it is gone."""
+    modifier = nodes.modifier_of(cloud)
+    if modifier is None:
+        raise InputError(cloud.name, "nothing that plays it", f"the modifier {nodes.NAME}", "import the recording again")
+    return modifier
+
+
+def _samples(modifier: bpy.types.Modifier | None) -> bpy.types.Mesh | None:
+    """The mesh of all samples that a modifier plays; None where it plays none, or some other object."""
+    holder = nodes.get(modifier, "Trajectories") if modifier is not None else None
+    mesh = holder.data if holder is not None and holder.type == "MESH" else None
+    return mesh if mesh is not None and nodes.SEEN in mesh.attributes else None
 
 
 def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]:
     """Markers that are seen on a scene frame and their places in the cloud's own space, quickly, in any mode."""
     modifier = nodes.modifier_of(cloud)
-    holder = nodes.get(modifier, "Trajectories") if modifier is not None else None
-    if holder is None:
+    mesh = _samples(modifier)
+    if mesh is None:
         return []
     count, samples = nodes.get(modifier, "Markers"), nodes.get(modifier, "Samples")
     row = min(max((frame - nodes.get(modifier, "Start")) * nodes.get(modifier, "Step"), 0.0), samples - 1.0)
     here = round(row)
     other = min(max(here + (1 if row > here else -1), 0), samples - 1)
-    places, seen = holder.data.vertices, holder.data.attributes[nodes.SEEN].data
+    places, seen = mesh.vertices, mesh.attributes[nodes.SEEN].data
     if len(places) != count * samples:
         return []
     found = []
@@ -173,9 +194,9 @@ def held(positions: np.ndarray) -> np.ndarray:
 
 
 def _relabel(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
-    """Other labels, as after markers were joined or left out; segments go along by name."""
+    """Other labels, as after markers were joined or left out; segment, landmark and role go along by name."""
     kept, mesh = cloud.beyond_mocap_cloud, cloud.data
-    segments = {label.name: label.segment for label in kept.labels}
+    known = {label.name.strip(): (label.segment, label.landmark, label.role) for label in kept.labels}
     mesh.clear_geometry()
     mesh.vertices.add(len(names))
     _attribute(mesh, nodes.MARKER, "INT", np.arange(len(names), dtype=np.int32))
@@ -183,7 +204,8 @@ def _relabel(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
     with lines.at_once():
         for name in names:
             label = kept.labels.add()
-            label.name, label.segment = name, segments.get(name, "")
+            label.name = name
+            label.segment, label.landmark, label.role = known.get(name, ("", "", "NEEDED"))
 
 
 def _trajectories(name: str, places: np.ndarray, seen: np.ndarray) -> bpy.types.Object:

@@ -179,12 +179,20 @@ def clouds(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def cloud_meant(context: bpy.types.Context) -> bpy.types.Object | None:
     """The cloud that is meant: the active object or the one whose body it is, one that is selected, or the only one."""
-    active, found = context.view_layer.objects.active, clouds(context.scene)
-    meant = [thing for thing in found if thing == active]
-    meant += [thing for thing in found if active is not None and thing.beyond_mocap_cloud.body == active]
+    active = context.view_layer.objects.active
+    if is_cloud(active):
+        return active
+    found = clouds(context.scene)
+    meant = [thing for thing in found if active is not None and thing.beyond_mocap_cloud.body == active]
     meant += [thing for thing in found if thing.select_get()]
     meant += found if len(found) == 1 else []
     return meant[0] if meant else None
+
+
+def is_alone(cloud: bpy.types.Object, scene: bpy.types.Scene, name: str) -> bool:
+    """Whether a cloud's `body` or `ball` is its own; a copy of a cloud points to those of the first."""
+    thing = getattr(cloud.beyond_mocap_cloud, name)
+    return all(getattr(other.beyond_mocap_cloud, name) != thing for other in clouds(scene) if other != cloud)
 
 
 def active_label(cloud: bpy.types.Object) -> BeyondMocapMarker | None:

@@ -17,7 +17,7 @@ from ..settings import absolute
 from . import cloud as clouds
 from . import kept as store
 from . import models, sets, thrown
-from .settings import is_cloud
+from .settings import is_alone, is_cloud
 
 if TYPE_CHECKING:
     from ...beyond_mocap.markers.model import MarkerModel
@@ -46,6 +46,7 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
     linked.refuse(cloud, cloud.data)
     kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     trial = clouds.read(cloud, scene)
+    clouds.played_rate(cloud, scene)
     static = kept.static if not kept.use_model and is_cloud(kept.static) and kept.static != cloud else None
     words = tuple(chosen.words.split()) if chosen.add else ()
     return Order(
@@ -82,12 +83,11 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
     """The result beside the cloud: an armature that moves with it, and what is told in the panel; returns it."""
     scene, kept = context.scene, cloud.beyond_mocap_cloud
     thing = kept.body
-    if thing is None or not fits(thing, made, scene):
+    if thing is None or not is_alone(cloud, scene, "body") or not fits(thing, made, scene):
         room = cloud.users_collection[0] if cloud.users_collection else context.collection
-        thing = armature.create(context, made.motion.skeleton, f"{cloud.name} body", room)
-        if scene.beyond_mocap_markers.dressed:
-            body.create(thing, thing.name, SKIN, room, scene, made.motion)
-        kept.body = thing
+        thing = kept.body = armature.create(context, made.motion.skeleton, f"{cloud.name} body", room)
+    if scene.beyond_mocap_markers.dressed and not any(child.type == "MESH" for child in thing.children):
+        body.create(thing, thing.name, SKIN, thing.users_collection[0], scene, made.motion)
     thing.matrix_world = Matrix()
     context.view_layer.update()
     slowed = clouds.played_rate(cloud, scene) / kept.fps
@@ -98,6 +98,7 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
     bake.lengthen(scene, clouds.start_frame(cloud) + played.duration * frames_per_second(scene))
     kept.made, kept.figures, kept.told = store.keep(made), "\n".join(figures(made)), "\n".join(made.warnings)
     models.onto(cloud, made.model)
+    kept.release = ""
     if made.release is not None:
         thrown.show(context, cloud, made.release)
     return thing

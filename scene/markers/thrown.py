@@ -15,13 +15,14 @@ from .. import channels, linked
 from ..measure import frames_per_second, units_per_metre
 from . import cloud as clouds
 from . import kept as store
+from .settings import is_alone
 
 if TYPE_CHECKING:
     from ...beyond_mocap.markers.trial import MarkerTrial
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.release import Release, ReleaseSettings
 
-MADE = "beyond_mocap_thrown"  # custom property of balls and actions made here; no group has its name
+MADE = "beyond_mocap_thrown"  # custom property of balls (their mesh's radius) and actions made here; no group's name
 
 
 def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "MarkerTrial", "Motion", "ReleaseSettings"]:
@@ -30,6 +31,7 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "Mar
     from ...beyond_mocap.release import ReleaseSettings
 
     linked.refuse(cloud, cloud.data)
+    clouds.played_rate(cloud, scene)
     kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     made = store.made(kept.made)
     if made is None:
@@ -44,10 +46,13 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "Mar
 def show(context: bpy.types.Context, cloud: bpy.types.Object, found: "Release") -> bpy.types.Object:
     """The ball on its way, the release on the timeline, and figures in the panel; returns the ball."""
     scene, kept, thing = context.scene, cloud.beyond_mocap_cloud, cloud.beyond_mocap_cloud.ball
-    if thing is None or thing.library is not None or thing.name not in scene.objects:
+    lost = thing is None or thing.library is not None or thing.name not in scene.objects
+    if lost or not is_alone(cloud, scene, "ball"):
         room = cloud.users_collection[0] if cloud.users_collection else context.collection
         thing = kept.ball = balls.create(context, f"{cloud.name} ball", room, found.radius)
-        thing[MADE] = True
+        thing[MADE] = found.radius
+    elif thing.get(MADE):
+        thing.scale = (found.radius / thing[MADE],) * 3
     channels.discard(thing, MADE)
     slowed = clouds.played_rate(cloud, scene) / kept.fps
     world = kept.body.matrix_world if kept.body is not None else cloud.matrix_world

@@ -102,12 +102,14 @@ def test_markers_whose_vertices_are_deleted_are_left_out(cloud, trial):
 def test_other_trajectories_take_the_place_of_the_first(cloud, trial):
     scene = bpy.context.scene
     thing = cloud.create(bpy.context, trial)
-    thing.beyond_mocap_cloud.labels["LKNE"].segment = "LeftLeg"
+    label = thing.beyond_mocap_cloud.labels["LKNE"]
+    label.segment, label.landmark, label.role = "LeftLeg", "left_knee_lateral", "OPTIONAL"
     fewer = trial.only(("LKNE", "LASI")).with_positions(trial.positions[::-1][:, [2, 0]])
     cloud.write(thing, fewer, scene)
     back = cloud.read(thing, scene)
     assert back.labels == ("LKNE", "LASI") and np.nanmax(np.abs(back.positions - fewer.positions)) < 1e-6
-    assert thing.beyond_mocap_cloud.labels["LKNE"].segment == "LeftLeg"
+    label = thing.beyond_mocap_cloud.labels["LKNE"]
+    assert (label.segment, label.landmark, label.role) == ("LeftLeg", "left_knee_lateral", "OPTIONAL")
     assert len([one for one in bpy.data.objects if "trajectories" in one.name]) == 1
 
 
@@ -120,6 +122,33 @@ def test_a_saved_file_plays_and_reads(cloud, trial, tmp_path):
     places, *_ = seen_at(thing, bpy.context.scene.frame_start)
     assert np.abs(places - trial.positions[0]).max() < 1e-5
     assert np.nanmax(np.abs(cloud.read(thing, bpy.context.scene).positions - trial.positions)) < 1e-6
+
+
+def test_a_vertex_that_is_doubled_in_edit_mode_is_no_second_marker(cloud, trial):
+    thing = cloud.create(bpy.context, trial)
+    bpy.context.view_layer.objects.active = thing
+    thing.data.vertices.foreach_set("select", [False, True, False, False])
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.duplicate()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert len(thing.data.vertices) == 5
+    assert cloud.read(thing, bpy.context.scene).labels == trial.labels
+
+
+@pytest.mark.parametrize("lost", ["modifier", "empty", "mesh"])
+def test_a_cloud_whose_player_is_spoilt_says_so(cloud, core, trial, lost):
+    nodes = importlib.import_module(f"{EXTENSION}.scene.markers.nodes")
+    thing = cloud.create(bpy.context, trial)
+    if lost == "modifier":
+        thing.modifiers.clear()
+        with pytest.raises(core("errors").InputError, match="import the recording again"):
+            cloud.played_rate(thing, bpy.context.scene)
+    else:
+        other = bpy.data.objects.new("other", bpy.data.meshes.new("other") if lost == "mesh" else None)
+        nodes.put(nodes.modifier_of(thing), "Trajectories", other)
+    assert cloud.places_at(thing, 1.0) == []
+    with pytest.raises(core("errors").InputError, match="no trajectories"):
+        cloud.read(thing, bpy.context.scene)
 
 
 @pytest.fixture
@@ -336,6 +365,30 @@ def test_a_slowed_cloud_has_a_slowed_body(cloud, walk, session):
     body = thing.beyond_mocap_cloud.body
     first, last = body.animation_data.action.frame_range
     assert last - first == pytest.approx(0.6 * 2 * 24, abs=1.0)
+    cloud.write(thing, cloud.read(thing, scene), scene)  # as Clean Up does
+    assert cloud.played_rate(thing, scene) == pytest.approx(50.0)
+    nodes.put(modifier, "Step", 0.0)
+    for verb in (bpy.ops.beyond_mocap.reconstruct_markers, bpy.ops.beyond_mocap.find_release):
+        with pytest.raises(RuntimeError, match="a Step of 0"):
+            verb()
+
+
+def test_a_copied_cloud_gets_a_body_of_its_own_and_a_lost_skin_comes_again(walk, session):
+    scene, thing = bpy.context.scene, imported(walk)
+    thing.beyond_mocap_cloud.release = "Speed: of the one before"
+    scene.beyond_mocap_markers.dressed = False
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    body = thing.beyond_mocap_cloud.body
+    assert not body.children and not thing.beyond_mocap_cloud.release
+    copied = thing.copy()
+    scene.collection.objects.link(copied)
+    bpy.context.view_layer.objects.active = copied
+    scene.beyond_mocap_markers.dressed = True
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    assert thing.beyond_mocap_cloud.body == body != copied.beyond_mocap_cloud.body
+    bpy.context.view_layer.objects.active = thing
+    bpy.ops.beyond_mocap.reconstruct_markers()
+    assert thing.beyond_mocap_cloud.body == body and len(body.children) == 1
 
 
 def test_a_throw_s_release_is_found_and_the_ball_flies(core, session):
@@ -351,6 +404,11 @@ def test_a_throw_s_release_is_found_and_the_ball_flies(core, session):
     places, seen, *_ = seen_at(thing, 26)
     marker = places[[row.name for row in kept.labels].index("BALL")]
     assert abs(np.linalg.norm(np.array(kept.ball.matrix_world.translation) - marker) - 0.0366) < 0.03
+    ball, size = kept.ball, kept.ball.dimensions.x
+    bpy.context.scene.beyond_mocap_markers.radius = size
+    bpy.ops.beyond_mocap.find_release()
+    bpy.context.view_layer.update()
+    assert kept.ball == ball and ball.dimensions.x == pytest.approx(2.0 * size, rel=1e-3)
 
 
 def test_without_a_body_no_release_is_looked_for(walk):
