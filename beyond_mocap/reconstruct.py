@@ -22,6 +22,8 @@ FILTERS = ("butterworth", "kalman", "none")
 RELEASES = ("auto", "yes", "no")
 LEAST_MARKERS = 0.5
 """Share of a model's markers that a trial must have."""
+MOST_SMOOTHNESS = 0.2
+"""Seconds: so far on a body hardly follows its markers any more."""
 _TOLD_FLOOR = 0.02  # metres
 _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
 
@@ -54,6 +56,8 @@ class ReconstructSettings:
         for name, choices in (("filter", FILTERS), ("release", RELEASES)):
             if getattr(self, name) not in choices:
                 raise InputError(name, f"{getattr(self, name)!r}", f"one of {', '.join(choices)}")
+        if not 0.0 <= self.smoothness <= MOST_SMOOTHNESS:
+            raise InputError("smoothness", f"{self.smoothness} s", f"0 to {MOST_SMOOTHNESS:g} seconds")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +66,8 @@ class Reconstruction:
 
     motion: at the trial's rate, where the markers are. floor: height in metres of the floor that its feet stood on when
     it was recorded; motion and trial are moved by that where `grounded`. model: whose skeleton it has. trial: the
-    markers under the set's names, cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters. cleaned: what was mended.
-    release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds: of each step. warnings:
+    markers under the set's names, cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters.
+    cleaned: what was mended. release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds: of each step. warnings:
     lines.
     """
 
@@ -249,6 +253,7 @@ def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Clean
 
 def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
     from .markers.calibrate import calibrate
+    from .markers.checks import some
 
     try:
         return calibrate(marker_set, trial, still, progress=progress, cancelled=cancelled)
@@ -256,16 +261,17 @@ def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
         lacking = [] if still is None else [label for label in trial.labels if label not in still.labels]
         if not lacking:
             raise
-        raise InputError(still.name, f"{error}; it lacks {', '.join(lacking[:6])}") from None
+        raise InputError(still.name, f"{error}; it lacks {some(lacking)}") from None
 
 
 def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
+    from .markers.checks import some
+
     lacking = [label for label in model.markers if label not in trial.labels]
     if len(lacking) > (1.0 - LEAST_MARKERS) * len(model.markers):
-        some = ", ".join(lacking[:6]) + (", ..." if len(lacking) > 6 else "")
         raise InputError(
             trial.name,
-            f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some}",
+            f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some(lacking)}",
             "a trial with the model's markers", "choose another model, or the marker set whose labels these are",
         )
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from .numbers import between, positive
+from .numbers import between
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
 

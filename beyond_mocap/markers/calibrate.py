@@ -27,6 +27,7 @@ from .late_markers import with_late_markers
 from .marker_set import MarkerSet
 from .model import MarkerModel
 from .pose import PoseSettings, Solved, solve
+from .residuals import seen_markers
 from .static import static_frame
 from .trial import MarkerTrial
 from .weights import cluster_deviation, edge_deviation
@@ -114,7 +115,7 @@ def refined(
     solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
     motion, part = _sane(solved, part)
     body = _body(model)
-    task = Adjustment(body, _prior(model, place_sigma), _pull(model), _seen(model, part), _sigmas(model), worth)
+    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen_markers(model, part), _sigmas(model), worth)
     task.start(motion)
     for _ in range(2):
         if cancelled():
@@ -122,7 +123,7 @@ def refined(
         task.run()
         task.sigma = _scatter(task.residuals())
     skeleton = replace(model.skeleton, offsets=body.offsets)
-    deviation = edge_deviation(model.joint, body.places, _seen(model, part))
+    deviation = edge_deviation(model.joint, body.places, seen_markers(model, part))
     return replace(
         model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.uncertainty(),
         edge_sigma=cluster_deviation(model.joint, deviation),
@@ -136,9 +137,9 @@ def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, 
     """
     root = [i for i, label in enumerate(trial.labels) if label in model.markers
             and model.joint[model.markers.index(label)] == 0]
-    positions = _seen(model, trial)[unlike_frames(trial, np.array(root, dtype=int), count)]
+    positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), count)]
     if static is not None:
-        still = _seen(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
+        still = seen_markers(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
         positions = np.concatenate([still, positions])
     return MarkerTrial(model.markers, positions, 1.0, name=trial.name)
 
@@ -153,16 +154,6 @@ def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
     motion = solved.motion
     kept = Motion(motion.skeleton, motion.root_positions[good], motion.rotations[good], motion.fps)
     return kept, part.with_positions(part.positions[good])
-
-
-def _seen(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
-    """The model's markers as seen, (T, M, 3) m."""
-    index = {label: i for i, label in enumerate(trial.labels)}
-    out = np.full((len(trial), len(model.markers), 3), np.nan)
-    for own, label in enumerate(model.markers):
-        if label in index:
-            out[:, own] = trial.positions[:, index[label]]
-    return out
 
 
 def _part(name: str) -> str:

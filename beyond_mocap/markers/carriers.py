@@ -31,9 +31,10 @@ _DEFORMED, _TIMES_USUAL = 0.012, 3.0
 class Carried:
     """One marker seen from its helpers, over T frames.
 
-    helpers: indices of the markers that carry it, () where none do. shape: theirs. fit: their frame in the world. trusted: (T,) bool,
-    where that frame is sound and its helpers lie as usual. local: (T, 3) m, the marker in that frame, NaN where it is
-    not seen or the frame not trusted. place: (3,) m, its median. sigma: m, how far it usually is from there.
+    helpers: indices of the markers that carry it, () where none do. shape: theirs. fit: their frame in the world.
+    trusted: (T,) bool, where that frame is sound and its helpers lie as usual. local: (T, 3) m, the marker in that
+    frame, NaN where it is not seen or the frame not trusted. place: (3,) m, its median. sigma: m, how far it usually is
+    from there.
     """
 
     helpers: tuple[int, ...]
@@ -107,7 +108,7 @@ def carriers(
 
 
 def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: Shape | None = None) -> Carried:
-    """How these helpers carry this marker over the frames of positions (T, M, 3) m; `shape`: theirs, where it is known."""
+    """How these helpers carry this marker over the frames of positions (T, M, 3) m; `shape`: theirs, where known."""
     frames = len(positions)
     nothing = np.full((frames, 3), np.nan)
     alone = Carried((), None, None, np.zeros(frames, dtype=bool), nothing, np.full(3, np.nan), np.inf)

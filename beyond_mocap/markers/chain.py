@@ -81,10 +81,6 @@ class Chain:
         """The same chain with joints that turn as far as they like."""
         return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))
 
-    def with_markers(self, chosen: np.ndarray) -> "Chain":
-        """The same chain with these markers (indices or a mask) only."""
-        return replace(self, joint=self.joint[chosen], places=self.places[chosen])
-
 
 def chain(
     skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None

@@ -80,13 +80,13 @@ def unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], others: Se
 
 def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:
     both = [one for one in (trial, static) if one is not None]
-    mirrored = {one.name: handedness(one.labels, one.positions) < _MIRRORED for one in both}
-    if not any(mirrored.values()):
+    mirrored = [handedness(one.labels, one.positions) < _MIRRORED for one in both]
+    if not any(mirrored):
         return
-    name = next(name for name, is_so in mirrored.items() if is_so)
+    name = both[mirrored.index(True)].name
     found, step = "left and right are exchanged", "exchange the labels, or the coordinates' left and right"
-    if len(mirrored) == 2 and not all(mirrored.values()):
-        good, bad = (static, trial) if mirrored[trial.name] else (trial, static)
+    if len(both) == 2 and not all(mirrored):
+        good, bad = (static, trial) if mirrored[0] else (trial, static)
         if _crossed(bad, good, clusters):
             found, step = "left and right labels are exchanged", "exchange L and R in its labels"
         else:

@@ -224,7 +224,9 @@ def _told(work):
     nameless = {trial.labels[i] for i in work.nameless}
     report = CleanReport(
         seen={label: part for label, part in share.items() if label not in nameless},
-        unnamed={trial.labels[i]: float(np.isfinite(work.positions[:, i, 0]).mean()) for i in work.nameless if i in keeps},
+        unnamed={
+            trial.labels[i]: float(np.isfinite(work.positions[:, i, 0]).mean()) for i in work.nameless if i in keeps
+        },
         **work.found,
     )
     return Cleaned(cleaned, report)

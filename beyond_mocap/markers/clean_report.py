@@ -87,8 +87,9 @@ def _by_label(stretches, what):
     for labels in alike.values():
         ones = own[labels[0]]
         count = sum(one.frames for one in ones)
+        counted = what if count != 1 else what.replace("frames", "frame")
         shown = ", ".join(one.when() for one in ones[:3]) + (f" and {len(ones) - 3} more" if len(ones) > 3 else "")
-        yield _timed(f"{_named(labels)}: {count} {what if count != 1 else what.replace('frames', 'frame')}: {shown}", ones)
+        yield _timed(f"{_named(labels)}: {count} {counted}: {shown}", ones)
 
 
 def _summed(stretches, what):

@@ -35,7 +35,8 @@ def mean_shape(positions: np.ndarray) -> Shape:
     positions = np.asarray(positions, dtype=float)
     chosen = positions[_spread_frames(np.isfinite(positions[..., 0]).sum(axis=1))]
     places = chosen[_middle_frame(chosen)]
-    places = places - np.nanmean(places, axis=0)
+    seen = np.isfinite(places).all(axis=-1)
+    places = places - (places[seen].mean(axis=0) if seen.any() else 0.0)
     weights = np.ones(chosen.shape[:2])
     for _ in range(_ROUNDS):
         fit = rigid_fit(places, chosen, weights)

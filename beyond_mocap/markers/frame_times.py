@@ -1,8 +1,8 @@
 """When a trial's frames were really taken: some systems expose at whole milliseconds and write the nominal rate.
 
 At 360 Hz the steps then are 3, 3, 3, 2, 3, 3, 3, 3, 2 ms instead of 2.78, and every marker of the body seems 28 %
-slower in one frame of four or five and 8 % faster in the others. No filter of one marker tells this from movement; all markers
-together do.
+slower in one frame of four or five and 8 % faster in the others. No filter of one marker tells this from movement; all
+markers together do.
 """
 
 from __future__ import annotations

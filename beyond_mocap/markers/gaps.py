@@ -64,8 +64,8 @@ def fill(
 ) -> tuple[np.ndarray, list[Gap]]:
     """(positions (T, M, 3) m with gaps filled, the gaps and how): nothing that was seen is moved, and nothing jumps.
 
-    soft: (M, M) m, how much each pair's distance varies. known: the markers whose gaps are filled, and what carries them
-    as a rule. ask: called for each gap; it may raise. Every gap is filled from what was seen alone, never from
+    soft: (M, M) m, how much each pair's distance varies. known: the markers whose gaps are filled, and what carries
+    them as a rule. ask: called for each gap; it may raise. Every gap is filled from what was seen alone, never from
     another gap's filling.
     """
     out, told = positions.copy(), []
@@ -73,7 +73,8 @@ def fill(
     for gap in gaps_of(positions, known):
         ask()
         one = _carried_over(positions, gap, soft, known[gap.marker], shapes)
-        how, path = _firmly(one, gap, longest.cluster * fps) or _by_a_curve(positions, one, gap, fps, longest) or ("", None)
+        found = _firmly(one, gap, longest.cluster * fps) or _by_a_curve(positions, one, gap, fps, longest)
+        how, path = found or ("", None)
         if how:
             out[gap.first : gap.end, gap.marker] = path
         told.append(gap._replace(how=how))
@@ -120,7 +121,8 @@ def _by_a_curve(positions, one, gap, fps, longest):
 
 
 def _expected(way, frames, fps):
-    """How far a curve over `frames` is off a way (T, 3) where it is seen, m: what nine in ten of some stretches keep to."""
+    """How far a curve over `frames` is off a way (T, 3) where it is seen, m: what nine in ten of some stretches keep
+    to."""
     seen = np.concatenate([[0], np.cumsum(np.isfinite(way[:, 0]))])
     edge = max(4, int(round(_EDGE * fps)) + 1)
     starts = np.arange(edge, len(way) - frames - edge)
@@ -165,7 +167,8 @@ def bridge(way: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | No
 
 
 def _edge(way, fps):
-    """The slope (3,) per frame with which a way sets out from its first frame, by a parabola; None where it is short."""
+    """The slope (3,) m a frame with which a way sets out from its first frame, by a parabola; None where it is short.
+    """
     count = min(len(way), max(4, int(round(_EDGE * fps)) + 1))
     there = np.flatnonzero(np.isnan(way[:count, 0]))
     count = int(there[0]) if len(there) else count

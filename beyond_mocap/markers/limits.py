@@ -114,9 +114,7 @@ def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> Non
         basis = rates = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
         means = np.broadcast_to(chain.free[joint][:, None], here.shape)
     along = np.einsum("abf,af->bf", basis, slope[:, frames])
-    outward = np.where(bound[:, frames] >= here, along < 0.0, along > 0.0)
-    at_high = here >= chain.high[joint][:, None] - _AT
-    outward = np.where(touching[:, frames], np.where(at_high, along < 0.0, along > 0.0), outward)
+    outward = np.where(here >= chain.high[joint][:, None] - _AT, along < 0.0, along > 0.0)
     stops[:, frames] = ((touching[:, frames] & outward) | stops[:, frames]) & means
     strength = np.where(stops[:, frames], _HELD, 0.0)
     short = np.where(stops[:, frames], here - bound[:, frames], 0.0)
@@ -125,8 +123,8 @@ def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> Non
 
 
 def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further: Poses) -> Poses:
-    """`further`, in place, with joints that limits hold (J, F) moved along the limit: their angles grow by what the turns
-    (J, 3, F) rad say, where a turn about a fixed axis would leave it."""
+    """`further`, in place, with joints that limits hold (J, F) moved along the limit: their angles grow by what the
+    turns (J, 3, F) rad say, where a turn about a fixed axis would leave it."""
     for joint in np.flatnonzero(held.any(axis=1)):
         if chain.turning[joint]:
             frames = np.flatnonzero(held[joint])

@@ -11,7 +11,8 @@ from .carriers import Carried
 from .robust import quantile
 
 # a step that bends the way by more than this is a leap, m, if it is also more than what a limb can do in a frame, m/s^2
-# (as its helpers see it, and in the world), and this many times what the marker does in all but a twentieth of the frames
+# (as its helpers see it, and in the world), and this many times what the marker does in all but a twentieth of the
+# frames
 _LEAP_LOCAL, _LEAP_WORLD, _TIMES_ITS_OWN = 0.02, 0.04, 6.0
 _SWING_LOCAL, _SWING_WORLD = 200.0, 500.0
 
@@ -54,7 +55,7 @@ def pieces(positions: np.ndarray, leaping: np.ndarray) -> list[Piece]:
 
 
 def bend(places: np.ndarray) -> np.ndarray:
-    """(T, ...) m: how much the step into each frame differs from the two before it and the two after, the least of them.
+    """(T, ...) m: how much the step into each frame differs from the two before and the two after, the least of them.
 
     A leap differs from them all; what comes after a leap, or lies between two, does not. places: (T, ..., 3) m; NaN
     where there is nothing to compare with.

@@ -105,10 +105,8 @@ def hold(place: np.ndarray, spans: list[tuple[int, int]], ease: int) -> tuple[np
     Bezier curve to 0 within `ease` frames on either side. Between two spans nearer than that it goes from one to the
     other."""
     shift, weight = np.zeros_like(place), np.zeros(len(place))
-    share = np.zeros(len(place))
+    share, frames = np.zeros(len(place)), np.arange(len(place))
     for first, end in spans:
-        own = np.zeros(len(place))
-        frames = np.arange(len(place))
         gone = np.maximum(np.maximum(first - frames, frames - (end - 1)), 0) / (ease + 1)
         own = bezier(1.0 - np.minimum(gone, 1.0))
         shift += own[:, None] * (place[first:end].mean(axis=0) - place)

@@ -2,9 +2,9 @@
 
 Centres: the distance of the joints that anatomy defines (hips, knees, ankles, shoulders, elbows, wrists), frame by
 frame, as they lie in the world. Angles: of each segment against the one above it, two ways. `raw` compares the
-segments' axes as they are. `angles` first takes off, from each segment, the one constant turn between found and true axes that
-fits the whole clip best: where a model draws a segment's axes is its convention, how the segment moves is not. Errors
-are the whole angle between found and true joint rotation, all three axes at once.
+segments' axes as they are. `angles` first takes off, from each segment, the one constant turn between found and true
+axes that fits the whole clip best: where a model draws a segment's axes is its convention, how the segment moves is
+not. Errors are the whole angle between found and true joint rotation, all three axes at once.
 """
 
 from __future__ import annotations

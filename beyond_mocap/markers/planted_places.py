@@ -27,7 +27,8 @@ class Place:
 
     on: the joint that carries it. to, share: begins at this share of the bone to the joint `to` ("shoulders": to the
     middle between both). offset: millimetres from there (forward, left, up in a T-pose) on an adult. soft: millimetres
-    by which the skin under it shifts when a joint beside it bends by one radian. wobble: how much it lags behind shocks, from 0 (bone) to 1 (a thigh's flesh).
+    by which the skin under it shifts when a joint beside it bends by one radian. wobble: how much it lags behind
+    shocks, from 0 (bone) to 1 (a thigh's flesh).
     """
 
     on: str

@@ -18,6 +18,7 @@ from .chain import Chain, Poses, chain, place
 from .descent import HeldPoint, Task, descend
 from .frames import placed as carried
 from .frames import rigid_fit
+from .residuals import seen_markers
 from .smooth import smooth
 from .start import first_poses
 from .untold import between, missing
@@ -109,17 +110,13 @@ def _usual(model) -> np.ndarray | None:
 
 def _positions(model, trial) -> np.ndarray:
     """The model's markers as seen: (T, M, 3) m, NaN where the trial does not have them."""
-    at = {label: index for index, label in enumerate(trial.labels)}
-    out = np.full((len(trial.positions), len(model.markers), 3), np.nan)
-    known = [(own, at[label]) for own, label in enumerate(model.markers) if label in at]
-    seen = sum(bool(np.isfinite(trial.positions[:, theirs]).any()) for _, theirs in known)
+    out = seen_markers(model, trial)
+    seen = int(np.isfinite(out).any(axis=(0, 2)).sum())
     if seen < _FEWEST:
         raise InputError(
             trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
             "choose the model or marker set of this recording",
         )
-    for own, theirs in known:
-        out[:, own] = trial.positions[:, theirs]
     return out
 
 
@@ -143,6 +140,7 @@ class _Solving:
         self.missing = missing(chain, self.there)
         self.notes: list[str] = []
         self.work_done, self.work = 0, 1
+        self.alone = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the work before all frames are smoothed
 
     def _weights(self, usual) -> np.ndarray:
         if not self.settings.weights:
@@ -200,7 +198,7 @@ class _Solving:
         def watch(part):
             if self.cancelled():
                 raise Cancelled("reconstruction cancelled")
-            self.progress(part, "smoothing poses")
+            self.progress(self.alone + (1.0 - self.alone) * part, "smoothing poses")
 
         everything = np.arange(len(self.cost))
         at, self.held = smooth(self._task(everything), self.poses, self.settings.smoothness, self.fps, watch)
@@ -229,7 +227,7 @@ class _Solving:
         for first in range(0, len(frames), _CHUNK):
             if self.cancelled():
                 raise Cancelled("reconstruction cancelled")
-            self.progress(min(self.work_done / self.work, 1.0), "solving poses")
+            self.progress(self.alone * min(self.work_done / self.work, 1.0), "solving poses")
             yield slice(first, first + _CHUNK)
             self.work_done += min(_CHUNK, len(frames) - first)
 
@@ -287,8 +285,8 @@ class _Solving:
 
 
 def single_residual(chain: Chain, seen: np.ndarray) -> np.ndarray:
-    """Residuals (T, M) m when every segment is laid through its own markers alone (§3.4.2); NaN where it has fewer than
-    three seen. seen: (T, M, 3) m."""
+    """Residuals (T, M) m when every segment is laid through its own markers alone (§3.4.2); NaN where it has fewer
+    than three seen. seen: (T, M, 3) m."""
     out = np.full(seen.shape[:2], np.nan)
     for joint in np.unique(chain.joint):
         own = np.flatnonzero(chain.joint == joint)

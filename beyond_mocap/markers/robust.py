@@ -9,7 +9,8 @@ import numpy as np
 
 
 def quantile(values: np.ndarray, share: float, axis: int = 0) -> np.ndarray:
-    """The value that `share` (0 to 1) of what is there along `axis` stays below, straight between samples; NaN for none."""
+    """The value that `share` (0 to 1) of what is there along `axis` stays below, straight between samples; NaN where
+    nothing is."""
     ordered = np.moveaxis(np.sort(values, axis=axis), axis, 0)  # NaN comes last
     if not len(ordered):
         return np.full(ordered.shape[1:], np.nan)

@@ -24,7 +24,8 @@ _STILL = 0.1
 def static_frame(
     trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], seconds: float = 2.0
 ) -> dict[str, np.ndarray]:
-    """The markers of a static trial as one frame: label -> (3,) m, NaN for what is never seen in its stillest `seconds`.
+    """The markers of a static trial as one frame: label -> (3,) m, NaN for what is never seen in its stillest
+    `seconds`.
 
     clusters: segment (of `template.JOINTS`, others hang on the root) -> labels. Markers of segments with too few for a
     frame of their own are averaged in the frame of the segment they hang on, and markers of no segment by their places.
@@ -38,7 +39,7 @@ def static_frame(
     frames, means = _technical_frames(part, groups), {}
     order = [name for name in PARENTS if name in groups] + [name for name in groups if name not in PARENTS]
     for name in order:
-        above = _above(name, frames, means)
+        above = _above(name, means)
         if name in frames:
             own = _mean_frame(frames[name], frames.get(above), means.get(above))
             means[name], above = own, name
@@ -65,7 +66,7 @@ def stillest(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int, int]:
         moved[: len(speed)] = quantile(speed, 0.5, axis=1)
     seen = trial.seen.sum(axis=1)
     starts = np.unique(np.linspace(0, len(trial) - length, 24).astype(int))
-    unrest = [(-round(float(seen[a : a + length].mean())), float(np.nan_to_num(medians(moved[a : a + length])))) for a in starts]
+    unrest = [(-round(float(seen[a : a + length].mean())), float(medians(moved[a : a + length]))) for a in starts]
     best = min(range(len(starts)), key=lambda i: unrest[i])
     if unrest[best][1] > _STILL:
         raise InputError(
@@ -93,7 +94,7 @@ def _wide(flags, like):
     return flags.reshape(-1, *[1] * (like.ndim - 1))
 
 
-def _above(name, frames, means):
+def _above(name, means):
     """The nearest segment above with a frame that is averaged already; the first of all where there is none."""
     parent = PARENTS.get(name)
     while parent is not None and parent not in means:

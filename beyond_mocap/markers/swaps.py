@@ -79,7 +79,8 @@ def mend(
 
     leaping: (T, M) bool from `pieces.leaps`. opposite: pairs that are likely taken for each other (left and right), and
     whole segments of them: always asked about. The exchange that mends the most is made first, and the others are asked
-    about again where it matters. ask: called for each question; it may raise. Of a pair that no cluster tells of, a single leap onto each other's ways is told.
+    about again where it matters. ask: called for each question; it may raise. Of a pair that no cluster tells of, a
+    single leap onto each other's ways is told.
     """
     out, found, deformed = positions.copy(), [], _Deformed(carried)
     crossings = _crossings(positions)
@@ -90,7 +91,8 @@ def mend(
         ask()
         offers[pairs] = _offers(deformed, out, pairs, leaping, step)
     for _ in range(_MOST_SWAPS):
-        best = max(((gain, pairs, first, end) for pairs, rows in offers.items() for gain, first, end in rows), default=None)
+        rated = ((gain, pairs, first, end) for pairs, rows in offers.items() for gain, first, end in rows)
+        best = max(rated, default=None)
         if best is None:
             break
         _, pairs, first, end = best
@@ -166,7 +168,8 @@ class _Deformed:
         return float(np.mean([max(one.shape.usual, one.sigma / np.sqrt(len(one.helpers) + 1.0)) for one in ones]))
 
     def both_ways(self, positions: np.ndarray, pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) m, the mean deformation of the pairs' shapes as they are, and with the pairs exchanged; NaN if untold."""
+        """(T,) m each: mean deformation of the pairs' shapes as they are, and with the pairs exchanged; NaN if untold.
+        """
         markers = self._telling(pairs)
         keep, swap = (
             np.stack([self._rms(version, marker) for marker in markers])
@@ -283,7 +286,8 @@ def _crossing(now, was, markers):
 
 
 def _untold(crossings, deformed, found, frames):
-    """A leap onto each other's ways of markers that no cluster tells of, which nothing has mended: told from there on."""
+    """A leap onto each other's ways of markers that no cluster tells of, which nothing has mended: told from there.
+    """
     for pair, when in _moments(crossings).items():
         known = any(pair in swap.pairs and swap.first - 3 <= when[-1] <= swap.end + 3 for swap in found)
         if not known and not deformed.told((pair,)):

@@ -123,7 +123,8 @@ class MarkerTrial:
         """The frames from `first` up to, not with, `end`, on the same clock; events outside are left out."""
         first, end, _ = slice(first, end).indices(len(self))
         start, last = self.start + first / self.fps, self.start + (end - 1) / self.fps
-        inside = tuple(event for event in self.events if start - 0.5 / self.fps <= event.seconds <= last + 0.5 / self.fps)
+        near = 0.5 / self.fps
+        inside = tuple(event for event in self.events if start - near <= event.seconds <= last + near)
         residuals = None if self.residuals is None else self.residuals[first:end]
         return replace(self, positions=self.positions[first:end], residuals=residuals, start=start, events=inside)
 

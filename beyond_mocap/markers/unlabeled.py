@@ -49,7 +49,8 @@ def assign(
         for piece in pieces(alone, leaps(alone, {}, fps)) if piece.end - piece.first >= max(2, _SHORTEST * fps)
     ]
     lacking = [marker for marker in carried if marker not in nameless and np.isnan(positions[:, marker, 0]).any()]
-    offers = [offer for piece in offered for marker in lacking if (offer := _offer(positions, carried, piece, marker, fps))]
+    asked = (_offer(positions, carried, piece, marker, fps) for piece in offered for marker in lacking)
+    offers = [offer for offer in asked if offer]
     for offer in sorted(offers):
         _, piece, marker, off = offer
         way = out[piece.first : piece.end, piece.marker]

@@ -1,4 +1,4 @@
-"""How much each marker counts in each frame: less where its cluster is bent out of shape there (Fredriksson §5.3.2)."""
+"""How much each marker counts in each frame: less where its cluster is bent out of shape (Fredriksson §5.3.2)."""
 
 from __future__ import annotations
 

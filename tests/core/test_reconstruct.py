@@ -94,9 +94,10 @@ def test_it_can_be_stopped(known):
         reconstruct(known.trial, known.static, cancelled=lambda: True)
 
 
-def test_progress_rises_to_its_end(known, made):
-    told = []
-    reconstruct(known.trial, model=made.model, progress=lambda fraction, text: told.append(fraction))
+@pytest.mark.parametrize("smoothness", [0.0, 0.004])
+def test_progress_rises_to_its_end(known, made, smoothness):
+    told, settings = [], ReconstructSettings(smoothness=smoothness)
+    reconstruct(known.trial, model=made.model, settings=settings, progress=lambda fraction, text: told.append(fraction))
     assert told == sorted(told) and 0 <= told[0] and told[-1] <= 1
 
 
@@ -108,7 +109,9 @@ def test_markers_of_no_set_and_a_model_of_another_are_refused(known, made):
         reconstruct(strange, model=replace(made.model, set_name="mine"))
 
 
-@pytest.mark.parametrize("wrong", [{"filter": "median"}, {"release": "maybe"}])
+@pytest.mark.parametrize("wrong", [
+    {"filter": "median"}, {"release": "maybe"}, {"smoothness": -0.1}, {"smoothness": np.nan}, {"smoothness": 1000.0},
+])  # fmt: skip
 def test_settings_that_are_none_are_refused(wrong):
     with pytest.raises(InputError):
         ReconstructSettings(**wrong)

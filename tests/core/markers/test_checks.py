@@ -1,5 +1,7 @@
 """Mirrored markers, exchanged sides, another body's static, nobody there: told apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,12 @@ def test_mirrored_is_told_from_exchanged_where_the_static_tells(known, clusters,
         check(spoil(known.trial), known.static, clusters)
     with pytest.raises(InputError, match=f"{known.static.name}.*{found}"):
         check(known.trial, spoil(known.static), clusters)
+
+
+def test_mirrored_markers_are_told_where_trial_and_static_have_one_name(known, clusters):
+    static = replace(known.static, name=known.trial.name)
+    with pytest.raises(InputError, match="coordinates are mirrored"):
+        check(mirrored(known.trial), static, clusters)
 
 
 @pytest.mark.parametrize("spoil", [mirrored, sides_exchanged])

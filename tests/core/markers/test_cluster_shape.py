@@ -1,6 +1,8 @@
-"""Shapes of clusters: the planted shape and its noise come back, whatever a few frames do; who moves together is found."""
+"""Shapes of clusters: the planted shape and its noise come back, whatever a few frames do; who moves together is
+found."""
 
 import numpy as np
+import pytest
 
 from beyond_mocap.markers.cluster_shape import deformation, distance_spread, mean_shape, rigid_clusters
 from beyond_mocap.markers.robust import median, medians, quantile
@@ -55,3 +57,9 @@ def test_quantiles_are_numpys_and_leave_out_nan():
     values[:, 2, 0] = np.nan
     assert np.isnan(quantile(values, 0.5)[2, 0]) and medians(values)[2, 0] == 0.0
     assert median(np.array([np.nan])) == 0.0 and median(np.array([1.0, np.nan, 3.0])) == 2.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_cluster_that_is_never_seen_has_no_shape():
+    shape = mean_shape(np.full((20, 4, 3), np.nan))
+    assert np.isnan(shape.places).all() and shape.usual == 0.0
