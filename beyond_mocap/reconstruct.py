@@ -67,8 +67,8 @@ class Reconstruction:
     motion: at the trial's rate, where the markers are. floor: height in metres of the floor that its feet stood on when
     it was recorded; motion and trial are moved by that where `grounded`. model: whose skeleton it has. trial: the
     markers under the set's names, cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters.
-    cleaned: what was mended. release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds: of each step. warnings:
-    lines.
+    cleaned: what was mended. release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds:
+    of each step. warnings: lines.
     """
 
     motion: Motion

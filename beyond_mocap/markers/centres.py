@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..motion import quaternion
-from .frames import rigid_fit
+from .frames import mean_rotation, rigid_fit
 from .template import LANDMARK_PLACES, PLACES, TIPS
 
 MARKER_RADIUS = 0.007
@@ -198,21 +198,14 @@ def _spine(out: Centres) -> None:
     pelvis, chest = out.axes["Hips"], out.axes["Chest"]
     out.put("Spine", out.places["Hips"] + pelvis @ (out.size * PLACES["Spine"]), pelvis, SIGMAS["trunk"])
     low, high = PLACES["Spine"], PLACES["Chest"]
-    middle = between_axes(pelvis, chest)
+    middle = mean_rotation(np.stack([pelvis, chest]))
     share = (PLACES["Spine1"][2] - low[2]) / (high[2] - low[2])
     bow = out.size * (PLACES["Spine1"] - (1.0 - share) * low - share * high)
     place = (1.0 - share) * out.places["Spine"] + share * out.places["Chest"] + middle @ bow
     out.put("Spine1", place, middle, SIGMAS["trunk"])
     out.axes["Neck"] = chest
-    middle = between_axes(chest, out.axes["Head"])
+    middle = mean_rotation(np.stack([chest, out.axes["Head"]]))
     out.put("Neck1", 0.5 * (out.places["Neck"] + out.places["Head"]), middle, SIGMAS["trunk"])
-
-
-def between_axes(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The axes (3, 3) half way between two."""
-    left, _, right = np.linalg.svd(a + b)
-    left[:, 2] *= np.sign(np.linalg.det(left @ right))
-    return left @ right
 
 
 def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarray, float] | None:

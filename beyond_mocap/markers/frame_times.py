@@ -24,8 +24,8 @@ def frame_times(trial: MarkerTrial) -> np.ndarray | None:
     """Seconds (T,) on the trial's clock at which the frames were taken, or None where they stand evenly.
 
     The steps of all markers, each against its own smooth course, give one common unsteadiness per frame; it is compared
-    with the one that a clock of whole milliseconds would make, at every phase. Never None without good reason: it must
-    correlate by 0.8.
+    with the one that a clock of whole milliseconds would make, at every phase, and believed where both correlate by
+    more than 0.8.
     """
     step = 1.0 / (trial.fps * TICK)
     if abs(step - round(step)) < 1e-3 or step < 1.5 or len(trial) < 3 * _SMOOTH:
