@@ -114,7 +114,14 @@ def reconstruct(
     trial itself. model: one that was made before. InputError where markers are of no known set, where the static or the
     model is of another body or set, where the markers are mirrored or too few. Cancelled where the user wants out.
     """
-    road = _Road(progress, cancelled)
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):  # the same bits everywhere; and small systems are slower on several
+        return _reconstruct(trial, static, model, settings, _Road(progress, cancelled), cancelled)
+
+
+def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Road, cancelled) -> Reconstruction:
+    """`reconstruct`, on one thread."""
     with road.step("clean", 0.1):
         marker_set = set_of(trial, model, settings)
         seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))

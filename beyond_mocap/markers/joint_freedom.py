@@ -35,6 +35,7 @@ _TABLE = {
     "ToeBase": ("YXZ", ((-80, 60), _NONE, _NONE), 0.002),
 }
 _WEAK = 0.004  # pull in metres per radian of a joint whose own markers are fewer than a technical frame needs
+_WEAK_FOOT = 0.01  # heel and toe lie nearly on a line with the ankle: a millimetre of skin would be 2 degrees of roll
 
 
 def freedom_of(joints: Sequence[str], parents: Sequence[int], counts: Mapping[str, int]) -> tuple[Freedom, np.ndarray]:
@@ -55,6 +56,7 @@ def freedom_of(joints: Sequence[str], parents: Sequence[int], counts: Mapping[st
             ranges = tuple(span if axis == "Y" else (-span[1], -span[0]) for axis, span in zip(order, ranges))
         orders.append(order)
         limits.append(np.radians(ranges))
-        pulls.append(pull if pull or counts.get(name, 0) >= 3 or name == "Hips" else _WEAK)
+        weak = _WEAK_FOOT if part == "Foot" else _WEAK
+        pulls.append(pull if pull or counts.get(name, 0) >= 3 or name == "Hips" else weak)
     limits = np.array(limits)
     return Freedom(tuple(orders), limits[..., 1] > limits[..., 0], limits[..., 0], limits[..., 1]), np.array(pulls)
