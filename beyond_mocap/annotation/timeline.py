@@ -28,7 +28,8 @@ MUST_NOT = "-"
 """Before a word in the text form: what is shown must not carry it."""
 
 
-def _checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
+def checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
+    """In small letters, each once. InputError, which `where` stands before, for what cannot be written as a word."""
     out = tuple(dict.fromkeys(str(word).lower() for word in words))
     for word in out:
         if not word or "#" in word or word.startswith(MUST_NOT) or word.split() != [word] or NUMBER.fullmatch(word):
@@ -59,8 +60,8 @@ class Span:
     def __post_init__(self):
         object.__setattr__(self, "start", _checked_time(self.start, "span"))
         object.__setattr__(self, "end", _checked_time(self.end, "span"))
-        object.__setattr__(self, "words", _checked_words(self.words, "span"))
-        object.__setattr__(self, "avoid", _checked_words(self.avoid, "span"))
+        object.__setattr__(self, "words", checked_words(self.words, "span"))
+        object.__setattr__(self, "avoid", checked_words(self.avoid, "span"))
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,8 @@ class KeyMoment:
 
     def __post_init__(self):
         object.__setattr__(self, "time", _checked_time(self.time, "key moment"))
-        object.__setattr__(self, "words", _checked_words(self.words, "key moment"))
-        object.__setattr__(self, "avoid", _checked_words(self.avoid, "key moment"))
+        object.__setattr__(self, "words", checked_words(self.words, "key moment"))
+        object.__setattr__(self, "avoid", checked_words(self.avoid, "key moment"))
 
     @property
     def in_force(self) -> float:

@@ -75,10 +75,13 @@ def _add_library(verb) -> None:
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`reconstruct`: of one trial, or of all in a folder."""
+    from ..library.add_clip import plain_words
+
     if options.model and options.static:
         raise InputError("--model", "with --static", "one of them", "leave one out")
     if options.words and not options.add_to:
         raise InputError("--words", "without --add-to", "both", "add --add-to LIBRARY")
+    options.words = plain_words(options.words)
     if options.trial.is_dir():
         _run_folder(options, told)
     else:
@@ -110,12 +113,12 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
     made.seconds.update(load=loaded - begun, total=time.perf_counter() - begun)
     if _is_throw(options.words) and made.release is None:
         raise InputError(options.trial, "no release was found for a throw's words", "a throw", "leave --words out")
+    notes = add_to_library(made, options.trial.stem, options) if options.add_to else []
     if options.report:
         write_report(options.report, made.report())
     write(as_take(made), options.out)
     if options.save_model:
         write_model(made.model, options.save_model)
-    notes = add_to_library(made, options.trial, options) if options.add_to else []
     told.end()
     lines = [f"{options.trial}: {line}" for line in (*trial.notes, *made.warnings)]
     _tell(told, [*_upright_alike(options, trial, static), *lines], options.report)
@@ -146,17 +149,21 @@ def _tell(told: Told, lines: list[str], report: Path | None) -> None:
 def _run_folder(options, told: Told) -> None:
     """All trials of a folder: NAME.bvh, NAME.report.json and, where a static has made one, NAME.model.json each, and
     trials.json and report.html over all."""
-    from ..reconstruct_folder import reconstruct_folder
+    from ..reconstruct_folder import reconstruct_folder, recordings_of
 
     for name in ("static", "report", "save_model"):
         if getattr(options, name):
             raise InputError(f"--{name.replace('_', '-')}", "with a folder of trials", "one trial",
                              "leave it out: statics are found, and each trial gets its own report")  # fmt: skip
-    _check_folder(options.out, options.trial)
+    if options.add_to and not options.add_to.is_dir():
+        raise InputError(options.add_to, "is not a folder", "a library's folder", "make the folder first")
+    recordings_of(options.trial)  # there are some
+    settings = settings_of(options)
     model = None if options.model is None else _model(options.model)
+    _check_folder(options.out, options.trial)
     read = partial(read_trial, options=options)
     rows = []
-    for made in reconstruct_folder(options.trial, read, settings_of(options), model, told.progress, told.cancelled):
+    for made in reconstruct_folder(options.trial, read, settings, model, told.progress, told.cancelled):
         rows.append(_kept(made, options))
         told.end()
         print(rows[-1]["line"])
@@ -185,13 +192,16 @@ def _kept(made, options) -> dict:
     row = {"trial": name, "file": str(made.recording.path), "session": made.recording.session, "error": made.error,
            "static": made.static and made.static.name, "bvh": "", "report": ""}  # fmt: skip
     if made.made is None:
-        return {**row, "line": f"{name}: {made.error}"}
+        return {**row, "line": f"{name}: {made.error.removeprefix(f'{made.recording.path.stem}: ')}"}
     place = options.out / name
     place.parent.mkdir(parents=True, exist_ok=True)
     bvh.write(place.parent / f"{place.name}.bvh", made.made.motion)
     write_report(place.parent / f"{place.name}.report.json", made.made.report())
     write_model(made.made.model, place.parent / f"{place.name}.model.json")
-    notes = add_to_library(made.made, made.recording.path, options) if options.add_to else []
+    try:
+        notes = add_to_library(made.made, name.replace("/", "_"), options) if options.add_to else []
+    except InputError as error:  # of this clip alone
+        notes = [f"not added: {error}"]
     return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": made.made.model.subject,
             "line": "; ".join([f"{name}: {summary(made.made)}", *notes])}  # fmt: skip
 
@@ -280,11 +290,11 @@ def _is_throw(words) -> bool:
     return any(word.startswith("throw") for word in words)
 
 
-def add_to_library(made, trial: Path, options) -> list[str]:
+def add_to_library(made, name: str, options) -> list[str]:
     """The motion as a clip of a library, a throw's words at its release; notes for people."""
     from ..library.add_clip import add_clip
 
     key = None
     if _is_throw(options.words) and made.release is not None:
         key = made.release.frame / made.motion.fps
-    return add_clip(options.add_to, trial.stem, made.on_floor(), options.words, key)
+    return add_clip(options.add_to, name, made.on_floor(), options.words, key)

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from .. import __version__
+from ..errors import InputError
 from .numbers import between
 from .outputs import Writer, check_outputs
 from .told import Told
@@ -47,7 +48,10 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     motion = bvh.read(options.motion).motion
     loaded = time.perf_counter()
     settings = ReleaseSettings(options.ball_marker, options.radius, options.hand, options.ball_kind)
-    found = release(trial, motion, settings)
+    try:
+        found = release(trial, motion, settings)
+    except InputError as error:  # trials know only the file's name
+        raise error if error.where != trial.name else InputError(options.trial, str(error).split(": ", 1)[1]) from None
     done = time.perf_counter()
     report = {"version": __version__, "trial": str(options.trial), **found.report()}
     write_report(options.report, {**report, "seconds": {"load": loaded - begun, "release": done - loaded}})

@@ -47,7 +47,9 @@ def given(path: str | os.PathLike, unit: float | str, positions: np.ndarray) -> 
     if span > 0 and not _GIVEN_RANGE[0] <= span * metres <= _GIVEN_RANGE[1]:
         found = f"makes {path} span {span * metres:.4g} m"
         raise InputError(f"--unit {str(unit)[:40]}", found, "a body", "check the unit")
-    return metres, f"unit {metres:g} m, as given"
+    told = f"unit {metres:g} m, as given"
+    usual = not span or _BODY_RANGE[0] <= span * metres <= _BODY_RANGE[1]
+    return metres, told if usual else f"{told}: makes the markers span {span * metres:.4g} m, as no body does"
 
 
 def decided(path: str | os.PathLike, said: str, positions: np.ndarray, height: float = 0.0) -> tuple[float, str]:

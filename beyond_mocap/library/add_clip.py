@@ -6,11 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..annotation import ClipAnnotation
+from ..annotation.timeline import checked_words
 from ..annotation.vocabulary import vocabulary_words
 from ..errors import InputError
 from ..files import bvh
 from ..motion.motion import Motion
 from .keep_words import has_words, keep
+
+
+def plain_words(words: Sequence[str]) -> tuple[str, ...]:
+    """The words of an annotation as they are written, also of several in one text. InputError for one that is none."""
+    return checked_words(" ".join(words).split(), "words")
 
 
 def free_place(folder: Path, name: str) -> Path:
@@ -31,15 +37,16 @@ def add_clip(
     """Writes NAME.bvh into a library's folder and, where there are words, NAME.txt; returns lines for people.
 
     words: of the annotation; with key_seconds, from the motion's first frame, they name that moment, else the whole
-    motion. Nothing that is there is replaced. InputError where it cannot be written, or the key lies outside.
+    motion. Nothing that is there is replaced. InputError where it cannot be written, a word is none, or the key lies
+    outside.
     """
-    clip = free_place(folder, name)
+    clip, words = free_place(folder, name), plain_words(words)
     key = None if key_seconds is None else round(key_seconds * motion.fps)
     if key is not None and not 0 <= key < len(motion):
         raise InputError(clip, f"its key lies at {key_seconds:.3f} s", f"0 to {motion.duration:.3f} s")
-    rows = [ClipAnnotation(key, key, key, tuple(words))] if key is not None else []
+    rows = [ClipAnnotation(key, key, key, words)] if key is not None else []
     if words and key is None:
-        rows = [ClipAnnotation(0, len(motion) - 1, None, tuple(words))]
+        rows = [ClipAnnotation(0, len(motion) - 1, None, words)]
     if words and has_words(clip, folder, motion.fps):
         raise InputError(clip.with_suffix(".txt"), "has words already", "a name that is free", "rename the clip")
     bvh.write(clip, motion)

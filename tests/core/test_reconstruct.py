@@ -165,6 +165,9 @@ def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, mad
     assert (clips / "walk.txt").read_text().split() == ["0f", f"{len(made.motion) - 1}f", "walking"]
     status, _, error = run(place / "walk.trc", "--out", tmp_path / "o.bvh", *words)
     assert status == 2 and "already" in error[0]
+    (clips / "walk.bvh").unlink()
+    status, _, error = run(place / "walk.trc", "--static", place / "static.trc", "--out", tmp_path / "p.bvh", *words)
+    assert status == 2 and "words already" in error[0] and not (tmp_path / "p.bvh").exists()
 
 
 def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
@@ -174,11 +177,15 @@ def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
         write_trc(known.static, trials / session / "static.trc")
         write_trc(known.trial.frames(0, 50), trials / session / "walk.trc")
     (trials / "broken.trc").write_text("nothing")
-    out = tmp_path / "out"
-    status, said, error = run(trials, "--out", out)
+    out, clips = tmp_path / "out", tmp_path / "clips"
+    clips.mkdir()
+    (clips / "tuesday_walk.bvh").write_text("taken")
+    status, said, error = run(trials, "--out", out, "--add-to", clips, "--words", "walking")
     rows = {row["trial"]: row for row in json.loads((out / "trials.json").read_text())["trials"]}
     assert status == 0 and set(rows) == {"broken", "monday/walk", "tuesday/walk"}
     assert rows["broken"]["error"] and rows["monday/walk"]["static"] == "monday/static"
+    assert {path.name for path in clips.iterdir()} == {"monday_walk.bvh", "monday_walk.txt", "tuesday_walk.bvh"}
+    assert "not added" in rows["tuesday/walk"]["line"] and rows["tuesday/walk"]["bvh"]
     skeletons = [bvh.read(out / session / "walk.bvh").motion.skeleton for session in ("monday", "tuesday")]
     assert np.allclose(skeletons[0].offsets, skeletons[1].offsets, atol=1e-6)
 
@@ -192,7 +199,11 @@ def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
     (("{place}/walk.trc", "--cutoff", "0", "--out", "{tmp}/o.bvh"), "hertz"),
     (("{place}", "--report", "{tmp}/r.json", "--out", "{tmp}/o"), "--report"),
     (("{tmp}", "--out", "{tmp}/o"), "holds no .c3d"),
+    (("{place}", "--out", "{tmp}/o", "--add-to", "{tmp}/gone"), "gone: is not a folder"),
+    (("{place}", "--out", "{tmp}/o", "--model", "{tmp}/m.json"), "m.json: no such file"),
+    (("{place}", "--out", "{tmp}/o", "--marker-set", "mine"), "plug_in_gait"),
+    (("{place}/walk.trc", "--out", "{tmp}/o.bvh", "--add-to", "{tmp}", "--words", "#3"), "words: '#3'"),
 ])
 def test_what_is_wrong_is_told_in_a_line(run, place, tmp_path, words, expected):
     status, _, error = run(*[word.format(place=place, tmp=tmp_path) for word in words])
-    assert status == 2 and len(error) == 1 and expected in error[0]
+    assert status == 2 and len(error) == 1 and expected in error[0] and not list(tmp_path.iterdir())

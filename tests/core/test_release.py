@@ -197,3 +197,13 @@ def test_the_verb_writes_what_the_recipe_finds(known, tmp_path, capsys):
 def test_the_verb_says_what_is_missing(tmp_path, capsys):
     assert main(["release", str(tmp_path / "no.trc"), "--motion", "m.bvh", "--report", str(tmp_path / "r.json")]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_the_verb_names_the_file_whose_motion_it_is_not(known, tmp_path, capsys):
+    write_trc(known.trial, tmp_path / "t.trc")
+    bvh.write(tmp_path / "m.bvh", known.motion.frames(0, 40))
+    given = ["release", str(tmp_path / "t.trc"), "--motion", str(tmp_path / "m.bvh"), "--report"]
+    assert main([*given, str(tmp_path / "r.json"), "--ball-csv", str(tmp_path / "b.csv")]) == 2
+    told = capsys.readouterr().err.strip()
+    assert f"{tmp_path / 't.trc'}: " in told and "\n" not in told and "made from this trial" in told
+    assert len(list(tmp_path.iterdir())) == 2

@@ -104,6 +104,8 @@ def test_a_unit_that_cannot_be(body, read):
         read(data)
     np.testing.assert_allclose(read(data, unit=1).positions, body.positions, atol=1e-6)
     np.testing.assert_allclose(read(data, unit="m").positions, body.positions, atol=1e-6)
+    assert any("makes the markers span" in note for note in read(data, unit=12).notes)
+    assert "unit 1 m, as given" in read(data, unit="m").notes
     for said, true in (("mm", 100), ("cm", 1000), ("in", 1000), ("m", 1 / 0.0254)):  # centimetres called mm ...
         with pytest.raises(InputError, match="a body of .*--unit"):
             read(body.c3d(body.positions * true, body.labels, unit=said))

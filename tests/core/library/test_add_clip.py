@@ -36,6 +36,15 @@ def test_nothing_is_replaced(tmp_path, walk):
     assert not (tmp_path / "run.bvh").exists()
 
 
+def test_words_are_written_as_they_are_read(tmp_path, walk):
+    add_clip(tmp_path, "throw", walk, ["Throwb high", "throwb"], key_seconds=1.2)
+    assert (tmp_path / "throw.txt").read_text() == "72f throwb high\n"
+    for word in ("#top", "3", "-low"):
+        with pytest.raises(InputError, match="words: .+ as a word"):
+            add_clip(tmp_path, "other", walk, ["throwb", word])
+    assert len(list(tmp_path.iterdir())) == 2
+
+
 @pytest.mark.parametrize("name, key", [("", None), ("a/b", None), ("late", 9.0), ("early", -0.5)])
 def test_what_cannot_be_is_refused(tmp_path, walk, name, key):
     with pytest.raises(InputError):
