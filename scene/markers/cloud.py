@@ -28,14 +28,17 @@ RADIUS = 0.007  # metres of a marker's sphere
 def create(
     context: bpy.types.Context, trial: "MarkerTrial", name: str = "", start: float | None = None, collection=None
 ) -> bpy.types.Object:
-    """A cloud that plays a trial from the scene frame `start` (the scene's first if None); the scene is lengthened."""
-    scene, units = context.scene, units_per_metre(context.scene)
+    """A cloud that plays a trial from the scene frame `start` (the scene's first if None); the scene is lengthened.
+    InputError where nothing can be seen, or the collection belongs to another file."""
+    scene, units, room = context.scene, units_per_metre(context.scene), collection or context.collection
     check(trial)
+    if room.library is not None:
+        raise InputError(room.name, "a linked collection", "one of this file", "choose another in the Outliner")
     mesh = bpy.data.meshes.new(name or trial.name)
     mesh.vertices.add(len(trial.labels))
     _attribute(mesh, nodes.MARKER, "INT", np.arange(len(trial.labels), dtype=np.int32))
     cloud = bpy.data.objects.new(name or trial.name, mesh)
-    (collection or context.collection).objects.link(cloud)
+    room.objects.link(cloud)
     kept = cloud.beyond_mocap_cloud
     kept.on = True
     for label in trial.labels:
@@ -106,6 +109,8 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     names = tuple(label.name.strip() for label in kept.labels)
     trial = MarkerTrial(names, places, kept.fps, None, events, kept.start, cloud.name, kept.subject)
     there = np.unique(markers(cloud))
+    if not len(there):
+        raise InputError(cloud.name, "no vertex that is a marker", "one for each", "import the recording again")
     return trial if len(there) == count else trial.only([trial.labels[i] for i in there])
 
 
@@ -161,12 +166,14 @@ def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]
 
 
 def markers(cloud: bpy.types.Object) -> np.ndarray:
-    """Which marker each vertex is: (V,) places in the list of labels."""
+    """Which marker each vertex is: (V,) places in the list of labels; none where the mesh does not know."""
     mesh = cloud.data
     if mesh.is_editmode:  # the mesh itself has no data meanwhile
         shape = bmesh.from_edit_mesh(mesh)
-        layer = shape.verts.layers.int[nodes.MARKER]
-        found = np.array([vertex[layer] for vertex in shape.verts], np.int32)
+        layer = shape.verts.layers.int.get(nodes.MARKER)
+        found = np.array([vertex[layer] for vertex in shape.verts] if layer is not None else [], np.int32)
+    elif nodes.MARKER not in mesh.attributes:
+        return np.zeros(0, np.int32)
     else:
         found = np.empty(len(mesh.vertices), np.int32)
         mesh.attributes[nodes.MARKER].data.foreach_get("value", found)

@@ -27,9 +27,11 @@ def at_once():
 
 def draw(cloud: bpy.types.Object) -> None:
     """Write edges and colours by the segments of the labels, in edit mode too; what is selected stays selected."""
-    if _waiting or cloud.library is not None or cloud.data.library is not None:
-        return
     mesh, labels = cloud.data, cloud.beyond_mocap_cloud.labels
+    if _waiting or cloud.library is not None or mesh.library is not None:
+        return
+    if not mesh.is_editmode and nodes.MARKER not in mesh.attributes:
+        return
     shape = bmesh.from_edit_mesh(mesh) if mesh.is_editmode else bmesh.new()
     if not mesh.is_editmode:
         shape.from_mesh(mesh)

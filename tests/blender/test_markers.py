@@ -135,6 +135,22 @@ def test_a_vertex_that_is_doubled_in_edit_mode_is_no_second_marker(cloud, trial)
     assert cloud.read(thing, bpy.context.scene).labels == trial.labels
 
 
+@pytest.mark.parametrize("by", ["delete", "clear"])
+def test_a_cloud_without_vertices_says_so(cloud, core, trial, by):
+    thing = cloud.create(bpy.context, trial)
+    if by == "clear":
+        thing.data.clear_geometry()
+    else:
+        bpy.context.view_layer.objects.active = thing
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.mesh.delete(type="VERT")
+        bpy.ops.object.mode_set(mode="OBJECT")
+    thing.beyond_mocap_cloud.labels[0].segment = "Hips"
+    with pytest.raises(core("errors").InputError, match="no vertex that is a marker"):
+        cloud.read(thing, bpy.context.scene)
+
+
 @pytest.mark.parametrize("lost", ["modifier", "empty", "mesh"])
 def test_a_cloud_whose_player_is_spoilt_says_so(cloud, core, trial, lost):
     nodes = importlib.import_module(f"{EXTENSION}.scene.markers.nodes")
@@ -268,6 +284,21 @@ def test_a_file_that_is_none_is_refused_and_nothing_comes(tmp_path):
     path.write_bytes(b"\x02P" + bytes(600))
     with pytest.raises(RuntimeError, match="broken.c3d"):
         bpy.ops.beyond_mocap.import_markers(filepath=str(path))
+    assert not len(bpy.data.objects) and not len(bpy.data.meshes)
+
+
+def test_into_a_linked_collection_nothing_is_imported(walk, tmp_path):
+    bpy.context.scene.collection.children.link(bpy.data.collections.new("Theirs"))
+    path = str(tmp_path / "theirs.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.collections = ["Theirs"]
+    bpy.context.scene.collection.children.link(wanted.collections[0])
+    layer = bpy.context.view_layer
+    layer.active_layer_collection = layer.layer_collection.children["Theirs"]
+    with pytest.raises(RuntimeError, match="a linked collection; expected one of this file"):
+        bpy.ops.beyond_mocap.import_markers(filepath=str(walk))
     assert not len(bpy.data.objects) and not len(bpy.data.meshes)
 
 
