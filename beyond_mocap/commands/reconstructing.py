@@ -55,7 +55,7 @@ def _add_posing(verb) -> None:
     verb.add_argument("--no-weights", action="store_true", help="all markers count alike")
     more = partial(between, low=0.0, high=0.2, expected="0 to 0.2 seconds")
     verb.add_argument("--smoothness", type=more, default=0.0, metavar="SECONDS",
-                      help="the whole sequence moves smoothly: 0.02 for a walk, 0.004 for a throw; default 0")  # fmt: skip
+                      help="it all moves smoothly: 0.02 for a walk, 0.004 for a throw; default 0")  # fmt: skip
 
 
 def _add_ball(verb) -> None:
