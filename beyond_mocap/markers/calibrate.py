@@ -66,10 +66,20 @@ def calibrate(
         raise Cancelled("calibration cancelled")
     tell(0.2, "refining the model")
     model = with_late_markers(model, marker_set, trial, stopped)
-    absent = sorted(set(marker_set.labels) - set(model.markers) - marker_set.optional - marker_set.static)
-    if absent:
-        model = replace(model, notes=(*model.notes, f"seen nowhere, so not on the model: {', '.join(absent)}"))
+    model = replace(model, notes=(*model.notes, *_left_out(model, marker_set, trial)))
     return refined(model, trial, static, stopped)
+
+
+def _left_out(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial) -> list[str]:
+    """Lines on the set's markers that are not on the model, and why."""
+    absent = sorted(set(marker_set.labels) - set(model.markers) - marker_set.optional - marker_set.static)
+    shown = {label for label, seen in zip(trial.labels, trial.seen.any(axis=0)) if seen}
+    nowhere = [label for label in absent if label not in shown]
+    loose = [label for label in absent if label in shown]
+    lines = [f"seen nowhere, so not on the model: {', '.join(nowhere)}"] if nowhere else []
+    if loose:
+        lines.append(f"not on the model, since too little tells how their segments lie: {', '.join(loose)}")
+    return lines
 
 
 def from_static(marker_set: MarkerSet, static: MarkerTrial) -> MarkerModel:

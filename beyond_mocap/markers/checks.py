@@ -44,6 +44,9 @@ def check(
     _check_sides(body, static, clusters)
     lines = list(_empty(body))
     if static is not None:
+        if not static.seen.any():
+            raise InputError(static.name, "no marker is seen", "a static trial with the trial's markers",
+                             "choose another, or go without")  # fmt: skip
         lines += _complete(body, static)
         lines += _same_body(body, _Usual(static), clusters, static.name, "the static")
     elif model is not None:
@@ -177,4 +180,5 @@ def _empty(trial: MarkerTrial):
     for first, end in runs(few):
         if (end - first) / trial.fps >= _EMPTY_SECONDS:
             span = trial.start + first / trial.fps, trial.start + (end - 1) / trial.fps
-            yield TimedLine(f"no markers from {span[0]:.2f} to {span[1]:.2f} s: the pose there is a guess", span)
+            count = "hardly any" if trial.seen[first:end].any() else "no"
+            yield TimedLine(f"{count} markers from {span[0]:.2f} to {span[1]:.2f} s: the pose there is a guess", span)

@@ -85,3 +85,12 @@ def test_a_static_trial_without_a_pelvis_is_refused(walk):
 def test_it_stops_when_the_user_wants_out(walk):
     with pytest.raises(Cancelled):
         calibrate(chosen_set("plug_in_gait"), walk.trial, walk.static, cancelled=lambda: True)
+
+
+def test_markers_that_are_seen_are_not_told_as_seen_nowhere(walk):
+    marker_set = chosen_set("plug_in_gait")
+    positions = np.array(walk.static.positions)
+    positions[:, [walk.static.index(label) for label in ("C7", "T10", "CLAV", "STRN", "RBAK")]] = np.nan
+    notes = calibrate(marker_set, walk.trial, walk.static.with_positions(positions)).notes
+    assert not any("seen nowhere" in note for note in notes)
+    assert any("not on the model" in note and "STRN" in note and "LELB" in note for note in notes)

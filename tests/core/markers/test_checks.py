@@ -100,3 +100,17 @@ def test_markers_of_no_segment_are_told(known, clusters):
     strange = known.trial.renamed({"LWRA": "STICK", "RWRA": "*4"})
     assert unused(strange, clusters) == ["1 markers of no segment are not used: STICK"]
     assert unused(strange, clusters, ["STICK"]) == []
+
+
+def test_a_static_in_which_nothing_is_seen_is_refused_as_that(known, clusters):
+    for static in (known.static.with_positions(known.static.positions * np.nan), known.static.frames(0, 0)):
+        with pytest.raises(InputError, match="no marker is seen"):
+            check(known.trial, static, clusters)
+
+
+def test_few_markers_are_not_told_as_none(known, clusters):
+    pelvis = [known.trial.index(label) for label in ("LASI", "RASI", "LPSI", "RPSI")]
+    positions = np.full_like(known.trial.positions, np.nan)
+    positions[:, pelvis] = known.trial.positions[:, pelvis]
+    (line,) = check(known.trial.with_positions(positions), None, clusters)
+    assert line.startswith("hardly any markers from")
