@@ -1,4 +1,4 @@
-"""Model and poses adjusted together: what the motion tells is found, what it does not tell stays as it was predicted."""
+"""Model and poses adjusted together: what the motion tells is found, what it does not tell stays as predicted."""
 
 import numpy as np
 import pytest

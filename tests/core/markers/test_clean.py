@@ -58,7 +58,8 @@ def test_precision_and_recall_on_many_planted_faults():
             for one in stretches
         )
 
-    planted_as = {kind: [fault for fault in known.faults if fault.kind == kind] for kind in ("swap", "jump", "unlabeled")}
+    kinds = ("swap", "jump", "unlabeled")
+    planted_as = {kind: [fault for fault in known.faults if fault.kind == kind] for kind in kinds}
     told = {"swap": report.swaps, "jump": report.jumps, "unlabeled": report.assigned}
     for kind, least in (("swap", 1.0), ("jump", 0.85), ("unlabeled", 0.75)):
         found = [hit(fault, told[kind]) for fault in planted_as[kind]]
@@ -133,7 +134,8 @@ def test_gaps_longer_than_asked_for_stay_open_and_are_told(walk):
     def hide(positions, index):
         positions[60:140, index["LFHD"]] = np.nan
 
-    cleaned, report = clean(spoiled(walk, hide), clusters_of(walk), CleanSettings(longest_gap=0.5, longest_soft_gap=0.1))
+    settings = CleanSettings(longest_gap=0.5, longest_soft_gap=0.1)
+    cleaned, report = clean(spoiled(walk, hide), clusters_of(walk), settings)
     assert np.isnan(off(walk, cleaned, "LFHD")[60:140]).all()
     assert [(gap.labels, gap.frames) for gap in report.left] == [(("LFHD",), 80)]
     line = next(line for line in report.lines if "LFHD" in line)
@@ -173,7 +175,9 @@ def test_each_step_can_be_left_out(walk):
         positions[30:40, index["LFHD"]] = np.nan
 
     trial = spoiled(walk, spoil)
-    settings = CleanSettings(swaps=False, jumps=False, assign=False, longest_gap=0, longest_soft_gap=0, longest_spline=0)
+    settings = CleanSettings(
+        swaps=False, jumps=False, assign=False, longest_gap=0, longest_soft_gap=0, longest_spline=0
+    )
     cleaned, report = clean(trial, clusters_of(walk), settings)
     np.testing.assert_array_equal(cleaned.positions, trial.positions)
     assert len(report.left) == 1
@@ -223,7 +227,8 @@ def test_the_pose_gets_no_long_guesses(walk):
     done = clean(spoiled(walk, hide), clusters_of(walk))
     how = {gap.labels[0]: gap.how for gap in done.report.gaps}
     assert how["LFHD"] == "cluster" and how["LFIN"] in ("soft", "spline")
-    assert np.isnan(off(walk, done.for_pose(), "LFIN")[60:69]).all() and not np.isnan(off(walk, done.trial, "LFIN")).any()
+    assert np.isnan(off(walk, done.for_pose(), "LFIN")[60:69]).all()
+    assert not np.isnan(off(walk, done.trial, "LFIN")).any()
     assert off(walk, done.for_pose(), "LFHD").max() < 0.005
 
 

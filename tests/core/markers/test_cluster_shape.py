@@ -13,7 +13,8 @@ CLUSTER = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.02], [0.03, 0.12, 0.0], [-0.05
 
 def moving(cluster, frames=300, seed=1):
     chance = np.random.default_rng(seed)
-    turn = quaternion.to_matrix(quaternion.from_rotation_vector(np.cumsum(chance.normal(scale=0.1, size=(frames, 3)), 0)))
+    vectors = np.cumsum(chance.normal(scale=0.1, size=(frames, 3)), 0)
+    turn = quaternion.to_matrix(quaternion.from_rotation_vector(vectors))
     way = np.cumsum(chance.normal(scale=0.02, size=(frames, 3)), axis=0)
     return np.einsum("tij,nj->tni", turn, cluster) + way[:, None]
 

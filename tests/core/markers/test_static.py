@@ -25,10 +25,8 @@ def clusters_of(known):
 
 def distances(places, clusters):
     """All distances within segments, m."""
-    return np.concatenate([
-        np.linalg.norm(np.array([places[x] for x in group])[:, None] - np.array([places[x] for x in group]), axis=-1).ravel()
-        for group in clusters.values()
-    ])
+    groups = [np.array([places[x] for x in group]) for group in clusters.values()]
+    return np.concatenate([np.linalg.norm(group[:, None] - group, axis=-1).ravel() for group in groups])
 
 
 def swaying(known, degrees):
