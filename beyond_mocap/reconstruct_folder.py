@@ -1,7 +1,7 @@
 """The recipe for a folder of trials: which are statics, which belong to one session, one model for all of a subject.
 
 A folder's own files are one session; where it has folders below, each of these is one. A static trial is told by its
-name, and serves the trials of its session whose markers it has. Trials that share a static share the model that is made
+name, and serves the trials of its session whose markers and body it has. Trials that share a static share the model that is made
 of it, and the models of several sessions of one subject get one skeleton (Fredriksson §5.2.3); trials without a static
 are modelled from their own motion.
 """
@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from .errors import BeyondMocapError, Cancelled, InputError
+from .markers.checks import check
 from .markers.model import MarkerModel
 from .markers.trial import MarkerTrial
 from .reconstruct import Reconstruction, ReconstructSettings, modelled, named_by, reconstruct, set_of
@@ -43,12 +44,13 @@ class Recording:
 @dataclass(frozen=True, eq=False)
 class Made:
     """What became of one trial: the reconstruction, or the error that says why there is none. static: its static, or
-    None."""
+    None. note: why a static that was there is not its own, or ""."""
 
     recording: Recording
     made: Reconstruction | None
     error: str = ""
     static: Recording | None = None
+    note: str = ""
 
 
 def recordings_of(folder: Path) -> list[Recording]:
@@ -88,12 +90,13 @@ def reconstruct_folder(
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """A trial, its static as read or None, and why it cannot be read."""
+    """A trial, its static as read or None, why it cannot be read, and why a static is not its own."""
 
     recording: Recording
     static: tuple[Recording, MarkerTrial] | None = None
     error: str = ""
     subject: str = field(default="")
+    note: str = ""
 
     @property
     def static_path(self) -> Path | None:
@@ -120,24 +123,34 @@ def _told_apart(recordings: Sequence[Recording], read: Read):
 def _planned(one: Recording, read: Read, statics, settings: ReconstructSettings) -> _Plan:
     try:
         trial = read(one.path)
-        return _Plan(one, _static_for(one, trial, statics, settings), subject=trial.subject)
+        static, note = _static_for(one, trial, statics, settings)
+        return _Plan(one, static, subject=trial.subject, note=note)
     except (BeyondMocapError, OSError) as error:
         return _Plan(one, error=str(error))
 
 
 def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
-    """The static of a trial's session that has its markers: of several the one whose name is likest."""
+    """The static of a trial's session that has its markers and body, of several the one whose name is likest, or None;
+    and a line on one that is of another body, or ""."""
     if not statics:
-        return None
+        return None, ""
     marker_set = set_of(trial, None, settings)
-    wanted = set(named_by(trial, marker_set).labels) & set(marker_set.labels)
-    fits = []
+    named = named_by(trial, marker_set)
+    wanted = set(named.labels) & set(marker_set.labels)
+    fits, note = [], ""
     for recording, static in statics:
-        shared = len(wanted & set(named_by(static, marker_set).labels)) / max(len(wanted), 1)
-        same_body = not (trial.subject and static.subject and trial.subject != static.subject)
-        if recording.session == one.session and same_body and shared >= _SAME_MARKERS:
-            fits.append((_alike(recording.path.stem, one.path.stem), shared, (recording, static)))
-    return max(fits, key=lambda row: row[:2])[2] if fits else None
+        other = named_by(static, marker_set)
+        shared = len(wanted & set(other.labels)) / max(len(wanted), 1)
+        same_name = not (trial.subject and static.subject and trial.subject != static.subject)
+        if recording.session != one.session or not same_name or shared < _SAME_MARKERS:
+            continue
+        try:
+            check(named, other, marker_set.clusters(named.labels))
+        except InputError as error:
+            note = f"goes without a static: {error}"
+            continue
+        fits.append((_alike(recording.path.stem, one.path.stem), shared, (recording, static)))
+    return (max(fits, key=lambda row: row[:2])[2], "") if fits else (None, note)
 
 
 def _alike(a: str, b: str) -> int:
@@ -175,7 +188,7 @@ def _made(plan: _Plan, read: Read, settings, model, progress, cancelled) -> Made
         raise
     except (BeyondMocapError, OSError) as error:
         return Made(plan.recording, None, str(error), static)
-    return Made(plan.recording, made, static=static)
+    return Made(plan.recording, made, static=static, note=plan.note)
 
 
 def _part_of(progress, number: int, count: int, name: str):

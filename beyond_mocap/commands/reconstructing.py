@@ -203,7 +203,7 @@ def _kept(made, options) -> dict:
     except InputError as error:  # of this clip alone
         notes = [f"not added: {error}"]
     return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": made.made.model.subject,
-            "line": "; ".join([f"{name}: {summary(made.made)}", *notes])}  # fmt: skip
+            "line": "; ".join([f"{name}: {summary(made.made)}", *filter(None, [made.note]), *notes])}  # fmt: skip
 
 
 def _write_overview(rows, options, told: Told) -> None:

@@ -170,6 +170,19 @@ def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, mad
     assert status == 2 and "words already" in error[0] and not (tmp_path / "p.bvh").exists()
 
 
+def test_a_trial_of_a_folder_goes_without_somebody_elses_static(run, tmp_path, known):
+    trials, out = tmp_path / "trials", tmp_path / "out"
+    trials.mkdir()
+    few = known.trial.frames(0, 40)
+    write_trc(known.static, trials / "static.trc")
+    write_trc(few, trials / "own.trc")
+    write_trc(few.with_positions(few.positions * 1.15), trials / "taller.trc")
+    assert run(trials, "--out", out)[0] == 0
+    rows = {row["trial"]: row for row in json.loads((out / "trials.json").read_text())["trials"]}
+    assert rows["own"]["static"] == "static" and "goes without" not in rows["own"]["line"]
+    assert rows["taller"]["static"] is None and "goes without a static" in rows["taller"]["line"] and rows["taller"]["bvh"]
+
+
 def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
     trials = tmp_path / "trials"
     for session in ("monday", "tuesday"):
