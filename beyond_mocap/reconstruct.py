@@ -67,7 +67,7 @@ class Reconstruction:
     motion: at the trial's rate, where the markers are. floor: height in metres of the floor that its feet stood on when
     it was recorded; motion and trial are moved by that where `grounded`. model: whose skeleton it has. trial: the
     markers under the set's names, cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters.
-    cleaned: what was mended. release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`, or None. seconds:
+    cleaned: what was mended. release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`. seconds:
     of each step. warnings: lines.
     """
 
@@ -146,7 +146,7 @@ def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Roa
         down = floor if settings.floor else 0.0
         motion, tidy, seen = moved_down(motion, down), _lowered(tidy, down), _lowered(seen, down)
     with road.step("release", 1.0):
-        found = _release(seen, motion, marker_set, settings, road)
+        found = _release(seen, motion, model, marker_set, settings, road)
     return Reconstruction(
         motion, model, tidy, trial, solved, cleaned, found, held, floor, settings.floor, road.seconds,
         tuple(road.warnings),
@@ -286,13 +286,13 @@ def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
 def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _Road, cancelled) -> Solved:
     """The pose; where a ball is to be held, once without it to find out how it is, and again with it."""
     how = PoseSettings(weights=settings.weights, limits=settings.limits, smoothness=settings.smoothness)
-    label = _ball_label(marker_set, trial) if settings.hold_ball else None
+    label = _ball_label(model, marker_set, trial) if settings.hold_ball else None
     solved = solve(model, trial, how, road.inner(0.45, 0.85 if label is None else 0.65), cancelled)
     if label is None:
         if settings.hold_ball:
             road.tell(["no marker on a ball: nothing is held"])
         return solved
-    found = _release(trial, solved.motion, marker_set, replace(settings, release="auto"), road)
+    found = _release(trial, solved.motion, model, marker_set, replace(settings, release="auto"), road)
     if found is None or found.how != "ball":
         road.tell([f"{label} does not tell how the ball is held: it takes no part in the pose"])
         return solved
@@ -318,9 +318,9 @@ def _far_off(solved: Solved, model: MarkerModel) -> list[str]:
     return [f"{off}: model, static or marker set may be another's, or labels exchanged"]
 
 
-def _ball_label(marker_set, trial: MarkerTrial) -> str | None:
-    """The first marker of the set that lies on a ball and is in the trial."""
-    labels = () if marker_set is None else marker_set.ball
+def _ball_label(model: MarkerModel, marker_set, trial: MarkerTrial) -> str | None:
+    """The first marker of the model or its set that lies on a ball and is in the trial."""
+    labels = ((model.ball.label,) if model.ball else ()) + (() if marker_set is None else marker_set.ball)
     return next((label for label in labels if label in trial.labels), None)
 
 
@@ -385,18 +385,22 @@ def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
     return trial.with_positions(trial.positions - [0.0, 0.0, by]) if by else trial
 
 
-def _release(trial, motion, marker_set, settings: ReconstructSettings, road: _Road):
-    """When and how the ball left the hand, where that is asked for."""
+def _release(trial, motion, model: MarkerModel, marker_set, settings: ReconstructSettings, road: _Road):
+    """When and how the ball left the hand, where that is asked for; it lies there as the model says, if it says so."""
     from .ball.released.radar import radar_speed
 
-    label = _ball_label(marker_set, trial)
+    label = _ball_label(model, marker_set, trial)
     told = label is not None or radar_speed(trial.name) is not None
     if settings.release == "no" or (settings.release == "auto" and not told):
         return None
     from .release import ReleaseSettings, release
 
+    asked = ReleaseSettings(label, settings.radius, ball=settings.ball)
+    if model.ball is not None and model.ball.label == label:
+        side = "left" if model.skeleton.names[model.ball.joint].startswith("Left") else "right"
+        asked = replace(asked, radius=asked.radius or model.ball.radius, hand=side, centre=model.ball.centre)
     try:
-        return release(trial, motion, ReleaseSettings(label, settings.radius, ball=settings.ball))
+        return release(trial, motion, asked)
     except InputError as error:
         road.tell([f"no release found: {error}"])
         return None

@@ -86,5 +86,6 @@ line"""
         from ..beyond_mocap.files.marker_set_text import marker_set_text
 
         path = Path(bpy.path.abspath(self.filepath))
-        atomic_write(path, marker_set_text(sets.of_cloud(cloud_meant(context), "_".join(path.stem.split()) or sets.OWN)))
+        name = "_".join(path.stem.split()) or sets.OWN
+        atomic_write(path, marker_set_text(sets.of_cloud(cloud_meant(context), name)))
         self.report({"INFO"}, f"written to {path}")

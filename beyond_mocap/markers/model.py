@@ -62,8 +62,9 @@ class MarkerModel:
     stiffness: (J,) metres per radian, a pull towards the rest pose: the cost of a pose is the sum over the markers of
     weight x distance^2, plus that over the joints of (stiffness x angle)^2. Zero for joints that markers tell; small
     for spine and neck, whose joints share out evenly what only their ends show (§5.3.1). centre_sigma: (J,) m, how
-    uncertain the centre of the joint is. ball: the ball's marker, if there is one. subject, sessions, set_name: whose
-    model it is, out of which recordings and of which marker set. notes: lines for people on how it was found.
+    uncertain the centre of the joint is. ball: how a ball with a marker lies in the hand, where that is known. subject,
+    sessions, set_name: whose model it is, out of which recordings and of which marker set. notes: lines for people on
+    how it was found.
     """
 
     skeleton: Skeleton

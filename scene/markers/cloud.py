@@ -132,7 +132,8 @@ def _player(cloud: bpy.types.Object) -> bpy.types.Modifier:
     """The modifier that plays a cloud. InputError where it is gone."""
     modifier = nodes.modifier_of(cloud)
     if modifier is None:
-        raise InputError(cloud.name, "nothing that plays it", f"the modifier {nodes.NAME}", "import the recording again")
+        wanted, step = f"the modifier {nodes.NAME}", "import the recording again"
+        raise InputError(cloud.name, "nothing that plays it", wanted, step)
     return modifier
 
 

@@ -19,7 +19,8 @@ FILTERS = (
     ("kalman", "Kalman", "Smoothing by how a body moves, forwards and backwards"),
     ("none", "None", "As it was solved"),
 )
-THROWN = tuple((name, name.capitalize(), f"A {name}") for name in ("baseball", "tennis", "handball", "volleyball", "football"))
+_THROWN = ("baseball", "tennis", "handball", "volleyball", "football")
+THROWN = tuple((name, name.capitalize(), f"A {name}") for name in _THROWN)
 HANDS = (
     ("AUTO", "Found", "The hand that throws"), ("left", "Left", "The left hand"), ("right", "Right", "The right hand"),
 )  # fmt: skip
@@ -157,7 +158,7 @@ class BeyondMocapMarkers(bpy.types.PropertyGroup):
     )
     floor: BoolProperty(name="Floor at 0", description="Move the body so that its lowest foot stands at height 0")
     dressed: BoolProperty(name="Make Body", default=True, description="Give the armature a simple body")
-    add: BoolProperty(name="Add to Library", description="Write the motion with its words into the library's folder too")
+    add: BoolProperty(name="Add to Library", description="Write the motion with its words into the library's folder")
     words: StringProperty(name="Words", default="throwb", description="The words of the clip that is added")
     hand: EnumProperty(name="Hand", items=HANDS, default="AUTO", description="The hand that throws")
     thrown: EnumProperty(name="Ball", items=THROWN, default="baseball", description="What is thrown")

@@ -131,4 +131,5 @@ def add(order: Order, made: "Reconstruction") -> list[str]:
     from ...beyond_mocap.library.add_clip import add_clip
 
     throw = made.release is not None and any(word.startswith("throw") for word in order.words)
-    return add_clip(order.add.parent, order.add.stem, made.on_floor(), order.words, made.release.time if throw else None)
+    key = made.release.time if throw else None
+    return add_clip(order.add.parent, order.add.stem, made.on_floor(), order.words, key)

@@ -10,9 +10,11 @@ from beyond_mocap.__main__ import main
 from beyond_mocap.errors import Cancelled, InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.files.trc_write import write_trc
-from beyond_mocap.markers.planted import planted
+from beyond_mocap.markers.model import BallMarker
+from beyond_mocap.markers.planted import PlantedBall, planted
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.throws import throw
 from beyond_mocap.reconstruct import ReconstructSettings, reconstruct
 
 FPS = 100.0
@@ -170,6 +172,18 @@ def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, mad
     assert status == 2 and "words already" in error[0] and not (tmp_path / "p.bvh").exists()
 
 
+def test_how_a_ball_lies_in_the_hand_may_be_known():
+    made = throw((18.0, 0.0, 1.0), 24.0, fps=120.0)
+    thrown = planted(made.motion, "driveline", seed=2, softness=0.2, ball=PlantedBall(made.release))
+    first = reconstruct(thrown.trial, thrown.static, settings=ReconstructSettings(plant=False))
+    hand, grip = first.model.skeleton.index("RightHand"), tuple(thrown.ball.grip)
+    model = replace(first.model, ball=BallMarker(first.trial.labels[-1], hand, grip, 0.0366))
+    again = reconstruct(thrown.trial, model=model, settings=ReconstructSettings(plant=False, hold_ball=True))
+    assert first.release.how == again.release.how == "ball" and not np.allclose(first.release.centre, grip, atol=1e-4)
+    assert np.allclose(again.release.centre, grip) and again.release.radius == 0.0366
+    assert abs(again.release.speed / thrown.ball.speed - 1.0) < 0.02
+
+
 def test_a_trial_of_a_folder_goes_without_somebody_elses_static(run, tmp_path, known):
     trials, out = tmp_path / "trials", tmp_path / "out"
     trials.mkdir()
@@ -180,7 +194,8 @@ def test_a_trial_of_a_folder_goes_without_somebody_elses_static(run, tmp_path, k
     assert run(trials, "--out", out)[0] == 0
     rows = {row["trial"]: row for row in json.loads((out / "trials.json").read_text())["trials"]}
     assert rows["own"]["static"] == "static" and "goes without" not in rows["own"]["line"]
-    assert rows["taller"]["static"] is None and "goes without a static" in rows["taller"]["line"] and rows["taller"]["bvh"]
+    taller = rows["taller"]
+    assert taller["static"] is None and "goes without a static" in taller["line"] and taller["bvh"]
 
 
 def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
