@@ -46,6 +46,8 @@ set know their segments at once"""
         trials = [(path, read_markers(path, *how)) for path in paths]
         for _, trial in trials:
             cloud.check(trial)
+        if context.mode != "OBJECT":  # what is edited would stay so beside what is then active
+            bpy.ops.object.mode_set(mode="OBJECT")
         made = [self.add(context, path, trial) for path, trial in trials]
         for other in context.selected_objects:
             other.select_set(False)

@@ -47,13 +47,24 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
     kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     trial = clouds.read(cloud, scene)
     clouds.played_rate(cloud, scene)
-    static = kept.static if not kept.use_model and is_cloud(kept.static) and kept.static != cloud else None
+    static = _static_of(cloud, scene)
     words = tuple(chosen.words.split()) if chosen.add else ()
     return Order(
         cloud.name, trial, static and clouds.read(static, scene),
         models.of_cloud(cloud) if kept.use_model else None, settings_of(cloud, chosen, words),
         clip_place(scene, cloud.name) if chosen.add else None, words,
     )
+
+
+def _static_of(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The cloud that stands for its model. InputError where it was deleted: the field keeps what is in no scene."""
+    kept = cloud.beyond_mocap_cloud
+    if kept.use_model or not is_cloud(kept.static) or kept.static == cloud:
+        return None
+    if scene.objects.get(kept.static.name) != kept.static:
+        found, step = f"its static trial {kept.static.name} is gone from the scene", "choose another, or clear the field"
+        raise InputError(cloud.name, found, "a cloud that is there", step)
+    return kept.static
 
 
 def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) -> "ReconstructSettings":

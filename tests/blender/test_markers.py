@@ -279,6 +279,25 @@ def test_the_active_cloud_becomes_the_others_static_trial(walk):
     assert trial.beyond_mocap_cloud.static == still and still.beyond_mocap_cloud.static is None
 
 
+def test_a_static_trial_that_was_deleted_is_not_used(walk):
+    imported(walk), imported(walk.with_name("static.trc"))
+    bpy.ops.beyond_mocap.set_static()
+    trial, still = bpy.data.objects["walk"], bpy.data.objects["static"]
+    for collection in still.users_collection:
+        collection.objects.unlink(still)
+    bpy.context.view_layer.objects.active = trial
+    with pytest.raises(RuntimeError, match="static trial static is gone"):
+        bpy.ops.beyond_mocap.reconstruct_markers()
+
+
+def test_importing_leaves_edit_mode(walk):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.object.mode_set(mode="EDIT")
+    thing = imported(walk)
+    assert bpy.context.mode == "OBJECT" and bpy.context.object == thing
+    assert all(one.mode == "OBJECT" for one in bpy.data.objects)
+
+
 def test_a_file_that_is_none_is_refused_and_nothing_comes(tmp_path):
     path = tmp_path / "broken.c3d"
     path.write_bytes(b"\x02P" + bytes(600))
