@@ -245,13 +245,18 @@ def _canvas(rows: int, heights: Sequence[float]):
 
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.1 * rows), dpi=DPI, layout="constrained")
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})[:, 0]
+    plain(axes)
+    return figure, axes
+
+
+def plain(axes) -> None:
+    """The look of all pictures: a faint grid behind, no frame above and on the right, small figures."""
     for ax in axes:
         ax.grid(color="#e6e6e6", lw=0.6)
         ax.set_axisbelow(True)
         ax.spines[["top", "right"]].set_visible(False)
         ax.tick_params(labelsize=8)
         ax.yaxis.label.set_fontsize(8)
-    return figure, axes
 
 
 def _time_axis(ax, view: View) -> None:

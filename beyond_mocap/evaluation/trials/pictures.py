@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..plots import plain
 from .impacts import dominant_sides
 from .results import TrialResult
 
@@ -155,12 +156,7 @@ def _canvas(rows: int, columns: int, height: float):
 
     figure = Figure(figsize=(_WIDTH, height * rows), dpi=_DPI, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for ax in axes:
-        ax.grid(color="#e6e6e6", lw=0.6)
-        ax.set_axisbelow(True)
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(labelsize=8)
-        ax.yaxis.label.set_fontsize(8)
+    plain(axes)
     return figure, axes
 
 
