@@ -97,11 +97,11 @@ def press_all(wanted=None, then=None):
 
 
 def press_button(operator, editor="VIEW_3D"):
-    """Find the operator's button in our tab and click it."""
+    """Find the operator's button in our tab and click it; `operator` may go on with its first arguments."""
     area = window.area(editor)
     yield from window.open_tab(area, TAB)
     region = window.sidebar(area)
-    wanted = f"bpy.ops.beyond_mocap.{operator}("
+    wanted = f"bpy.ops.beyond_mocap.{operator}" + "(" * ("(" not in operator)
     place = yield from window.find(area, region, lambda call: call.startswith(wanted), window.command_under_pointer)
     yield from window.click(*place)
     yield 0.3
