@@ -6,12 +6,13 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest test test-core test-blender test-oldest demo bench extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training test test-core test-blender test-oldest test-training demo bench extension extension-all window-test window-bench \
   pictures clean
 
 help:
 	@echo 'make venv           .venv with Blender as a Python module and all that the tests need'
-	@echo 'make test           all tests but the window ones: the core, then Blender 5.0 (or 5.2) and Blender 4.5'
+	@echo 'make training       .venv-training with what trains the networks of throws and kicks (jax, no Blender)'
+	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
 	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
@@ -27,13 +28,19 @@ venv:
 venv-oldest:
 	@packaging/venv.sh oldest
 
+training:
+	@packaging/venv.sh training
+
 # The two Blenders take one core each, side by side; what the older one says is shown when both are done.
-test: test-core venv venv-oldest
+test: test-core test-training venv venv-oldest
 	@mkdir -p build; $(MAKE) -s test-oldest >build/test-oldest.txt 2>&1 & oldest=$$!; \
 	status=0; $(MAKE) -s test-blender || status=1; wait $$oldest || status=1; cat build/test-oldest.txt; exit $$status
 
 test-core: venv
 	.venv/bin/python $(PYTEST) -n 2 tests/core tests/packaging
+
+test-training: training
+	.venv-training/bin/python $(PYTEST) tests/training
 
 test-blender: venv
 	.venv/bin/python $(PYTEST) tests/blender
@@ -63,4 +70,4 @@ pictures: extension
 	@tests/gui/run $(REAL_BLENDER) tests/gui/pictures.py
 
 clean:
-	rm -rf build .venv .venv-4.5
+	rm -rf build .venv .venv-4.5 .venv-training

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Makes a virtual environment with Blender as a Python module, and everything the tests need.
+# Makes a virtual environment: with Blender as a Python module and everything the tests need, or what trains networks.
 #
-#   packaging/venv.sh main     .venv      bpy 5.0.1 on Python 3.11, bpy 5.2.2 on Python 3.13
-#   packaging/venv.sh oldest   .venv-4.5  bpy 4.5.15 on Python 3.11; says so and makes none without that Python
+#   packaging/venv.sh main      .venv           bpy 5.0.1 on Python 3.11, bpy 5.2.2 on Python 3.13
+#   packaging/venv.sh oldest    .venv-4.5       bpy 4.5.15 on Python 3.11; says so and makes none without that Python
+#   packaging/venv.sh training  .venv-training  jax and optax on Python 3.11, 3.12 or 3.13, without bpy
 #
 # The environments live outside the clone, in a cache named by their requirements, so that a second
 # clone (or a clean one) gets them in a second; the clone holds links. PYTHON=... chooses an interpreter.
@@ -28,17 +29,19 @@ find_python() {  # the first interpreter that runs and is one of the wanted vers
 }
 
 probe() {  # prints nothing where the environment works, else the reason
-  "$1/bin/python" - 2>&1 <<'PY' | tail -1
-import bpy
+  "$1/bin/python" - $modules 2>&1 <<'PY' | tail -1
+import sys
+from importlib import import_module
 from importlib.util import find_spec
-for name in ("numpy", "scipy", "sklearn", "kloppy", "c3d", "pytest", "xdist", "hypothesis", "matplotlib"):
+import_module(sys.argv[1])
+for name in sys.argv[2:]:
     if find_spec(name) is None:
         raise SystemExit(f"{name} is missing")
 PY
 }
 
 build() {  # PYTHON REQUIREMENTS FOLDER
-  echo "venv: making $3 (downloads Blender as a module, about 350 MB)"
+  echo "venv: making $3 (downloads $download)"
   rm -rf "$3"
   "$1" -m venv "$3" >&2 || { rm -rf "$3"; fail "$1 cannot make a virtual environment; on Debian: apt-get install python3-venv"; }
   "$3/bin/python" -m pip install --quiet --disable-pip-version-check -r "$2" || { rm -rf "$3"; fail "pip could not install $2"; }
@@ -56,17 +59,22 @@ case ${1:-} in
   main) link=$clone/.venv; python=$(find_python 3.11 3.13) || fail "needs Python 3.11 or 3.13 (PYTHON=... names one)" ;;
   oldest) link=$clone/.venv-4.5
     python=$(find_python 3.11) || { rm -f "$link"; echo "venv: no Python 3.11 here: NOT tested under Blender 4.5"; exit 0; } ;;
-  *) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 2 ;;
+  training) link=$clone/.venv-training
+    python=$(find_python 3.11 3.12 3.13) || fail "training needs Python 3.11, 3.12 or 3.13 (PYTHON=... names one)" ;;
+  *) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac
+modules="bpy numpy scipy sklearn kloppy c3d pytest xdist hypothesis matplotlib"  # the first is imported, to see it works
+download="Blender as a module, about 350 MB"
 case $1-$(version_of "$python") in
-  main-3.11) blender=5.0 ;;
-  main-3.13) blender=5.2 ;;
-  oldest-3.11) blender=4.5 ;;
+  main-3.11) kind=blender-5.0 ;;
+  main-3.13) kind=blender-5.2 ;;
+  oldest-3.11) kind=blender-4.5 ;;
+  training-*) kind=training; modules="jax numpy scipy sklearn optax c3d pytest hypothesis"; download="jax, about 150 MB" ;;
 esac
-requirements=$here/requirements/blender-$blender.txt
+requirements=$here/requirements/$kind.txt
 interpreter=$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')
 key=$({ cat "$here/requirements/core.txt" "$requirements"; echo "$interpreter"; } | sha256sum | cut -c1-12)
-folder=$cache/venv-$blender-$key
+folder=$cache/venv-${kind#blender-}-$key
 
 mkdir -p "$cache"
 exec 9>"$folder.lock"

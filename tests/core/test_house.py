@@ -43,7 +43,7 @@ LAZY = {
     "library": ["sklearn", "threadpoolctl"],
     "files": ["kloppy", "c3d"],
     "evaluation": ["matplotlib"],
-    "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn", "threadpoolctl"],
+    "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn", "threadpoolctl", "jax", "optax", "training"],
 }
 # A room of the extension -> what it may import of ours.
 EXTENSION = {
@@ -140,6 +140,14 @@ def extension_complaint(path, imported):
     return f"{room} may not import this package"
 
 
+def training_complaint(path, imported):
+    """Why this import is not allowed in this file of what trains networks, or None."""
+    package = imported.name.split(".")[0]
+    if package in {"training", CORE} or package in sys.stdlib_module_names:
+        return None
+    return None if package in {"numpy", "scipy", "jax", "optax"} else "training may not import this package"
+
+
 def complaints(judge, path, text):
     """One line for each import of a file that the judge does not allow."""
     judged = [(imported, judge(path, imported)) for imported in imports_of(path, text)]
@@ -157,6 +165,11 @@ def test_core_rooms_import_only_what_they_may():
 
 def test_blender_rooms_import_only_what_they_may():
     assert all_complaints(extension_complaint, *EXTENSION) == []
+
+
+def test_training_imports_only_what_it_may():
+    assert all_complaints(training_complaint, "training") == []
+    assert complaints(training_complaint, pathlib.Path("training/a.py"), "import sklearn")
 
 
 @pytest.mark.parametrize("path, text", [
@@ -195,14 +208,14 @@ def test_a_planted_offence_in_the_extension_is_seen(path, text):
 
 
 def test_there_are_no_drawers():
-    names = {part for path in sources(CORE, *EXTENSION, "tests", "packaging", "sample_blend", "benchmarks")
+    names = {part for path in sources(CORE, *EXTENSION, "training", "tests", "packaging", "sample_blend", "benchmarks")
              for part in (*path.parts[:-1], path.stem)}
     assert names & DRAWERS == set()
 
 
 def test_nothing_is_unpickled_or_evaluated():
     offences = []
-    for path in sources(CORE, *EXTENSION, "packaging", "sample_blend", "benchmarks"):
+    for path in sources(CORE, *EXTENSION, "training", "packaging", "sample_blend", "benchmarks"):
         text = (TOP / path).read_text("utf-8")
         offences += [i.where for i in imports_of(path, text) if i.name.split(".")[0] in FORBIDDEN]
         for node in ast.walk(ast.parse(text)):

@@ -1,0 +1,25 @@
+"""The environment that trains: jax and optax there, Blender not, and one line where they are missing."""
+
+import sys
+from importlib.util import find_spec
+
+import pytest
+
+from beyond_mocap.__main__ import main
+
+
+def test_jax_is_there_and_blender_is_not():
+    import jax.numpy as jnp
+    import optax
+
+    assert float(jnp.sum(jnp.arange(4))) == 6.0 and optax.adam(1e-3)
+    assert find_spec("bpy") is None
+
+
+@pytest.mark.parametrize("missing", ["jax", "optax", "training"])
+def test_without_it_one_line_says_what_to_do(missing, monkeypatch, tmp_path, capsys):
+    monkeypatch.setitem(sys.modules, missing, None)
+    assert main(["throw", "train", str(tmp_path), "--out", str(tmp_path / "w.npz")]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1 and "make training" in said[0]
+    assert list(tmp_path.iterdir()) == []
