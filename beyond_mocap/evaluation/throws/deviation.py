@@ -1,0 +1,21 @@
+"""How far generated hands and feet are from their wanted trajectories (Fredriksson §4.5 eq. 4.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+def deviations(generated: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(4,) m of one motion: mean distance over its frames; both (T, 4, 3) m in one frame of reference, the effectors
+    in the order left hand, right hand, left foot, right foot."""
+    return np.linalg.norm(np.asarray(generated, float) - np.asarray(wanted, float), axis=-1).mean(axis=0)
+
+
+def mean_deviation(generated: Sequence[np.ndarray], wanted: Sequence[np.ndarray]) -> np.ndarray:
+    """(4,) m over many motions, each (T, 4, 3) with a T of its own.
+
+    Eq. 4.1 divides by one n_f for all sequences; where lengths differ, every motion counts alike here.
+    """
+    return np.mean([deviations(*pair) for pair in zip(generated, wanted, strict=True)], axis=0)

@@ -1,0 +1,140 @@
+"""Throws measured and compared: his p-values come back from his own tables, planted deviations and impacts as planted."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.ball.physics import BASEBALL, PAPER
+from beyond_mocap.evaluation.throws import fredriksson
+from beyond_mocap.evaluation.throws.compare import compared, detectable, judged, kept, sidak
+from beyond_mocap.evaluation.throws.deviation import deviations, mean_deviation
+from beyond_mocap.evaluation.throws.impact import held_ball, impact, let_go
+from beyond_mocap.evaluation.throws.subjects import comparisons, gathered
+from beyond_mocap.evaluation.throws.tables import figure_table, test_table as rows_of_tests, verdicts
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.throws import throw
+
+
+@pytest.mark.parametrize("old, new, printed", fredriksson.EXPERIMENTS.values(), ids=fredriksson.EXPERIMENTS)
+def test_his_p_values_come_back_from_his_tables(old, new, printed):
+    found = comparisons(new, old)
+    for k, one in enumerate(found):
+        slack = 0.02 if k == 4 else 2e-4  # the impact of subject 3 in table 8.4 is not that of 8.1 and 8.2
+        assert one.mean == pytest.approx(printed.mean[k], abs=slack)
+        assert one.spread == pytest.approx(printed.spread[k], abs=slack)
+        assert one.test == "t"
+        if np.isfinite(printed.p[k]):
+            assert one.p == pytest.approx(printed.p[k], rel=0.02, abs=6e-5)
+            assert one.rejected == (printed.p[k] < 0.025)
+
+
+def test_his_p_values_come_back_from_his_differences_but_for_the_left_leg_of_8_7():
+    for printed, wrong in ((fredriksson.FIRST, ()), (fredriksson.SECOND, (2,))):
+        for k in range(5):
+            one = judged(printed.differences[:, k])
+            if np.isfinite(printed.p[k]):
+                assert (one.p == pytest.approx(printed.p[k], abs=1.1e-4)) == (k not in wrong)
+
+
+def test_where_his_tables_disagree_is_told():
+    lines = fredriksson.disagreements()
+    assert len(lines) == 8
+    assert "tables 8.3, 8.4, subject 3, impact: printed -1.7758, by the figures -1.7940" in lines
+    assert sum("8.7" in line and "leg" in line for line in lines) == 7
+
+
+def test_planted_differences_are_found_and_none_where_there_are_none():
+    rng = np.random.default_rng(3)
+    old = rng.normal(0.1, 0.02, 12)
+    better = compared(old - 0.01 + rng.normal(0.0, 0.004, 12), old)
+    assert better.rejected and better.test == "t" and better.mean < 0.0
+    assert not compared(old + 0.01 + rng.normal(0.0, 0.004, 12), old).rejected
+    assert np.isnan(compared(old, old).p)
+    chances = [judged(rng.normal(0.0, 1.0, 4)).t_p < 0.025 for _ in range(400)]
+    assert 0.005 < np.mean(chances) < 0.05
+
+
+def test_ranks_stand_in_where_normality_is_rejected():
+    off = -np.array([1.0, 1.1, 0.9, 1.05, 0.95, 1.0, 1.02, 40.0])
+    one = judged(off)
+    assert one.normal < 0.05 and one.test == "Wilcoxon" and one.p == one.wilcoxon_p == one.least_p == 2.0**-8
+    assert one.rejected and not np.isclose(one.t_p, one.p)
+    few = judged(np.array([-1.0, -1.0001, -1.0002, -9.0]))
+    assert few.test == "Wilcoxon" and few.least_p == 0.0625 and not few.rejected
+
+
+def test_pairs_without_figures_are_left_out():
+    one = compared(np.array([1.0, np.nan, 3.0]), np.array([2.0, 2.0, 5.0]))
+    assert one.differences.tolist() == [-1.0, -2.0] and np.isnan(one.normal)
+    assert np.isnan(compared(np.array([np.nan]), np.array([1.0])).mean)
+
+
+def test_levels_and_power():
+    assert sidak() == pytest.approx(0.0253, abs=5e-5)
+    normal, student = detectable(4)
+    assert normal == pytest.approx(1.62, abs=0.005)  # his figure: by the normal distribution
+    assert student == pytest.approx(2.57, abs=0.1)
+
+
+def test_throws_beyond_three_standard_deviations_are_left_out():
+    values = np.array([*np.full(30, 0.5) + np.linspace(0.0, 0.1, 30), 9.0, np.nan])
+    assert kept(values).tolist() == [True] * 30 + [False, False]
+    assert kept(np.array([0.0] * 9 + [100.0])).all()  # ten can have none beyond three
+    assert not kept(np.array([np.nan])).any()
+
+
+def test_planted_deviations():
+    wanted = np.random.default_rng(0).normal(size=(20, 4, 3))
+    off = np.array([0.01, 0.02, 0.03, 0.04])[:, None] * [0.6, 0.0, 0.8]
+    assert deviations(wanted + off, wanted) == pytest.approx([0.01, 0.02, 0.03, 0.04])
+    two = mean_deviation([wanted + off, wanted[:5]], [wanted, wanted[:5]])  # each motion counts alike
+    assert two == pytest.approx([0.005, 0.01, 0.015, 0.02])
+
+
+def test_a_ball_is_let_go_with_the_velocity_of_its_way():
+    times = np.arange(12) / 30.0
+    ways = np.stack([0.1 + 2.0 * times + 30.0 * times**3, times**2, 1.0 - times], axis=-1)  # a cubic comes back exactly
+    for frame in (0.0, 4.3, 5.0, 10.9, 11.0):
+        place, velocity = let_go(ways, frame, 30.0)
+        t = frame / 30.0
+        assert place == pytest.approx([0.1 + 2.0 * t + 30.0 * t**3, t * t, 1.0 - t])
+        assert velocity == pytest.approx([2.0 + 90.0 * t * t, 2.0 * t, -1.0])
+
+
+def test_impact_is_where_the_plane_is_crossed_or_the_ground_met():
+    vacuum = type(PAPER)("vacuum", 0.04, 0.1)
+    place = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 2.0], [1.0, 1.0, 1.8]])
+    velocity = np.array([[20.0, 0.0, 1.0], [2.0, 0.5, 0.0], [0.0, 15.0, 2.0]])
+    target = np.array([[4.0, 0.0, 1.0], [4.0, 0.0, 1.0], [1.0, 5.0, 9.0]])
+    found = impact(place, velocity, target, vacuum)
+    assert found[0] == pytest.approx([4.0, 0.0, 2.0 + 0.2 - 0.5 * 9.8 * 0.04], abs=2e-4)
+    fall = np.sqrt(2.0 * 1.96 / 9.8)
+    assert found[1] == pytest.approx([2.0 * fall, 0.5 * fall, 0.04], abs=2e-4)
+    assert found[2] == pytest.approx([1.0, 5.0, 1.8 + 2.0 * 4 / 15 - 4.9 * (4 / 15) ** 2], abs=2e-4)
+
+
+def test_a_made_throw_hits_what_it_was_aimed_at():
+    made = throw((4.0, 0.3, 1.2), 16.0, fps=240.0)
+    joint = identify(made.motion.skeleton).right.hand
+    places, turns = forward_kinematics(made.motion)
+    ball = held_ball(places[:, joint], turns[:, joint], made.grip)
+    place, velocity = let_go(ball, made.release * 240.0, 240.0)
+    vacuum = type(BASEBALL)("vacuum", 0.0366, 0.145, 9.81)
+    assert np.linalg.norm(impact(place, velocity, (4.0, 0.3, 1.2), vacuum)[0] - (4.0, 0.3, 1.2)) < 0.03
+
+
+def test_a_ball_in_a_turned_hand():
+    turn = quaternion.about_up(np.array([0.0, np.pi / 2]))
+    assert held_ball(np.zeros((2, 3)), turn, [0.1, 0.0, 0.0]) == pytest.approx(np.array([[0.1, 0, 0], [0, 0.1, 0]]))
+
+
+def test_tables_are_written():
+    rng = np.random.default_rng(1)
+    rows = [(name, rng.uniform(0.02, 0.05, (20, 4)), np.append(rng.uniform(0.5, 1.0, 19), 50.0)) for name in "abcd"]
+    ours = gathered("ours", rows)
+    worse = gathered("worse", [(name, d + rng.uniform(0.01, 0.03), np.full(20, np.nan)) for name, d, _ in rows])
+    assert ours.culled.tolist() == [1] * 4 and np.all(ours.impact < 1.0) and np.isnan(worse.impact).all()
+    text = "\n".join(figure_table(ours, fredriksson.HIERARCHY) + rows_of_tests(ours, worse, fredriksson.SECOND))
+    assert "| his 1 | 0.0525 |" in text and "| his p | 0.0064 |" in text and "1 of 20" in text
+    assert "better at 0.025 in none" not in verdicts(ours, worse)[0]
