@@ -1,0 +1,101 @@
+"""Two-bone inverse kinematics as one functional step: with numpy for use, with jax as a layer inside the training.
+
+The knee or elbow bends or stretches until the limb has the length that is asked for, then the whole limb turns to the
+target by the shortest arc (Fredriksson §3.3.1, §7.7.3). `polish.reach` does the same over all frames of a finished
+motion; here one frame follows another, nothing may look ahead, and every step must have a derivative."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_NEXT = np.array([1, 2, 0])
+_STRAIGHT = 0.03  # weight of the given hinge against the sine of the bend that the limb shows itself
+_TINY = 1e-12
+
+
+def toward(predicted, wanted, share):
+    """The point that is reached for, (..., 3) m: between what was predicted and what is wanted (..., 3), at `share` of
+    the way (§7.7.3: a linearly interpolated point, so that joints are not over-corrected)."""
+    return predicted + share * (wanted - predicted)
+
+
+def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
+    """World turns that bring a limb's end joint to `target`.
+
+    top, middle, end, target: (..., 3) metres, world. hinge: (..., 3) unit, world, about which the middle joint bends
+    (upper bone x lower bone of a bent limb); it only counts where the limb is nearly straight. xp: numpy or jax.numpy.
+    soft: metres below full length from where the limb eases (`motion.limb.soft_distance`).
+
+    Returns turn_upper, turn_lower (..., 3, 3), to be put left of the bones' world rotations, and the end joint's new
+    place (..., 3). Bones keep their lengths; a target out of reach is neared along its line, one too close to `top` kept
+    away by the difference of the bones.
+    """
+    upper, lower = middle - top, end - middle
+    long_upper, long_lower = _length(upper, xp), _length(lower, xp)
+    along, down = upper / long_upper, lower / long_lower
+    axis = _cross(along, down) + _STRAIGHT * hinge
+    axis = _unit(axis - _dot(axis, along) * along, xp)
+    way = target - top
+    asked = _length(way, xp)
+    reach = _eased(asked, long_upper, long_lower, soft, xp)
+    cosine = (reach * reach - long_upper * long_upper - long_lower * long_lower) / (2.0 * long_upper * long_lower)
+    cosine = xp.clip(cosine, -1.0 + 1e-9, 1.0 - 1e-9)
+    bent = cosine * along + xp.sqrt(1.0 - cosine * cosine) * _cross(axis, along)
+    turn_bend = _frame(bent, axis) @ _swapped(_frame(down, _unit(axis - _dot(axis, down) * down, xp)))
+    swing = _shortest(_unit(long_upper * along + long_lower * bent, xp), way / asked, xp)
+    return swing, swing @ turn_bend, top + way * (reach / asked)
+
+
+def _eased(asked, upper, lower, soft, xp):
+    """The reach that is played for an asked one, metres."""
+    longest = upper + lower
+    start = longest - soft
+    beyond = xp.maximum(asked - start, 0.0)
+    far = xp.where(asked > start, longest - soft * xp.exp(-beyond / soft), asked)
+    return xp.maximum(far, xp.abs(upper - lower) + 0.02 * longest)
+
+
+def _shortest(one, other, xp):
+    """Rotations (..., 3, 3) that turn unit `one` (..., 3) to unit `other` by the shortest arc."""
+    cosine = _dot(one, other)[..., None]
+    axis = _cross(one, other)
+    outer = axis[..., :, None] * axis[..., None, :] / (1.0 + cosine + 1e-9)
+    return cosine * np.eye(3) + _skew(axis, xp) + outer
+
+
+def _skew(v, xp):
+    zero = xp.zeros_like(v[..., 0])
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    return xp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape[:-1], 3, 3)
+
+
+def _frame(direction, axis):
+    """Columns: direction, axis, and what is square to both."""
+    return _columns(direction, axis, _cross(direction, axis))
+
+
+def _columns(x, y, z):
+    return x[..., :, None] * _EYE[0] + y[..., :, None] * _EYE[1] + z[..., :, None] * _EYE[2]
+
+
+_EYE = np.eye(3)
+
+
+def _swapped(m):
+    return m.swapaxes(-1, -2)
+
+
+def _cross(a, b):
+    return (a * b[..., _NEXT] - a[..., _NEXT] * b)[..., _NEXT]
+
+
+def _dot(a, b):
+    return (a * b).sum(-1)[..., None]
+
+
+def _length(v, xp):
+    return xp.sqrt((v * v).sum(-1)[..., None] + _TINY)
+
+
+def _unit(v, xp):
+    return v / _length(v, xp)

@@ -1,0 +1,161 @@
+"""How far joints turn: the range that the training data show, and hinges that do not bend backwards.
+
+A joint's range is kept about the mean of its rotations in the training data: the offset from that mean is a rotation
+vector, and each of its three components stays between the lowest and highest that was seen, widened by a margin. About
+the mean the vectors are short, also where a rig's rest pose lies far from how the joint is used, so the box has no seam.
+A network that is asked for what it has never seen can leave the range (Fredriksson §9.4: "extreme angular velocities");
+`within` brings it back.
+
+As an array of a model: (J, 3, 3), rows middle (rotation vector, rad), lowest and highest offset (rad) of each joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from ...motion import quaternion
+from ...motion.humanoid import identify
+from ...motion.skeleton import Skeleton, frozen_array
+
+FREE = 4.0
+"""Radians: offsets never get so long, so a joint with this range is free."""
+_MARGIN = np.radians(4.0)
+_SHARE = 0.08  # of the range, on either side
+_ROUNDS = 8
+_CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
+_BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
+    """Limits (J, 3, 3) of the joints whose local rotations (N, J, 4) are given; joints in `free` get none.
+
+    The ends are what the data show, widened by 4 degrees and 8 % of the range."""
+    q = np.asarray(rotations, dtype=float)
+    middle = _mean(q)
+    offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
+    low, high = offsets.min(axis=0), offsets.max(axis=0)
+    margin = _MARGIN + _SHARE * (high - low)
+    out = np.stack([quaternion.to_rotation_vector(middle), low - margin, high + margin], axis=1)
+    out[list(free), 1:] = np.array([[-FREE], [FREE]])
+    return out
+
+
+def _mean(q: np.ndarray) -> np.ndarray:
+    """The mean rotation (J, 4) of unit quaternions (N, J, 4), by steps along the mean offset (the Karcher mean)."""
+    middle = quaternion.normalized(np.sum(np.where(np.sum(q * q[:1], axis=-1, keepdims=True) < 0, -q, q), axis=0))
+    for _ in range(_ROUNDS):
+        offset = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q)).mean(axis=0)
+        middle = quaternion.multiply(middle, quaternion.from_rotation_vector(offset))
+    return quaternion.normalized(middle)
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """Which way an elbow or knee bends. joint, end: the lower bone's joint and the one that ends it. across (3,): unit,
+    in the axes of the joint's parent, about which it bends; along (3,): the lower bone's direction there when straight;
+    bone (3,): the lower bone in the joint's own axes, metres."""
+
+    joint: int
+    end: int
+    across: np.ndarray
+    along: np.ndarray
+    bone: np.ndarray
+
+
+class JointLimits:
+    """Limits ready for use. limits: (J, 3, 3) as of `learn`. InputError for another shape, or no numbers."""
+
+    def __init__(self, skeleton: Skeleton, limits: np.ndarray):
+        limits = frozen_array(limits)
+        if limits.shape != (len(skeleton), 3, 3) or not np.isfinite(limits).all():
+            raise InputError("joint limits", f"an array {limits.shape}", f"finite numbers ({len(skeleton)}, 3, 3)")
+        if np.any(limits[:, 1] > limits[:, 2]):
+            raise InputError("joint limits", "a lowest angle above the highest", "lowest, then highest")
+        self.skeleton = skeleton
+        self.middle = quaternion.to_matrix(quaternion.from_rotation_vector(limits[:, 0]))
+        self.low, self.high = limits[:, 1], limits[:, 2]
+        self.hinges = _hinges(skeleton, self.middle)
+        self._least = float(min(-self.low.max(), self.high.min()))
+
+    def offsets(self, local: np.ndarray) -> np.ndarray:
+        """Rotation vectors (..., J, 3) rad from the middle to local rotations (..., J, 3, 3)."""
+        m = self.middle.swapaxes(-1, -2) @ local
+        sine = 0.5 * (m[..., _LAST, _NEXT] - m[..., _NEXT, _LAST])
+        cosine = 0.5 * (m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2] - 1.0)
+        length = np.sqrt((sine * sine).sum(-1))
+        angle = np.arctan2(length, cosine)
+        scale = np.where(length > 1e-7, angle / np.maximum(length, 1e-7), 1.0)
+        return scale[..., None] * sine
+
+    def beyond(self, local: np.ndarray) -> np.ndarray:
+        """How far local rotations (..., J, 3, 3) lie outside, (..., J) rad: out of the box, or bent backwards."""
+        offsets = self.offsets(local)
+        out = np.linalg.norm(offsets - np.clip(offsets, self.low, self.high), axis=-1)
+        for hinge in self.hinges:
+            out[..., hinge.joint] = np.maximum(out[..., hinge.joint], np.maximum(-_BACK - bend_of(hinge, local), 0.0))
+        return out
+
+    def within(self, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Local rotations (..., J, 3, 3) brought back, and how far they were outside (..., J) rad."""
+        offsets = self.offsets(local)
+        kept = np.minimum(np.maximum(offsets, self.low), self.high)
+        over = np.abs(offsets - kept).max(-1)
+        if over.max() > 1e-9:
+            turned = self.middle @ quaternion.to_matrix(quaternion.from_rotation_vector(kept))
+            local = np.where((over > 1e-9)[..., None, None], turned, local)
+        for hinge in self.hinges:
+            back = np.maximum(-_BACK - bend_of(hinge, local), 0.0)
+            if back.max() > 1e-9:
+                local, over = _straightened(hinge, local, back), over.copy()
+                over[..., hinge.joint] = np.maximum(over[..., hinge.joint], back)
+        return local, over
+
+
+def bend_of(hinge: Hinge, local: np.ndarray) -> np.ndarray:
+    """Bend (...,) rad of an elbow or knee in local rotations (..., J, 3, 3): 0 straight, negative backwards."""
+    bone = local[..., hinge.joint, :, :] @ hinge.bone
+    forward = _cross(hinge.across, hinge.along)
+    return np.arctan2(bone @ forward, bone @ hinge.along)
+
+
+def _straightened(hinge: Hinge, local: np.ndarray, back: np.ndarray) -> np.ndarray:
+    """The rotations with the lower bone turned by `back` (...,) rad about the hinge."""
+    turn = quaternion.to_matrix(quaternion.from_rotation_vector(back[..., None] * hinge.across))
+    out = local.copy()
+    out[..., hinge.joint, :, :] = turn @ local[..., hinge.joint, :, :]
+    return out
+
+
+def _hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:
+    """Elbows and knees whose mean pose shows which way they bend. middle: (J, 3, 3) mean local rotations."""
+    body = identify(skeleton)
+    found = []
+    for limb in (body.left, body.right):
+        for upper, lower, end in ((limb.upper_arm, limb.lower_arm, limb.hand),
+                                  (limb.upper_leg, limb.lower_leg, limb.foot)):
+            if None not in (upper, lower, end):
+                found.append(_hinge(skeleton, middle, lower, end))
+    return tuple(hinge for hinge in found if hinge is not None)
+
+
+def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hinge | None:
+    """None where other joints stand between the two bones or where the mean pose is straight."""
+    if skeleton.parents[end] != lower:
+        return None
+    along = _unit(skeleton.offsets[lower])
+    across = _cross(along, _unit(middle[lower] @ skeleton.offsets[end]))
+    if np.linalg.norm(across) < np.sin(_CLEAR):
+        return None
+    return Hinge(lower, end, _unit(across), along, skeleton.offsets[end])
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return v / max(float(np.linalg.norm(v)), 1e-12)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return (a * b[..., _NEXT] - a[..., _NEXT] * b)[..., _NEXT]

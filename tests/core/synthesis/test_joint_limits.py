@@ -1,0 +1,71 @@
+"""Joint limits that are learnt, and hinges that do not bend backwards."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.adult import adult_skeleton
+from beyond_mocap.motion.throws import throw
+from beyond_mocap.synthesis.phase_network.limits import FREE, JointLimits, bend_of, learn
+
+SKELETON = adult_skeleton()
+
+
+@pytest.fixture(scope="module")
+def thrown():
+    return np.concatenate([throw((18.0, y, 1.0), fps=60.0).motion.rotations for y in (-2.0, 0.0, 2.0)])
+
+
+@pytest.fixture(scope="module")
+def limits(thrown):
+    return JointLimits(SKELETON, learn(thrown))
+
+
+def test_what_was_learnt_from_lies_within(thrown, limits):
+    local = quaternion.to_matrix(thrown)
+    kept, over = limits.within(local)
+    assert over.max() < 1e-9 and limits.beyond(local).max() < 1e-9
+    assert np.array_equal(kept, local)
+
+
+def test_a_joint_turned_too_far_comes_back_to_the_end_of_its_range(thrown, limits):
+    local = quaternion.to_matrix(thrown[:5])
+    joint = SKELETON.index("Neck")
+    far = local.copy()
+    far[:, joint] = far[:, joint] @ quaternion.to_matrix(quaternion.from_rotation_vector(np.array([0.0, 0.0, 2.0])))
+    kept, over = limits.within(far)
+    assert over[:, joint].min() > 0.3 and limits.beyond(kept).max() < 1e-6
+    others = [j for j in range(len(SKELETON)) if j != joint]
+    assert np.array_equal(kept[:, others], far[:, others]) and over[:, others].max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["LeftLeg", "RightLeg", "LeftForeArm", "RightForeArm"])
+def test_a_hinge_does_not_bend_backwards(thrown, limits, name):
+    joint = SKELETON.index(name)
+    hinge = next(h for h in limits.hinges if h.joint == joint)
+    local = quaternion.to_matrix(thrown[:1])
+    assert bend_of(hinge, local)[0] > 0.0
+    bent = quaternion.to_matrix(quaternion.from_rotation_vector(-0.5 * hinge.across))
+    local[:, joint] = bent
+    assert bend_of(hinge, local)[0] < -0.4
+    kept, over = limits.within(local)
+    assert over[0, joint] > 0.3 and bend_of(hinge, kept)[0] >= -np.radians(5.0) - 1e-9
+
+
+def test_the_root_is_free(thrown):
+    limits = learn(thrown)
+    assert np.array_equal(limits[0, 1:], [[-FREE] * 3, [FREE] * 3])
+
+
+def test_the_mean_is_found_on_both_sides_of_the_sphere():
+    q = quaternion.from_rotation_vector(np.array([[[0.0, 0.0, a]] for a in (2.6, 2.8, 3.0, 3.2, 3.4)]))
+    middle, low, high = learn(q, free=())[0]
+    assert np.allclose(np.abs(middle), [0, 0, 3.0], atol=1e-6)
+    assert high[2] < 0.6 and low[2] > -0.6
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 3, 3)), np.full((22, 3, 3), np.nan)])
+def test_limits_of_another_body_are_refused(bad):
+    with pytest.raises(InputError, match="joint limits"):
+        JointLimits(SKELETON, bad)
