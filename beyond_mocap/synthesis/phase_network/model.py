@@ -82,8 +82,8 @@ class ThrowModel:
 
     networks: by name, `settings.networks`. leg_reach: {"left": (shortest, longest), "right": ...}, metres from the top of
     the leg to the toe in the training data (eq. 7.3). examples: recorded movements in the normalised frame, at the
-    model's rate, on its skeleton. stature: metres. joint_limits: (J, 2, 3) lowest and highest rotation vector in radians
-    that the training data has, or None. reference: (N,) the limb's speed over evenly spaced phases, which `warped` phases
+    model's rate, on its skeleton. stature: metres. joint_limits: (J, 3, 3) radians, as of `limits.learn` of the
+    training data, or None. reference: (N,) the limb's speed over evenly spaced phases, which `warped` phases
     are warped to, or None. trained_on: one line. notes: one line each.
     """
 
@@ -130,8 +130,8 @@ def _check_body(model: ThrowModel) -> None:
     if not 0.1 <= model.stature <= 10.0:
         raise InputError("model: stature", f"{model.stature:g} m", "0.1 to 10 m")
     limits = model.joint_limits
-    if limits is not None and (limits.shape != (joints, 2, 3) or not np.all(limits[:, 0] <= limits[:, 1])):
-        raise InputError("model: joint_limits", f"shape {limits.shape}", f"({joints}, 2, 3), lowest before highest")
+    if limits is not None and (limits.shape != (joints, 3, 3) or not np.all(limits[:, 1] <= limits[:, 2])):
+        raise InputError("model: joint_limits", f"shape {limits.shape}", f"({joints}, 3, 3): middle, lowest, highest")
     reference = model.reference
     if model.settings.phase == "warped" and reference is None:
         raise InputError("model: reference", "none", "a speed curve, because its phases are warped")
