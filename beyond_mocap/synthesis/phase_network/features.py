@@ -1,0 +1,208 @@
+"""What each network is told and what it answers (Fredriksson §7.2, §7.3), and how answers become a pose.
+
+All functions are pure, take `xp` (numpy or jax.numpy) last and leave leading axes free. A network speaks of frame n + 1
+out of frame n: `pose` is the state in n, `after` what is known of n + 1 so far, in the order of `HIERARCHY`.
+
+    after = pose
+    for name in HIERARCHY:
+        x = network_input(name, chains, settings, pose, after, window)
+        after = answered(name, chains, settings, y(x), after, pose, window)
+
+Where the text leaves something open, this is what was decided:
+
+- **Hip**: its 14 joints are the hips, the chest, and upper, middle and end joint of each limb (of legs the ankle).
+- **Static frame** (`frame="static"`, his): the normalised frame. `frame="hip"` (ours): the same, moved so that the
+  hips of frame n stand over the origin, so that a run-up may go anywhere.
+- **Reference frame of a chain**: place and turn of the joint that it hangs on, in frame n + 1; trajectories, impact and joints
+  "in absolute form" are given in it, those of frame n too. δa_o: the turn from the frame's axes in n to those in n + 1, seen
+  in n, as six numbers less those of no turn. His "delta axis" is a difference of world axes; this one does not change when the
+  world turns.
+- **Body**: the 8 joints outside it are elbows, wrists, knees and ankles, in frame n.
+- **Arm**: d is from the upper arm to where the wrist is to be in n + 1; the wrist's rotation r¹ is that of the hand in the
+  reference frame, because the lower arm that it would be relative to is what is asked for. p_i¹ are the hips and the body's joints
+  except the reference itself, a_k¹ those of hips and body.
+- **Leg**: p_i¹ are the head and both shoulders (upper arms), a_k¹ six joints of the body: lowest, chest, both joints that
+  carry the arms, neck, head.
+- **Wrist inferred**: no r¹, and the hand's relative rotation joins those of the arm, in input and output.
+- **Phase**: of a leg, that of d in n + 1, which stands in the input; of all others the motion phase of frame n.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .answers import network_output, origin, predicted
+from .chains import LIMB_OF, Chains
+from .description import Windows
+from .kinematics import Pose, flat, picked, pose_of, six, transposed
+from .model import SINGLE, ModelSettings
+from .phases import distance_phase
+
+
+def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
+    """The input x (..., in) of a network of `settings.networks`."""
+    if name == SINGLE:
+        return single_input(chains, settings, pose, window, xp)
+    if name == "hip":
+        return hip_input(chains, settings, pose, window, xp)
+    if name == "body":
+        return body_input(chains, pose, after, window, xp)
+    number = LIMB_OF.index(name)
+    if number < 2:
+        return arm_input(number, chains, settings, pose, after, window, xp)
+    return leg_input(number, chains, pose, after, window, xp)
+
+
+def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
+    """The phase (...) at which a network is asked. leg_reach: {"left": (shortest, longest), "right": ...} m."""
+    if name not in LIMB_OF[2:]:
+        return window.phase
+    return distance_phase(stretch(LIMB_OF.index(name), chains, after, window, xp)[..., 0], leg_reach[name[:-4]], xp)
+
+
+def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
+    """(b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (§7.3)."""
+    return xp.concatenate([*_motion(chains, settings, pose, window, xp), *_joints(chains, settings, pose, chains.hip_sees, xp)], axis=-1)
+
+
+def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
+    """(b_l, b_r, i, four trajectories, p_j, a_j, v_j), j = all joints that networks move, 25 with him (§7.2)."""
+    parts = _joints(chains, settings, pose, chains.joints, xp)
+    moved = flat(picked(pose.moved, chains.joints, -2, xp), 2)
+    return xp.concatenate([*_motion(chains, settings, pose, window, xp), *parts, moved], axis=-1)
+
+
+def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
+    """(b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), j = 10 with him, i = 8 (§7.3)."""
+    frame = _Frame(chains.references["body"], pose, after, xp)
+    seen = chains.body_sees
+    return xp.concatenate([
+        window.sides,
+        frame.place(window.impact),
+        *(_trajectory(frame, window, number) for number in (0, 1)),
+        *(frame.place(window.next[..., number, :]) for number in (2, 3)),
+        frame.turned,
+        flat(six(picked(pose.local, chains.members["body"], -3, xp), xp), 2),
+        flat(frame.places(picked(pose.positions, seen, -2, xp)), 2),
+        flat(six(frame.turns(picked(pose.turns, seen, -3, xp)), xp), 2),
+    ], axis=-1)  # fmt: skip
+
+
+def arm_input(
+    number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np
+):
+    """(b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of the arm 0 (left) or 1 (§7.3)."""
+    name = LIMB_OF[number]
+    frame = _Frame(chains.references[name], pose, after, xp)
+    given = settings.wrist == "given"
+    trunk = (chains.hips, *chains.members["body"])
+    others = tuple(joint for joint in trunk if joint != chains.references[name])
+    wrist = [six(frame.turn(window.hands_next[..., number, :, :]), xp)] if given else []
+    return xp.concatenate([
+        window.sides,
+        _trajectory(frame, window, number),
+        frame.place(window.next[..., number, :]),
+        frame.turned,
+        *wrist,
+        stretch(number, chains, after, window, xp),
+        flat(six(picked(pose.local, predicted(name, chains, settings), -3, xp), xp), 2),
+        flat(frame.places(picked(after.positions, others, -2, xp)), 2),
+        flat(six(frame.turns(picked(after.turns, trunk, -3, xp)), xp), 2),
+    ], axis=-1)  # fmt: skip
+
+
+def leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
+    """(t_toe, o_toe, δa_o, d, r_j, p_i¹, a_k¹), j = 4, i = 3, k = 6, of the leg 2 (left) or 3 (§7.3)."""
+    name = LIMB_OF[number]
+    frame = _Frame(chains.references[name], pose, after, xp)
+    seen = [after.positions[..., chains.head, :], *(_socket(arm, chains, after, xp) for arm in (0, 1))]
+    return xp.concatenate([
+        _trajectory(frame, window, number),
+        frame.place(window.next[..., number, :]),
+        frame.turned,
+        stretch(number, chains, after, window, xp),
+        flat(six(picked(pose.local, chains.members[name], -3, xp), xp), 2),
+        *(frame.place(place) for place in seen),
+        flat(six(frame.turns(picked(after.turns, chains.leg_sees, -3, xp)), xp), 2),
+    ], axis=-1)  # fmt: skip
+
+
+def widths(chains: Chains, settings: ModelSettings) -> dict[str, tuple[int, int]]:
+    """Length of input and output of each network."""
+    local = np.broadcast_to(np.eye(3), (len(chains.skeleton), 3, 3))
+    pose = pose_of(chains.skeleton, np.zeros(3), local)
+    window = Windows(
+        points=np.zeros((4, 9, 3)), deltas=np.zeros((4, 9, 3)), next=np.zeros((4, 3)),
+        hands_next=np.broadcast_to(np.eye(3), (2, 3, 3)), sides=np.zeros(2), impact=np.zeros(3), phase=np.zeros(()),
+    )  # fmt: skip
+    found = {}
+    for name in settings.networks:
+        x = network_input(name, chains, settings, pose, pose, window)
+        found[name] = (x.shape[-1], network_output(name, chains, settings, pose, pose).shape[-1])
+    return found
+
+
+class _Frame:
+    """The reference frame of a chain: its joint in frame n + 1; `turned` (..., 6) is δa_o."""
+
+    def __init__(self, joint: int, pose: Pose, after: Pose, xp):
+        self.xp = xp
+        self.origin = after.positions[..., joint, :]
+        self.axes = after.turns[..., joint, :, :]
+        self.back = transposed(self.axes, xp)
+        step = xp.matmul(transposed(pose.turns[..., joint, :, :], xp), self.axes)
+        self.turned = six(step - np.eye(3), xp)
+
+    def place(self, place):
+        """(..., 3) world -> this frame."""
+        return self.xp.matmul(self.back, (place - self.origin)[..., None])[..., 0]
+
+    def places(self, places):
+        """(..., N, 3) world -> this frame."""
+        return self.xp.matmul(places - self.origin[..., None, :], self.axes)
+
+    def ways(self, ways):
+        """Differences (..., N, 3) world -> this frame."""
+        return self.xp.matmul(ways, self.axes)
+
+    def turn(self, turn):
+        """(..., 3, 3) world -> this frame."""
+        return self.xp.matmul(self.back, turn)
+
+    def turns(self, turns):
+        """(..., N, 3, 3) world -> this frame."""
+        return self.xp.matmul(self.back[..., None, :, :], turns)
+
+
+def _trajectory(frame: _Frame, window: Windows, number: int):
+    """t of one effector, 54 values, in a chain's frame (eq. 7.1)."""
+    points = frame.places(window.points[..., number, :, :])
+    deltas = frame.ways(window.deltas[..., number, :, :])
+    return flat(frame.xp.concatenate([points, deltas], axis=-2), 2)
+
+
+def _motion(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp) -> list:
+    """x_m of hip and single: b_l, b_r, i and four trajectories, in the world or from under the hips."""
+    start = origin(chains, settings, pose)
+    points = window.points - start[..., None, None, :]
+    trajectories = xp.concatenate([points, window.deltas], axis=-2)
+    return [window.sides, window.impact - start, flat(trajectories, 3)]
+
+
+def _joints(chains: Chains, settings: ModelSettings, pose: Pose, joints: tuple[int, ...], xp) -> list:
+    """p_j and a_j of hip and single."""
+    places = picked(pose.positions, joints, -2, xp) - origin(chains, settings, pose)[..., None, :]
+    return [flat(places, 2), flat(six(picked(pose.turns, joints, -3, xp), xp), 2)]
+
+
+def stretch(number: int, chains: Chains, after: Pose, window: Windows, xp):
+    """d: metres (..., 1) from a limb's first joint to where its end is to be in frame n + 1."""
+    way = window.next[..., number, :] - _socket(number, chains, after, xp)
+    return xp.sqrt(xp.sum(way * way, axis=-1, keepdims=True))
+
+
+def _socket(number: int, chains: Chains, after: Pose, xp):
+    """Place (..., 3) m of a limb's first joint: known as soon as the joint that it hangs on is."""
+    reference = chains.references[LIMB_OF[number]]
+    offset = chains.skeleton.offsets[chains.sockets[number]]
+    return after.positions[..., reference, :] + xp.matmul(after.turns[..., reference, :, :], offset)

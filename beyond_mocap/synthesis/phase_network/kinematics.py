@@ -1,0 +1,127 @@
+"""Bodies as rotation matrices, in numpy and in jax alike: places and turns of joints, and rotations as six numbers.
+
+Networks learn on matrices: a rotation is the two first columns of its matrix (its x and its y axis; Zhang, Starke,
+Komura and Saito 2018, Fredriksson §7.1.1), which has no jumps. Every function takes the array module `xp` (numpy or
+jax.numpy) last, and writes into no array, so that training and use run the same code.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...motion import quaternion
+from ...motion.motion import Motion
+from ...motion.skeleton import Skeleton
+
+_TINY = 1e-12  # below any square of a length that matters: gradients of a root stay finite
+
+
+class Pose(NamedTuple):
+    """A body's state in one frame, or in many: leading axes are free.
+
+    root (..., 3) m, the root joint's place. local (..., J, 3, 3), each joint against its parent. positions (..., J, 3)
+    m and turns (..., J, 3, 3), in the world. moved (..., J, 3) m, how far each joint came since the frame before.
+    """
+
+    root: np.ndarray
+    local: np.ndarray
+    positions: np.ndarray
+    turns: np.ndarray
+    moved: np.ndarray
+
+
+def places_and_turns(offsets, parents, root, local, xp=np):
+    """Forward kinematics: positions (..., J, 3) m and turns (..., J, 3, 3) in the world.
+
+    offsets (J, 3) m, parents (J,) with -1 for the root, which comes first; root (..., 3) m; local (..., J, 3, 3).
+    """
+    positions, turns = [root], [local[..., 0, :, :]]
+    for joint in range(1, len(parents)):
+        parent = parents[joint]
+        turns.append(xp.matmul(turns[parent], local[..., joint, :, :]))
+        positions.append(positions[parent] + xp.matmul(turns[parent], offsets[joint]))
+    return xp.stack(positions, axis=-2), xp.stack(turns, axis=-3)
+
+
+def pose_of(skeleton: Skeleton, root, local, xp=np) -> Pose:
+    """The state of a body, from its root's place (..., 3) m and local rotations (..., J, 3, 3), at rest."""
+    positions, turns = places_and_turns(skeleton.offsets, skeleton.parents, root, local, xp)
+    return Pose(root, local, positions, turns, xp.zeros_like(positions))
+
+
+def six(turns, xp=np):
+    """Rotations (..., 3, 3) as their x and y axis: (..., 6)."""
+    return xp.concatenate([turns[..., :, 0], turns[..., :, 1]], axis=-1)
+
+
+def from_six(values, xp=np):
+    """The rotations (..., 3, 3) nearest to values (..., 6): Gram-Schmidt, the x axis first."""
+    first = _unit(values[..., :3], xp)
+    second = values[..., 3:]
+    second = _unit(second - xp.sum(first * second, axis=-1, keepdims=True) * first, xp)
+    return xp.stack([first, second, xp.cross(first, second)], axis=-1)
+
+
+def _unit(vectors, xp):
+    return vectors / xp.sqrt(xp.sum(vectors * vectors, axis=-1, keepdims=True) + _TINY)
+
+
+def transposed(turns, xp=np):
+    """The inverse rotations (..., 3, 3)."""
+    return xp.swapaxes(turns, -1, -2)
+
+
+def matrices(motion: Motion) -> np.ndarray:
+    """A motion's local rotations as matrices (T, J, 3, 3)."""
+    return quaternion.to_matrix(motion.rotations)
+
+
+def motion_of(skeleton: Skeleton, root: np.ndarray, local: np.ndarray, fps: float) -> Motion:
+    """The motion with these root positions (T, 3) m and local rotations (T, J, 3, 3)."""
+    return Motion(skeleton, root, quaternion.from_matrix(np.asarray(local, dtype=float)), fps)
+
+
+def flat(values, axes: int):
+    """The last `axes` axes as one."""
+    return values.reshape(*values.shape[:-axes], -1)
+
+
+def picked(values, joints: tuple[int, ...], axis: int, xp=np):
+    """Some joints of values whose joints lie along `axis` (-2 for places, -3 for rotations)."""
+    return xp.take(values, np.array(joints), axis=axis)
+
+
+def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local: dict, given: dict, xp=np) -> Pose:
+    """A pose with other rotations of some `joints`, and all `joints` where these bring them; the rest as it was.
+
+    joints: indices, parents first. root: (..., 3) m, the root joint's place. local: joint -> (..., 3, 3), against its
+    parent. given: joint -> (..., 3, 3), in the world.
+    """
+    places, turns, changed = {}, {}, dict(local)
+    for joint in joints:
+        parent = skeleton.parents[joint]
+        if parent < 0:
+            places[joint] = root
+            turns[joint] = changed[joint] = given.get(joint, local.get(joint, pose.local[..., joint, :, :]))
+            continue
+        base = turns[parent] if parent in turns else pose.turns[..., parent, :, :]
+        start = places[parent] if parent in places else pose.positions[..., parent, :]
+        if joint in given:
+            changed[joint] = xp.matmul(transposed(base, xp), given[joint])
+        turns[joint] = xp.matmul(base, changed[joint] if joint in changed else pose.local[..., joint, :, :])
+        places[joint] = start + xp.matmul(base, skeleton.offsets[joint])
+    return pose._replace(
+        root=root,
+        local=_put(pose.local, changed, -3, xp),
+        positions=_put(pose.positions, places, -2, xp),
+        turns=_put(pose.turns, turns, -3, xp),
+    )
+
+
+def _put(values, new: dict, axis: int, xp):
+    """Values with those of some joints replaced."""
+    order = np.arange(values.shape[axis])
+    order[list(new)] = len(order) + np.arange(len(new))
+    return xp.take(xp.concatenate([values, xp.stack(list(new.values()), axis=axis)], axis=axis), order, axis=axis)
