@@ -195,7 +195,7 @@ def _joints(chains: Chains, settings: ModelSettings, pose: Pose, joints: tuple[i
     return [flat(places, 2), flat(six(picked(pose.turns, joints, -3, xp), xp), 2)]
 
 
-def stretch(number: int, chains: Chains, after: Pose, window: Windows, xp):
+def stretch(number: int, chains: Chains, after: Pose, window: Windows, xp=np):
     """d: metres (..., 1) from a limb's first joint to where its end is to be in frame n + 1."""
     way = window.next[..., number, :] - _socket(number, chains, after, xp)
     return xp.sqrt(xp.sum(way * way, axis=-1, keepdims=True))
