@@ -254,7 +254,7 @@ def _made(library: Library) -> Library:
         clips += [clip, clip.twin()]
     if not clips:
         return replace(library, clips=())
-    frames = _described(clips, library.frames)
+    frames = described(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
 
 
@@ -368,7 +368,7 @@ def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
     """Features, words and clusters of `clips`."""
     _check(cancelled)
     report(0.7, "Describing frames")
-    frames = _described(clips)
+    frames = described(clips)
     clusters = {}
     for number, length in enumerate(BLOCK_LENGTHS):
         _check(cancelled)
@@ -377,7 +377,7 @@ def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
     return Library(folder, clips[0].motion.skeleton, clips, frames, clusters, FPS, notes)
 
 
-def _described(clips, like: Frames | None = None) -> Frames:
+def described(clips, like: Frames | None = None) -> Frames:
     """Frames of `clips` with all words they carry, their features comparable with those of `like`."""
     from threadpoolctl import threadpool_limits
 

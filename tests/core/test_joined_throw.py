@@ -1,0 +1,156 @@
+"""A throw within a longer motion: exact around its release, joined by the synthesizer or eased in and out."""
+
+import pathlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap import joined_throw
+from beyond_mocap.annotation import KeyMoment, Span, Timeline
+from beyond_mocap.errors import InputError
+from beyond_mocap.library.library import build
+from beyond_mocap.motion.gait import gait
+from beyond_mocap.motion.humanoid import heading
+from beyond_mocap.motion.motion import Motion, forward_kinematics, place
+from beyond_mocap.motion.throws import throw
+from beyond_mocap.motion.track import Track
+from beyond_mocap.plan import Plan
+
+LIBRARY = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
+FPS, AT = 30.0, 6.0
+TIMES = np.arange(0.0, 12.05, 0.1)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return build(LIBRARY, cache_dir=tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(scope="module")
+def made():
+    return throw((18.0, 0.0, 1.0), 25.0, fps=FPS)
+
+
+def going(speed: float) -> Plan:
+    """A plan along X, over the origin when the throw is released."""
+    places = np.stack([speed * (TIMES - AT), np.zeros_like(TIMES)], axis=1)
+    return Plan(track=Track(TIMES, places, None), fps=FPS)
+
+
+def on_library(library, speed):
+    """A throw on the library's skeleton, where the plan has the player at the release, and the plan."""
+    one = throw((18.0, 0.0, 1.0), 25.0, skeleton=library.skeleton, fps=FPS)
+    begin = joined_throw.begins_at(one.motion, one.release, np.zeros(2)) - one.motion.root_positions[0, :2]
+    return place(one.motion, 0.0, (*begin, 0.0)), one.release, going(speed)
+
+
+def same_where_kept(joined, motion) -> bool:
+    low, high = joined.kept
+    part = slice(low - joined.first, high - joined.first)
+    return np.array_equal(joined.motion.root_positions[low:high], motion.root_positions[part]) and np.allclose(
+        np.abs(np.sum(joined.motion.rotations[low:high] * motion.rotations[part], axis=-1)), 1.0, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("speed", [0.0, 2.5])
+def test_the_synthesizer_joins_it_on_the_track(library, speed):
+    motion, release, plan = on_library(library, speed)
+    way = joined_throw.run_up_and_recovery(library, plan, motion, release, AT)
+    joined = joined_throw.laid_into(way.motion, way.start, motion, release, AT)
+    assert len(joined.motion) == len(plan.sampled(FPS).times)
+    assert abs(joined.release - AT) <= 0.5 / FPS + 1e-9
+    assert same_where_kept(joined, motion)
+    # the footage of the throw lies where the throw itself does, facing included, so that little is faded
+    inside = slice(joined.kept[0], joined.kept[1])
+    both = [forward_kinematics(one)[0][inside] for one in (way.motion, joined.motion)]
+    assert np.linalg.norm(both[0] - both[1], axis=-1).mean() < 0.03
+    off = heading(way.motion)[inside] - heading(joined.motion)[inside]
+    assert np.abs(np.angle(np.exp(1j * off))).max() < 0.12
+    usual = joined_throw.usual_jerk(library, FPS)
+    assert np.all(joined_throw.seam_jerk(joined) <= usual)
+    # two seconds before and behind the player is on his track
+    for second in (AT - 5.5, AT + 5.5):
+        frame = int((second - way.start) * FPS)
+        assert np.linalg.norm(joined.motion.root_positions[frame, :2] - [speed * (second - AT), 0.0]) < 0.3
+
+
+def test_the_library_itself_stays_as_it_was(library):
+    motion, release, _ = on_library(library, 0.0)
+    clips, keys = library.clips, library.keys
+    more = joined_throw.with_clip(library, motion, release)
+    assert library.clips is clips and library.keys is keys
+    assert [key for key in more.keys if joined_throw.OWN_WORD in key.words][0].frame == pytest.approx(release * FPS)
+
+
+def test_what_lies_within_the_throw_gives_way(library):
+    motion, release, plan = on_library(library, 0.0)
+    words = (KeyMoment(AT + 0.2, ("kick", "low")), KeyMoment(AT + 4.0, ("kick", "low")))
+    plan = replace(plan, timeline=Timeline((Span(AT - 4.0, AT + 4.0, ("standing",)),), words))
+    way = joined_throw.run_up_and_recovery(library, plan, motion, release, AT)
+    assert [line for line in way.warnings if "not played" in line] == [
+        "6.2 s: 'kick low' lies within the throw, it is not played"
+    ]
+
+
+def test_other_bones_and_sizes_keep_the_exact_throw(library, made):
+    # the adult of `motion.adult` is not the library's skeleton: the way there is found on the library's bones
+    begin = joined_throw.begins_at(made.motion, made.release, np.zeros(2)) - made.motion.root_positions[0, :2]
+    motion = place(made.motion, 0.0, (*begin, 0.0))
+    way = joined_throw.run_up_and_recovery(library, going(0.0), motion, made.release, AT)
+    assert way.motion.skeleton.names == motion.skeleton.names
+    assert same_where_kept(joined_throw.laid_into(way.motion, way.start, motion, made.release, AT), motion)
+    tall = replace(going(0.0), height=2.0)
+    way = joined_throw.run_up_and_recovery(library, tall, motion, made.release, AT)
+    assert way.motion.root_positions[-1, 2] == pytest.approx(motion.root_positions[-1, 2], abs=0.15)
+
+
+def test_eased_out_of_a_walk_and_on(made):
+    walk = gait(1.4, 8.0, FPS)
+    first = round((3.0 - made.release) * FPS)
+    offset = walk.root_positions[first] - made.motion.root_positions[0]
+    motion = place(made.motion, 0.0, (*offset[:2], 0.0))
+    joined = joined_throw.laid_into(walk, 0.0, motion, made.release, 3.0, goes_on=True)
+    assert same_where_kept(joined, motion)
+    assert np.array_equal(joined.motion.root_positions[: joined.first], walk.root_positions[: joined.first])
+    behind = slice(joined.end, None)
+    step = np.diff(joined.motion.root_positions[behind, :2], axis=0)
+    own = np.diff(walk.root_positions[behind, :2], axis=0)
+    assert np.allclose(np.linalg.norm(step, axis=1), np.linalg.norm(own, axis=1), atol=1e-9)  # it walks on, elsewhere
+    assert np.all(joined_throw.seam_jerk(joined) < 3000.0)
+    assert any("faces 8" in line for line in joined.warnings)  # the throw begins side on
+
+
+def test_a_motion_that_stays_where_it_is(made):
+    stands = joined_throw.standing(made.motion.skeleton, 6.0, FPS)
+    joined = joined_throw.laid_into(stands, 10.0, made.motion, made.release, 13.0)
+    assert joined.start == 10.0 and abs(joined.release_frame - 90.0) <= 0.5
+    assert np.array_equal(joined.motion.root_positions[joined.end :], stands.root_positions[joined.end :])
+    assert not joined.moved.any()
+
+
+def test_a_short_motion_is_held(made):
+    stands = joined_throw.standing(made.motion.skeleton, 0.1, FPS)
+    joined = joined_throw.laid_into(stands, 3.0, made.motion, made.release, 3.0)
+    assert joined.first == 0 and joined.end == len(joined.motion)
+    assert joined.start == pytest.approx(3.0 - made.release, abs=0.5 / FPS)
+
+
+@pytest.mark.parametrize("fps", [24000.0 / 1001.0, 60.0])
+def test_at_any_rate(made, fps):
+    stands = joined_throw.standing(made.motion.skeleton, 6.0, fps)
+    exact = throw((18.0, 0.0, 1.0), 25.0, fps=fps)
+    joined = joined_throw.laid_into(stands, 0.0, exact.motion, exact.release, 3.0)
+    assert same_where_kept(joined, exact.motion) and abs(joined.release - 3.0) <= 0.5 / fps + 1e-9
+
+
+def test_what_cannot_be_joined(library, made):
+    other = Motion(library.skeleton, np.zeros((90, 3)), np.tile([1.0, 0, 0, 0], (90, len(library.skeleton), 1)), FPS)
+    with pytest.raises(InputError, match="another skeleton"):
+        joined_throw.laid_into(other, 0.0, made.motion, made.release, 2.0)
+    stands = joined_throw.standing(made.motion.skeleton, 6.0, FPS)
+    with pytest.raises(InputError, match="before and"):
+        joined_throw.laid_into(stands, 0.0, made.motion, 0.1, 2.0)
+    motion, release, plan = on_library(library, 0.0)
+    with pytest.raises(InputError, match="within the track"):
+        joined_throw.run_up_and_recovery(library, plan, motion, release, 1.0)
