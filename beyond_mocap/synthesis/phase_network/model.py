@@ -138,5 +138,8 @@ def _check_body(model: ThrowModel) -> None:
     if reference is not None and (reference.ndim != 1 or len(reference) < 2 or not np.all(np.isfinite(reference))):
         raise InputError("model: reference", f"shape {reference.shape}", "(N,) finite speeds")
     for example in model.examples:
+        where = f"model: example {example.name}"
         if not example.motion.skeleton.same_bones(model.skeleton):
-            raise InputError(f"model: example {example.name}", "another skeleton", "the model's skeleton")
+            raise InputError(where, "another skeleton", "the model's skeleton")
+        if abs(example.motion.fps - model.settings.fps) > 1e-9:
+            raise InputError(where, f"{example.motion.fps:g} frames per second", f"{model.settings.fps:g}, the model's")

@@ -106,13 +106,14 @@ class PhaseNetwork:
 
 class FrameNetwork:
     """A network prepared for single frames: float32, the scales inside the first and the last layer, all control points
-    of a layer in one matrix, so that a layer is one product of a matrix with a vector."""
+    of a layer in one matrix, so that a layer is one product of a matrix with a vector. Column by column in memory: the
+    product is up to half as fast again that way, and faster than blending the weights before it."""
 
     def __init__(self, network: PhaseNetwork):
         weights, biases = _without_scales(network)
         self.points = network.points
         self._layers = [
-            (np.ascontiguousarray(w.reshape(-1, w.shape[2]), np.float32), np.ascontiguousarray(b, np.float32))
+            (np.asfortranarray(w.reshape(-1, w.shape[2]), np.float32), np.ascontiguousarray(b, np.float32))
             for w, b in zip(weights, biases)
         ]
 
