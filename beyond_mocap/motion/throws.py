@@ -124,21 +124,22 @@ def throw(
     target: tuple[float, float, float] = (18.0, 0.0, 1.0),
     speed: float = 25.0,
     arm: str = "right",
-    style: str = "overarm",
+    style: str | ThrowStyle = "overarm",
     skeleton: Skeleton | None = None,
     fps: float = 120.0,
 ) -> Throw:
     """A throw out of standing at the origin, such that a ball without air flies through `target` (3,) metres.
 
     speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
-    adult. InputError for a target that cannot be reached at that speed, an unknown arm or style, a body without hands.
+    adult. style: a name, or somebody's own. InputError for a target that cannot be reached at that speed, an unknown arm or style, a body without hands.
     """
-    if arm not in ("left", "right") or style not in STYLES:
+    how = style if isinstance(style, ThrowStyle) else STYLES.get(style)
+    if arm not in ("left", "right") or how is None:
         raise InputError("throw", f"{style} with the {arm} arm", f"left or right, {' or '.join(STYLES)}")
     if not SLOWEST <= speed <= FASTEST:
         raise InputError("throw", f"{speed:g} m/s", f"{SLOWEST:g} to {FASTEST:g} m/s")
     neutral = neutral_stance(skeleton or adult_skeleton())
-    swing = _Swing(to_motion(_posture(STYLES[style], neutral), neutral), neutral, arm)
+    swing = _Swing(to_motion(_posture(how, neutral), neutral), neutral, arm)
     release, rate, turn = _aimed(swing, np.asarray(target, dtype=float), speed)
     return swing.at_rate(release, rate, turn, fps)
 

@@ -1,0 +1,127 @@
+"""Folders of made throws and kicks whose targets are known: the truth that networks are trained and tested on.
+
+For each subject a folder of BVH files with their words (`NAME.txt`), and over all of them `throws.csv`, which says who
+threw with what, when the ball left, how fast, and through which point it flew. The ball flies through air, so the point
+is where it truly went.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from .annotation import KeyMoment, Span, Timeline, format_timeline
+from .ball.physics import BASEBALL
+from .ball.wall import meets_wall
+from .errors import Cancelled, InputError
+from .files import bvh
+from .files.whole import atomic_write
+from .motion import quaternion
+from .motion.motion import Motion, place
+from .motion.throw_subjects import subject, subject_throws
+from .motion.throws import GRAVITY
+
+TABLE_NAME = "throws.csv"
+COLUMNS = (
+    "file", "subject", "limb", "release_s", "target_x_m", "target_y_m", "target_z_m", "speed_m_s",
+    "launch_x_m_s", "launch_y_m_s", "launch_z_m_s",
+)  # fmt: skip
+RATE = 120.0
+_TRIES = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Planted:
+    """A made throw or kick: motion, limb as in `throws.csv`, release s, position (3,) m and velocity (3,) m/s of the ball
+    as it leaves, impact (3,) m where it flies through, words."""
+
+    motion: Motion
+    limb: str
+    release: float
+    position: np.ndarray
+    velocity: np.ndarray
+    impact: np.ndarray
+    words: str
+
+
+def planted_throws(seed: int, count: int, fps: float = RATE) -> tuple[str, list[Planted]]:
+    """The name of the subject of that seed, and `count` of its throws at targets 5 to 26 m away and up to 2.4 m high."""
+    thrower, chance = subject(seed), np.random.default_rng([seed, 40])
+    made = []
+    while len(made) < count:
+        target, speed = _throw_order(thrower.fastest, chance)
+        thrown = subject_throws(thrower, target, speed, chance, fps)
+        impact, _ = meets_wall(thrown.position, thrown.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
+        words = f"throwb high {thrown.arm}"
+        limb = f"{thrown.arm}_hand"
+        made.append(Planted(thrown.motion, limb, thrown.release, thrown.position, thrown.velocity, impact, words))
+    return thrower.name, [_elsewhere(throw, chance) for throw in made]
+
+
+def _throw_order(fastest: float, chance: np.random.Generator) -> tuple[tuple[float, float, float], float]:
+    """A target (3,) m ahead and a speed m/s that reaches it on a flat arc."""
+    for _ in range(_TRIES):
+        ahead, up = float(chance.uniform(5.0, 26.0)), float(chance.uniform(0.1, 2.4))
+        speed = float(chance.uniform(13.0, fastest))
+        rise = up - 1.7
+        least = np.sqrt(GRAVITY * (rise + np.hypot(rise, ahead)))
+        if speed > 1.3 * least:
+            return (ahead, 0.0, up), speed
+    raise InputError("planted throws", f"a fastest throw of {fastest:g} m/s", "one of more than 20 m/s")
+
+
+def _elsewhere(made: Planted, chance: np.random.Generator) -> Planted:
+    """The same somewhere else on the ground, turned by any angle."""
+    angle, away = float(chance.uniform(-np.pi, np.pi)), np.append(chance.uniform(-20.0, 20.0, 2), 0.0)
+    turn = quaternion.about_up(np.array(angle))
+    position, velocity, impact = (quaternion.rotate(turn, v) for v in (made.position, made.velocity, made.impact))
+    motion = place(made.motion, angle, away)
+    return replace(made, motion=motion, position=position + away, velocity=velocity, impact=impact + away)
+
+
+def write_planted(
+    folder: Path, action: str, subjects: int, count: int, seed: int = 0,
+    progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
+) -> int:
+    """Makes `count` throws (or kicks, by `action`) of each of `subjects` people in `folder`; how many there are then.
+
+    seed: of the first subject, the others follow. InputError where the folder has files, or cannot be written.
+    """
+    if action not in ACTIONS:
+        raise InputError("action", action, " or ".join(ACTIONS))
+    folder = Path(folder)
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError(folder, "a folder that is not empty", "an empty or a new one", "choose another place")
+    rows = [",".join(COLUMNS)]
+    for number in range(subjects):
+        name, made = ACTIONS[action](seed + number, count)
+        for order, example in enumerate(made):
+            if cancelled():
+                raise Cancelled("cancelled")
+            progress((number * count + order) / (subjects * count), f"{name}, {action} {order + 1}")
+            rows.append(_written(folder, name, f"{name}_{action}{order + 1:03d}", example))
+    atomic_write(folder / TABLE_NAME, "\n".join(rows) + "\n")
+    return subjects * count
+
+
+def _written(folder: Path, who: str, name: str, example: Planted) -> str:
+    """Writes one example; its row of the table."""
+    place_of = folder / who
+    try:
+        place_of.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(place_of, error.strerror or "cannot be made", "a folder that can be written") from None
+    bvh.write(place_of / f"{name}.bvh", example.motion)
+    words, end = tuple(example.words.split()), example.motion.duration
+    timeline = Timeline((Span(0.0, end, words),), (KeyMoment(round(example.release, 6), words),))
+    atomic_write(place_of / f"{name}.txt", format_timeline(timeline))
+    speed = float(np.linalg.norm(example.velocity))
+    numbers = (example.release, *example.impact, speed, *example.velocity)
+    return ",".join((f"{who}/{name}.bvh", who, example.limb, *(f"{number:.6f}" for number in numbers)))
+
+
+ACTIONS: dict[str, Callable[[int, int], tuple[str, list[Planted]]]] = {"throw": planted_throws}
+"""action -> the subject's name and its examples, by seed and count."""
