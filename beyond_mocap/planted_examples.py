@@ -21,7 +21,7 @@ from .files import bvh
 from .files.whole import atomic_write
 from .motion import quaternion
 from .motion.motion import Motion, place
-from .motion.throw_subjects import subject, subject_throws
+from .motion.throw_subjects import Subject, subject, subject_throws
 from .motion.throws import GRAVITY
 
 TABLE_NAME = "throws.csv"
@@ -47,18 +47,13 @@ class Planted:
     words: str
 
 
-def planted_throws(seed: int, count: int, fps: float = RATE) -> tuple[str, list[Planted]]:
-    """The name of the subject of that seed, and `count` of its throws at targets 5 to 26 m away and up to 2.4 m high."""
-    thrower, chance = subject(seed), np.random.default_rng([seed, 40])
-    made = []
-    while len(made) < count:
-        target, speed = _throw_order(thrower.fastest, chance)
-        thrown = subject_throws(thrower, target, speed, chance, fps)
-        impact, _ = meets_wall(thrown.position, thrown.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
-        words = f"throwb high {thrown.arm}"
-        limb = f"{thrown.arm}_hand"
-        made.append(Planted(thrown.motion, limb, thrown.release, thrown.position, thrown.velocity, impact, words))
-    return thrower.name, [_elsewhere(throw, chance) for throw in made]
+def planted_throw(thrower: Subject, chance: np.random.Generator, fps: float = RATE) -> Planted:
+    """A throw of this subject at some target 5 to 26 m away and up to 2.4 m high."""
+    target, speed = _throw_order(thrower.fastest, chance)
+    made = subject_throws(thrower, target, speed, chance, fps)
+    impact, _ = meets_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
+    words, limb = f"throwb high {made.arm}", f"{made.arm}_hand"
+    return Planted(made.motion, limb, made.release, made.position, made.velocity, impact, words)
 
 
 def _throw_order(fastest: float, chance: np.random.Generator) -> tuple[tuple[float, float, float], float]:
@@ -71,6 +66,13 @@ def _throw_order(fastest: float, chance: np.random.Generator) -> tuple[tuple[flo
         if speed > 1.3 * least:
             return (ahead, 0.0, up), speed
     raise InputError("planted throws", f"a fastest throw of {fastest:g} m/s", "one of more than 20 m/s")
+
+
+def planted(action: str, seed: int, order: int) -> tuple[str, Planted]:
+    """The name of the subject of that seed, and its throw (or kick) number `order`, somewhere on the ground."""
+    make, person = ACTIONS[action]
+    who, chance = person(seed), np.random.default_rng([seed, order, 40])
+    return who.name, _elsewhere(make(who, chance), chance)
 
 
 def _elsewhere(made: Planted, chance: np.random.Generator) -> Planted:
@@ -97,12 +99,12 @@ def write_planted(
         raise InputError(folder, "a folder that is not empty", "an empty or a new one", "choose another place")
     rows = [",".join(COLUMNS)]
     for number in range(subjects):
-        name, made = ACTIONS[action](seed + number, count)
-        for order, example in enumerate(made):
+        for order in range(count):
             if cancelled():
                 raise Cancelled("cancelled")
-            progress((number * count + order) / (subjects * count), f"{name}, {action} {order + 1}")
-            rows.append(_written(folder, name, f"{name}_{action}{order + 1:03d}", example))
+            who, example = planted(action, seed + number, order)
+            progress((number * count + order) / (subjects * count), f"{who}, {action} {order + 1}")
+            rows.append(_written(folder, who, f"{who}_{action}{order + 1:03d}", example))
     atomic_write(folder / TABLE_NAME, "\n".join(rows) + "\n")
     return subjects * count
 
@@ -123,5 +125,5 @@ def _written(folder: Path, who: str, name: str, example: Planted) -> str:
     return ",".join((f"{who}/{name}.bvh", who, example.limb, *(f"{number:.6f}" for number in numbers)))
 
 
-ACTIONS: dict[str, Callable[[int, int], tuple[str, list[Planted]]]] = {"throw": planted_throws}
-"""action -> the subject's name and its examples, by seed and count."""
+ACTIONS = {"throw": (planted_throw, subject)}
+"""action -> who makes one of somebody's examples by chance, and who makes somebody by seed."""
