@@ -23,12 +23,9 @@ from .motion import quaternion
 from .motion.motion import Motion, place
 from .motion.throw_subjects import Subject, subject, subject_throws
 from .motion.throws import GRAVITY
+from .throw_examples import LAUNCH, TABLE_NAME, TARGET
 
-TABLE_NAME = "throws.csv"
-COLUMNS = (
-    "file", "subject", "limb", "release_s", "target_x_m", "target_y_m", "target_z_m", "speed_m_s",
-    "launch_x_m_s", "launch_y_m_s", "launch_z_m_s",
-)  # fmt: skip
+COLUMNS = ("file", "subject", "limb", "release_s", *TARGET, "speed_m_s", *LAUNCH)
 RATE = 120.0
 _TRIES = 50
 

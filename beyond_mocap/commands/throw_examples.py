@@ -29,7 +29,8 @@ def add(verbs):
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`throw examples`: makes them and writes them."""
-    from ..planted_examples import TABLE_NAME, write_planted
+    from ..planted_examples import write_planted
+    from ..throw_examples import TABLE_NAME
 
     begun = time.perf_counter()
     count = write_planted(
