@@ -37,7 +37,8 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
     axis = _unit(axis - _dot(axis, along) * along, xp)
     way = target - top
     asked = _length(way, xp)
-    reach = _eased(asked, long_upper, long_lower, soft, xp)
+    # a limb that is already as straight as that stays so
+    reach = xp.maximum(_eased(asked, long_upper, long_lower, soft, xp), xp.minimum(asked, _length(end - top, xp)))
     cosine = (reach * reach - long_upper * long_upper - long_lower * long_lower) / (2.0 * long_upper * long_lower)
     cosine = xp.clip(cosine, -1.0 + 1e-9, 1.0 - 1e-9)
     bent = cosine * along + xp.sqrt(1.0 - cosine * cosine) * _cross(axis, along)

@@ -1,0 +1,127 @@
+"""One frame after the other: what the networks say of the next frame, brought within the joints' limits and towards
+where hands and feet are wanted (Fredriksson §7.7)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from . import answers, features, phase_function
+from .chains import chains_of
+from .description import BACK, SAMPLES, STEP, Windows
+from .kinematics import Pose
+from .limb_reach import LimbReach, posed
+from .limits import JointLimits, learn
+from .model import SINGLE, ThrowModel
+
+_SETTLES = 0.12
+"""Seconds in which tanh brings an offset trajectory back to the wanted one by three quarters (§7.7.3)."""
+
+
+class Step(NamedTuple):
+    """The next frame. pose: as it is to be. state: what the frame after is predicted from: the pose, or for a single network
+    without inverse kinematics its own floating places (§7.2). predicted (4, 3) m: where the networks had the effectors.
+    over (J,): radians by which joints were beyond their limits. floating (j, 3) m: the places that a single network says, or
+    None."""
+
+    pose: Pose
+    state: Pose
+    predicted: np.ndarray
+    over: np.ndarray
+    floating: np.ndarray | None
+
+
+class Stepper:
+    """A model made ready to say one frame after the other."""
+
+    def __init__(self, model: ThrowModel):
+        self.model = model
+        self.chains = chains_of(model.skeleton)
+        self.limits = JointLimits(model.skeleton, _limits_of(model))
+        self.effectors = list(self.chains.effectors)
+        self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
+
+    def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: float, limited: bool) -> Step:
+        """Frame n + 1 from the pose and window of n. wanted (4, 3) m: where the effectors are to be; share: how much of the way
+        from what the networks say to there is taken, 0 for none. limited: joints are kept within their limits."""
+        after, floating = self.predicted(pose, window)
+        said = after.positions[self.effectors] if floating is None else self._said(floating)
+        over = np.zeros(len(self.model.skeleton))
+        if limited:
+            after, over = self._limited(after)
+        if share > 0.0:
+            after = self.reach(after, wanted, share)
+            if limited:
+                after, more = self._limited(after)
+                over = np.maximum(over, more)
+        state = after if floating is None or share > 0.0 else self._afloat(after, floating)
+        return Step(after, state._replace(moved=state.positions - pose.positions), said, over, floating)
+
+    def predicted(self, pose: Pose, window: Windows) -> tuple[Pose, np.ndarray | None]:
+        """What the networks say of the next frame; of a single network also the places of the joints that it moves."""
+        model, after, floating = self.model, pose, None
+        for name in model.settings.networks:
+            network = model.networks[name]
+            phase = features.phase_of(name, self.chains, after, window, model.leg_reach)
+            x = features.network_input(name, self.chains, model.settings, pose, after, window)
+            y = network.frame(x, phase_function.weights(phase, network.points)).astype(float)
+            after = answers.answered(name, self.chains, model.settings, y, pose, after, window)
+            if name == SINGLE:
+                floating = answers.floating(self.chains, model.settings, y, pose)[0]
+        return after, floating
+
+    def _said(self, floating: np.ndarray) -> np.ndarray:
+        return floating[[self.chains.joints.index(joint) for joint in self.effectors]]
+
+    def _afloat(self, pose: Pose, floating: np.ndarray) -> Pose:
+        places = pose.positions.copy()
+        places[list(self.chains.joints)] = floating
+        return pose._replace(positions=places)
+
+    def _limited(self, pose: Pose) -> tuple[Pose, np.ndarray]:
+        local, over = self.limits.within(pose.local)
+        return (pose, over) if local is pose.local else (posed(self.chains, pose.root, local), over)
+
+
+@lru_cache(maxsize=8)
+def stepper(model: ThrowModel) -> Stepper:
+    """The model made ready; kept, as models are asked again and again."""
+    return Stepper(model)
+
+
+def _limits_of(model: ThrowModel) -> np.ndarray:
+    """The model's joint limits, or those of its examples."""
+    if model.joint_limits is not None:
+        return model.joint_limits
+    free = (0, *stillness(model))
+    return learn(np.concatenate([example.motion.rotations for example in model.examples]), free)
+
+
+def stillness(model: ThrowModel) -> tuple[int, ...]:
+    """Joints without limits besides the root: those between it and the hips, and the hips."""
+    chains = chains_of(model.skeleton)
+    return (*chains.above, chains.hips)
+
+
+@lru_cache(maxsize=8)
+def _fading(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """How much of an offset is left at a window's samples (9, 1), how much less a frame later (9, 1), and in the next frame."""
+    seconds = (np.arange(SAMPLES) - BACK) * STEP
+
+    def left(t):
+        return 1.0 - np.tanh(np.maximum(t, 0.0) / _SETTLES)
+
+    return left(seconds)[:, None], (left(seconds + 1.0 / fps) - left(seconds))[:, None], float(left(1.0 / fps))
+
+
+def blended(window: Windows, offset: np.ndarray, fps: float) -> Windows:
+    """The window with its trajectories led through where the effectors are, offset (4, 3) m from where they are wanted,
+    and back to the wanted ones by tanh (§7.7.3)."""
+    left, change, following = _fading(fps)
+    return window._replace(
+        points=window.points + offset[:, None, :] * left,
+        deltas=window.deltas + offset[:, None, :] * change,
+        next=window.next + offset * following,
+    )

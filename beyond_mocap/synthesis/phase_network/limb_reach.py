@@ -1,0 +1,95 @@
+"""Hands and feet brought towards where they are wanted, on a pose whose limbs the networks have spoken of: one limb at a
+time with numpy or jax, as the layer that networks are trained with (§9.4), and all four at once for use."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .chains import LIMB_OF, Chains
+from .correct import bend_to, toward
+from .kinematics import Pose, places_and_turns, spread, transposed
+from .limits import JointLimits
+
+
+def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
+    """Unit axes (4, 3) about which elbows and knees bend, in the axes of the middle joint's parent.
+
+    From the limits; where they show none (or are None) the line from hip to hip of the rest pose."""
+    known = {hinge.joint: hinge.across for hinge in (limits.hinges if limits is not None else ())}
+    offsets = chains.skeleton.offsets
+    across = offsets[chains.sockets[2]] - offsets[chains.sockets[3]]
+    across = across / max(float(np.linalg.norm(across)), 1e-9)
+    sides = (-across, -across, across, across)
+    return np.stack([known.get(joint, side) for joint, side in zip(chains.middles, sides)])
+
+
+def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.ndarray, turn_kept: bool, xp) -> Pose:
+    """`after` with limb `number` of `EFFECTORS` brought towards `wanted` (..., 3) m by `share` of the way.
+
+    axes: of `hinge_axes`. turn_kept: hand or foot keeps its turn in the world (a given hand; every foot, so that the toe comes
+    to its place); else it rides on the lower bone. All joints of the limb are right afterwards, in numpy and in jax.
+    """
+    upper, middle, end, effector = _joints(chains, number)
+    places, turns, parents = after.positions, after.turns, chains.skeleton.parents
+    tip = places[..., effector, :]
+    target = toward(tip, wanted, share) - (tip - places[..., end, :])
+    hinge = xp.matmul(turns[..., parents[middle], :, :], axes[number])
+    first, second, _ = bend_to(
+        places[..., upper, :], places[..., middle, :], places[..., end, :], target, hinge, xp
+    )
+    given = {joint: xp.matmul(first, turns[..., joint, :, :]) for joint in _between(chains, upper, middle)}
+    given |= {joint: xp.matmul(second, turns[..., joint, :, :]) for joint in _between(chains, middle, end)}
+    if turn_kept:
+        given[end] = turns[..., end, :, :]
+    return spread(chains.skeleton, after, chains.known[LIMB_OF[number]], after.root, {}, given, xp)
+
+
+class LimbReach:
+    """All four limbs of one pose at once: the same as `bent_limb` for each, several times as fast."""
+
+    def __init__(self, chains: Chains, limits: JointLimits | None, hands_given: bool):
+        self.chains = chains
+        self._axes = hinge_axes(chains, limits)
+        joints = [_joints(chains, number) for number in range(4)]
+        self._upper, self._middle, self._end, self._tip = (list(column) for column in zip(*joints))
+        parents = chains.skeleton.parents
+        self._above_upper, self._above_middle, self._above_end = (
+            [parents[joint] for joint in column] for column in (self._upper, self._middle, self._end)
+        )
+        self._kept = [0, 1, 2, 3] if hands_given else [2, 3]
+
+    def __call__(self, pose: Pose, wanted: np.ndarray, share: float) -> Pose:
+        """The pose with its effectors brought towards wanted (4, 3) m; root and trunk as they are."""
+        places, turns = pose.positions, pose.turns
+        tip, end = places[self._tip], places[self._end]
+        target = toward(tip, wanted, share) - (tip - end)
+        hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
+        first, second, _ = bend_to(places[self._upper], places[self._middle], end, target, hinge, np)
+        local = pose.local.copy()
+        local[self._upper] = transposed(turns[self._above_upper]) @ first @ turns[self._upper]
+        bent = transposed(first @ turns[self._above_middle])
+        local[self._middle] = bent @ second @ turns[self._middle]
+        carried = transposed(second @ turns[self._above_end])
+        local[[self._end[n] for n in self._kept]] = (carried @ turns[self._end])[self._kept]
+        return posed(self.chains, pose.root, local)
+
+
+def posed(chains: Chains, root: np.ndarray, local: np.ndarray) -> Pose:
+    """The pose with these local rotations (J, 3, 3); how far its joints moved is not known (zero)."""
+    places, turns = places_and_turns(chains.skeleton.offsets, chains.skeleton.parents, root, local)
+    return Pose(root, local, places, turns, np.zeros_like(places))
+
+
+def _joints(chains: Chains, number: int) -> tuple[int, int, int, int]:
+    """Upper, middle and end joint and effector of a limb; a foot ends its leg, its toe is the effector."""
+    end = chains.effectors[number] if number < 2 else chains.ankles[number - 2]
+    return chains.sockets[number], chains.middles[number], end, chains.effectors[number]
+
+
+def _between(chains: Chains, high: int, low: int) -> list[int]:
+    """Joints from `high` (included) down to `low` (not included)."""
+    joint, found = chains.skeleton.parents[low], []
+    while joint != high:
+        found.append(joint)
+        joint = chains.skeleton.parents[joint]
+    return [*found, high]
