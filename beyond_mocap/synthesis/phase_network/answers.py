@@ -1,5 +1,6 @@
-"""What a network's answer is, and how it becomes a pose: hips in the world, all other joints relative to their parents; the
-single network says places and turns of all joints, which need not fit together (Fredriksson §7.2, §7.3, eq. 7.5)."""
+"""What a network's answer is, and how it becomes a pose: hips in the world, all other joints relative to their
+parents; the single network says places and turns of all joints, which need not fit together (Fredriksson §7.2, §7.3,
+eq. 7.5)."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ def answered(
 ) -> Pose:
     """`after` with what the network's answer y (..., out) says; places and turns of its chain are right from then on.
 
-    The single network's places are left out here and its turns taken, so that bones keep their length: `floating` has them.
+    The single network's places are left out here and its turns taken, so that bones keep their length: `floating` has
+    them.
     """
     if name == SINGLE:
         return _single_pose(chains, settings, y, pose, xp)
@@ -53,9 +55,9 @@ def floating(chains: Chains, settings: ModelSettings, y, pose: Pose, xp=np):
 def ends(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
     """Where an answer y (..., out) brings the ends that the loss looks at (E_i of eq. 7.5): (..., E, 3) metres.
 
-    Of hip both upper legs, of body both upper arms and the head (his two, and the head, whose motion was lost in his), of
-    a limb its wrist or toe, each in the chain's reference frame; of the single network its four effectors. Joints that
-    ride along are taken as at rest.
+    Of hip both upper legs, of body both upper arms and the head (his two, and the head, whose motion was lost in
+    his), of a limb its wrist or toe, each in the chain's reference frame; of the single network its four effectors.
+    Joints that ride along are taken as at rest.
     """
     if name == SINGLE:
         count = len(chains.joints)
@@ -116,7 +118,8 @@ def _single_pose(chains: Chains, settings: ModelSettings, y, pose: Pose, xp) -> 
 
 def origin(chains: Chains, settings: ModelSettings, pose: Pose):
     """Where hip and single network measure from: (..., 3) metres."""
-    return pose.positions[..., chains.hips, :] * np.array([0.0, 0.0, 0.0] if settings.frame == "static" else [1.0, 1.0, 0.0])
+    level = np.array([1.0, 1.0, 0.0] if settings.frame == "hip" else [0.0, 0.0, 0.0])
+    return pose.positions[..., chains.hips, :] * level
 
 
 def predicted(name: str, chains: Chains, settings: ModelSettings) -> tuple[int, ...]:

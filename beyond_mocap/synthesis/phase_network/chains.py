@@ -1,9 +1,10 @@
 """Which joints the networks of the hierarchy move: hip, body, two arms, two legs, of any humanoid (Fredriksson §7.3).
 
 He has 25 joints: the hips, ten of the body (spine, thorax, neck, head, both scapulae), three of each arm and four of
-each leg. Here a body chain is whatever lies between the hips, the head and both upper arms, an arm runs from the upper arm to
-the hand and a leg from the upper leg to the toe, joints between them included. All other joints (fingers, twist
-bones, props, joints between the hips and an upper leg) ride along with the local rotation that they have.
+each leg. Here a body chain is whatever lies between the hips, the head and both upper arms, an arm runs from the
+upper arm to the hand and a leg from the upper leg to the toe, joints between them included. All other joints
+(fingers, twist bones, props, joints between the hips and an upper leg) ride along with the local rotation that they
+have.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ class Chains:
     """Joint indices of a skeleton by chain.
 
     above: the joints over the hips, held still. members: chain name -> its joints, parents first; arms end with the
-    hand, legs with the toe. references: chain -> the joint that it hangs on (-1 for the hip). known: chain -> all joints
-    whose place is known once this chain is. effectors: the joints of both hands and both toes. sockets: the first joints of both
-    arms and legs. chest, head: joints, the head the uppermost where there is none.
+    hand, legs with the toe. references: chain -> the joint that it hangs on (-1 for the hip). known: chain -> all
+    joints whose place is known once this chain is. effectors: the joints of both hands and both toes. sockets: the
+    first joints of both arms and legs. chest, head: joints, the head the uppermost where there is none.
     """
 
     skeleton: Skeleton
@@ -68,8 +69,8 @@ class Chains:
     @cached_property
     def leg_sees(self) -> tuple[int, ...]:
         """The (6) joints of the body whose turns the leg networks see."""
-        seen = (self.members["body"][0], self.chest, *(self.references[arm] for arm in LIMB_OF[:2]), self.neck, self.head)
-        return tuple(dict.fromkeys(seen))
+        carriers = (self.references[arm] for arm in LIMB_OF[:2])
+        return tuple(dict.fromkeys((self.members["body"][0], self.chest, *carriers, self.neck, self.head)))
 
 
 def chains_of(skeleton: Skeleton) -> Chains:
@@ -87,9 +88,7 @@ def chains_of(skeleton: Skeleton) -> Chains:
         raise InputError("skeleton", "no joint between the hips and the arms", "a spine")
     members = dict(zip(HIERARCHY, [(body.hips,), tuple(sorted(trunk)), *arms, *legs]))
     references = dict(zip(HIERARCHY, [-1, body.hips, *(parents[joint] for joint in sockets)]))
-    chest = parents[sockets[0]] if parents[sockets[0]] == parents[sockets[1]] else max(
-        set(structure.path(parents, sockets[0])) & set(structure.path(parents, sockets[1]))
-    )
+    chest = structure.common_ancestor(parents, [parents[arm] for arm in sockets[:2]])
     head = chest if body.head is None else body.head
     return Chains(
         skeleton=skeleton,
@@ -117,15 +116,16 @@ def _check(left: Limb, right: Limb) -> None:
         if getattr(limb, part) is None
     ]
     if missing:
-        raise InputError("skeleton", f"no {', no '.join(missing)}", "a body with arms, hands and feet", "take another rig")
+        found = f"no {', no '.join(missing)}"
+        raise InputError("skeleton", found, "a body with arms, hands and feet", "take another rig")
 
 
 def _between(parents, high: int, low: int) -> tuple[int, ...]:
     """Joints from `high` down to `low`, both included; InputError where `low` does not hang below."""
-    way = structure.path(parents, low)
-    way = sorted(way)
+    way = sorted(structure.path(parents, low))
     if high not in way:
-        raise InputError("skeleton", f"joint {low} does not hang below joint {high}", "limbs whose joints follow each other")
+        found = f"joint {low} does not hang below joint {high}"
+        raise InputError("skeleton", found, "limbs whose joints follow each other")
     return tuple(way[way.index(high) :])
 
 

@@ -1,5 +1,5 @@
-"""All that is known of a throw or kick before it is generated (Fredriksson §7.1, §7.7): where hands and feet are to be, when
-the ball leaves, and what it is to hit; and the windows of it that networks see in each frame (eq. 7.1)."""
+"""All that is known of a throw or kick before it is generated (Fredriksson §7.1, §7.7): where hands and feet are to
+be, when the ball leaves, and what it is to hit; and the windows of it that networks see in each frame (eq. 7.1)."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ SAMPLES = BACK + 1 + AHEAD
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """What a motion is to be, in the normalised frame: metres, Z up, floor at 0, the hips' first place over the ground at the
-    origin, +X from there to the impact.
+    """What a motion is to be, in the normalised frame: metres, Z up, floor at 0, the hips' first place over the
+    ground at the origin, +X from there to the impact.
 
-    effectors: (T, 4, 3) m, places of left and right wrist, left and right toe. hands: (T, 2, 3, 3), rotations of the hand
-    joints in the world, or None. limb: which of `EFFECTORS` throws or kicks. release: fractional frame at which the
-    ball leaves it. impact: (3,) m, what the ball is to hit. fps: frames per second. before (B, 4, 3), after (A, 4, 3):
-    places of the effectors in the frames beyond both ends, where they are known; else they are taken to keep still.
+    effectors: (T, 4, 3) m, places of left and right wrist, left and right toe. hands: (T, 2, 3, 3), rotations of the
+    hand joints in the world, or None. limb: which of `EFFECTORS` throws or kicks. release: fractional frame at which
+    the ball leaves it. impact: (3,) m, what the ball is to hit. fps: frames per second. before (B, 4, 3), after (A,
+    4, 3): places of the effectors in the frames beyond both ends, where they are known; else they are taken to keep
+    still.
     """
 
     effectors: np.ndarray
@@ -65,9 +66,10 @@ class Description:
 class Windows(NamedTuple):
     """What networks are told of each frame n, leading axes free.
 
-    points, deltas (..., 4, 9, 3) m: places of the effectors from 0.2 s before to 0.6 s after, and how far each goes in the
-    frame that follows. next (..., 4, 3) m: their places in frame n + 1. hands_next (..., 2, 3, 3): the hands' rotations there,
-    or None. sides (..., 2): b_l, b_r, which side throws or kicks. impact (..., 3) m. phase (...): the motion phase.
+    points, deltas (..., 4, 9, 3) m: places of the effectors from 0.2 s before to 0.6 s after, and how far each goes
+    in the frame that follows. next (..., 4, 3) m: their places in frame n + 1. hands_next (..., 2, 3, 3): the hands'
+    rotations there, or None. sides (..., 2): b_l, b_r, which side throws or kicks. impact (..., 3) m. phase (...):
+    the motion phase.
     """
 
     points: np.ndarray

@@ -24,9 +24,9 @@ class Example:
     """A throw or kick in the normalised frame (see `Description`).
 
     name, subject: for reports, and for telling subjects apart. motion: at the model's rate. limb: index into
-    `EFFECTORS`. release: fractional frame at which the ball leaves. impact: (3,) m. launch: (3,) m/s, the ball's velocity
-    as it leaves, or None. stature: metres. before (B, 4, 3), after (A, 4, 3): places of the effectors beyond the motion's
-    ends, or None.
+    `EFFECTORS`. release: fractional frame at which the ball leaves. impact: (3,) m. launch: (3,) m/s, the ball's
+    velocity as it leaves, or None. stature: metres. before (B, 4, 3), after (A, 4, 3): places of the effectors beyond
+    the motion's ends, or None.
     """
 
     name: str
@@ -63,9 +63,9 @@ def example_of(
     """An example from a motion in the world, floor at 0.
 
     limb: index or name of one of `EFFECTORS`. release: seconds from the motion's first frame. impact (3,) m and
-    launch (3,) m/s, in the world. span: first and last second that the example has, the whole motion without it; what the
-    motion shows beyond them is kept as `before` and `after`. InputError where the impact is on top of the hips, or the
-    skeleton lacks a limb.
+    launch (3,) m/s, in the world. span: first and last second that the example has, the whole motion without it; what
+    the motion shows beyond them is kept as `before` and `after`. InputError where the impact is on top of the hips,
+    or the skeleton lacks a limb.
     """
     first, last = (0.0, motion.duration) if span is None else (max(span[0], 0.0), min(span[1], motion.duration))
     count = int(np.floor((last - first) * fps + 1e-6)) + 1
@@ -89,8 +89,8 @@ def example_of(
 
 
 def _normalised(motion: Motion, impact: np.ndarray, frame: float, name: str) -> tuple[Motion, float, np.ndarray]:
-    """The motion in the frame where the hips' place over the ground at `frame` is the origin and the impact lies on +X; by
-    which angle (radians) it was turned about the world's Z and by which vector (3,) m then moved."""
+    """The motion in the frame where the hips' place over the ground at `frame` is the origin and the impact lies on
+    +X; by which angle (radians) it was turned about the world's Z and by which vector (3,) m then moved."""
     root, rotations = at_frames(motion, np.array([frame]))
     places, _ = forward_kinematics(Motion(motion.skeleton, root, rotations, motion.fps))
     hips = places[0, identify(motion.skeleton).hips] * (1.0, 1.0, 0.0)
@@ -103,8 +103,8 @@ def _normalised(motion: Motion, impact: np.ndarray, frame: float, name: str) -> 
 
 
 def _frames(motion: Motion, first: float, count: int, fps: float) -> list[np.ndarray]:
-    """Of an example of `count` frames from second `first`: its frames, those known before it and those after it, at `fps`,
-    as far as windows see."""
+    """Of an example of `count` frames from second `first`: its frames, those known before it and those after it, at
+    `fps`, as far as windows see."""
     last = int(np.floor((motion.duration - first) * fps + 1e-6))
     back = min(int(np.floor(first * fps + 1e-6)), int(np.ceil(BACK * STEP * fps)))
     ahead = min(last, count - 1 + int(np.ceil(AHEAD * STEP * fps)) + 1)

@@ -6,23 +6,23 @@ out of frame n: `pose` is the state in n, `after` what is known of n + 1 so far,
     after = pose
     for name in HIERARCHY:
         x = network_input(name, chains, settings, pose, after, window)
-        after = answered(name, chains, settings, y(x), after, pose, window)
+        after = answered(name, chains, settings, y(x), pose, after, window)
 
 Where the text leaves something open, this is what was decided:
 
 - **Hip**: its 14 joints are the hips, the chest, and upper, middle and end joint of each limb (of legs the ankle).
 - **Static frame** (`frame="static"`, his): the normalised frame. `frame="hip"` (ours): the same, moved so that the
   hips of frame n stand over the origin, so that a run-up may go anywhere.
-- **Reference frame of a chain**: place and turn of the joint that it hangs on, in frame n + 1; trajectories, impact and joints
-  "in absolute form" are given in it, those of frame n too. δa_o: the turn from the frame's axes in n to those in n + 1, seen
-  in n, as six numbers less those of no turn. His "delta axis" is a difference of world axes; this one does not change when the
-  world turns.
+- **Reference frame of a chain**: place and turn of the joint that it hangs on, in frame n + 1; trajectories, impact
+  and joints "in absolute form" are given in it, those of frame n too. δa_o: the turn from the frame's axes in n to
+  those in n + 1, seen in n, as six numbers less those of no turn. His "delta axis" is a difference of world axes;
+  this one does not change when the world turns.
 - **Body**: the 8 joints outside it are elbows, wrists, knees and ankles, in frame n.
-- **Arm**: d is from the upper arm to where the wrist is to be in n + 1; the wrist's rotation r¹ is that of the hand in the
-  reference frame, because the lower arm that it would be relative to is what is asked for. p_i¹ are the hips and the body's joints
-  except the reference itself, a_k¹ those of hips and body.
-- **Leg**: p_i¹ are the head and both shoulders (upper arms), a_k¹ six joints of the body: lowest, chest, both joints that
-  carry the arms, neck, head.
+- **Arm**: d is from the upper arm to where the wrist is to be in n + 1; the wrist's rotation r¹ is that of the hand
+  in the reference frame, because the lower arm that it would be relative to is what is asked for. p_i¹ are the hips
+  and the body's joints except the reference itself, a_k¹ those of hips and body.
+- **Leg**: p_i¹ are the head and both shoulders (upper arms), a_k¹ six joints of the body: lowest, chest, both joints
+  that carry the arms, neck, head.
 - **Wrist inferred**: no r¹, and the hand's relative rotation joins those of the arm, in input and output.
 - **Phase**: of a leg, that of d in n + 1, which stands in the input; of all others the motion phase of frame n.
 """
@@ -62,7 +62,8 @@ def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach,
 
 def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
     """(b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (§7.3)."""
-    return xp.concatenate([*_motion(chains, settings, pose, window, xp), *_joints(chains, settings, pose, chains.hip_sees, xp)], axis=-1)
+    joints = _joints(chains, settings, pose, chains.hip_sees, xp)
+    return xp.concatenate([*_motion(chains, settings, pose, window, xp), *joints], axis=-1)
 
 
 def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):

@@ -12,15 +12,12 @@ import numpy as np
 
 from ...errors import InputError
 from ...motion.skeleton import Skeleton, frozen_array
+from .chains import HIERARCHY
 from .network import PhaseNetwork
 
 if TYPE_CHECKING:
     from .example import Example
 
-EFFECTORS = ("left_hand", "right_hand", "left_foot", "right_foot")
-"""Wrists and toes: what a description says the way of."""
-CHAINS = ("hip", "body", "left_arm", "right_arm", "left_leg", "right_leg")
-"""The networks of a hierarchy, parents before children (Fredriksson fig. 7.1)."""
 SINGLE = "single"
 """The one network of the monolithic model (§7.2)."""
 _CHOICES = {
@@ -73,7 +70,7 @@ class ModelSettings:
     @property
     def networks(self) -> tuple[str, ...]:
         """Names of its networks, in the order in which they are evaluated."""
-        return CHAINS if self.kind == "hierarchy" else (SINGLE,)
+        return HIERARCHY if self.kind == "hierarchy" else (SINGLE,)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ class TrainingSet(NamedTuple):
 def steps(example: Example, reference: np.ndarray | None = None) -> Steps:
     """The example's steps. reference: the speed curve for warped phases."""
     states, window = poses(example), windows(describe(example), reference)
-    return Steps(*(_rows(part, cut) for part, cut in ((states, slice(-1)), (states, slice(1, None)), (window, slice(-1)))))
+    return Steps(_rows(states, slice(-1)), _rows(states, slice(1, None)), _rows(window, slice(-1)))
 
 
 def joined(all_steps: Sequence[Steps]) -> Steps:
@@ -85,7 +85,8 @@ def shared_chains(examples: Sequence[Example]) -> Chains:
 
 
 def leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, float]]:
-    """Shortest and longest distance in metres from the top of a leg to its toe (eq. 7.3), over both legs' own examples."""
+    """Shortest and longest distance in metres from the top of a leg to its toe (eq. 7.3), over both legs' own
+    examples."""
     chains = shared_chains(examples)
     whole = joined([steps(example) for example in examples])
     found = {}
