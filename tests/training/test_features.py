@@ -14,7 +14,7 @@ from beyond_mocap.synthesis.phase_network.model import ModelSettings
 from beyond_mocap.synthesis.phase_network.training_set import leg_reach, steps
 
 TARGET = (12.0, 3.0, 1.2)
-CASES = [ModelSettings(kind, wrist=wrist) for kind in ("hierarchy", "single") for wrist in ("given", "inferred")]
+CASES = [ModelSettings(), ModelSettings("single", wrist="inferred", frame="static")]
 
 
 @pytest.fixture(scope="module")
@@ -38,19 +38,20 @@ def told(settings, chains, reach, pose, truth, window, xp):
 def test_the_same_in_numpy_and_jax(example, settings):
     chains, reach, parts = chains_of(example.motion.skeleton), leg_reach([example]), steps(example)
     mine = told(settings, chains, reach, *parts, np)
-    theirs = jax.jit(lambda parts: told(settings, chains, reach, *parts, jnp))(parts)
+    theirs = told(settings, chains, reach, *jax.tree.map(jnp.asarray, parts), jnp)
     for here, there in zip(jax.tree.leaves(mine), jax.tree.leaves(theirs)):
         assert np.abs(here - np.asarray(there)).max() < 1e-4
 
 
-def test_gradients_go_through_a_whole_frame(example):
+def test_gradients_go_from_wrist_to_hips(example):
     chains, settings = chains_of(example.motion.skeleton), ModelSettings()
     pose, truth, window = jax.tree.map(lambda array: jnp.asarray(array[:5]), steps(example))
-    answers = {name: network_output(name, chains, settings, pose, truth, jnp) for name in settings.networks}
+    names = ("hip", "right_arm")
+    answers = {name: network_output(name, chains, settings, pose, truth, jnp) for name in names}
 
     def off(answers):
         after = pose
-        for name in settings.networks:
+        for name in names:
             after = answered(name, chains, settings, answers[name], pose, after, window, jnp)
         return jnp.sum((after.positions - truth.positions + 0.01) ** 2)
 
