@@ -18,8 +18,9 @@ import numpy as np
 from ..errors import InputError
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
+from ..synthesis.phase_network.chains import EFFECTORS
 from ..synthesis.phase_network.example import Example
-from ..synthesis.phase_network.model import EFFECTORS, ModelSettings, ThrowModel
+from ..synthesis.phase_network.model import ModelSettings, ThrowModel
 from ..synthesis.phase_network.network import PhaseNetwork
 from .content import content
 from .json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
