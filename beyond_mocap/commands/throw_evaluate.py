@@ -1,0 +1,71 @@
+"""The verb `throw evaluate`: how good trained networks are on throws or kicks that they never saw."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+
+from .. import __version__
+from ..errors import InputError
+from .numbers import whole
+from .outputs import Writer, check_outputs
+from .told import Told
+
+
+def add(verbs):
+    """The verb's parser."""
+    verb = verbs.add_parser("evaluate", help="how good trained networks are on recorded throws or kicks")
+    verb.add_argument("--model", type=Path, required=True, metavar="W.npz", help="what throw train wrote")
+    verb.add_argument("--examples", type=Path, required=True, metavar="FOLDER", help="recordings with annotations")
+    verb.add_argument("--subject", action="append", default=[], metavar="S", help="only this one's; repeatable")
+    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
+    verb.add_argument("--html", type=Path, metavar="R.html", help="the same as a page for a browser")
+    verb.add_argument("--raw", action="store_true", help="networks alone: no pose iterations, no inverse kinematics")
+    verb.add_argument("--as-they-are", action="store_true", help="do not scale what is asked for by height")
+    most = partial(whole, low=1, high=1_000_000, expected="1 to 1000000")
+    verb.add_argument("--motions", type=most, metavar="N", help="of each subject at most, evenly chosen")
+    verb.set_defaults(run=run)
+    return verb
+
+
+def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`throw evaluate`: generates every example anew and writes how far off it is."""
+    from ..evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
+    from ..evaluation.throws.page import throws_page
+    from ..files.network_npz import read_model
+    from ..files.tables import write_report
+    from ..files.whole import atomic_write
+    from ..throw_examples import examples_in
+
+    begun = time.perf_counter()
+    check_outputs(options.report, options.html, never=(options.model,))
+    model = read_model(options.model)
+    every = examples_in(options.examples, model.settings.action, model.settings.fps, told=told.note)
+    chosen = some_of_each(_of_subjects(every, options.subject, options.examples), options.motions)
+    loaded = time.perf_counter()
+    found = evaluate_throws(
+        model, chosen, RAW if options.raw else FULL, by_height=not options.as_they_are, progress=told.progress,
+        cancelled=told.cancelled,
+    )  # fmt: skip
+    for line in found.left_out:
+        told.note(line)
+    report = {
+        "version": __version__, "model": str(options.model), "trained_on": model.trained_on,
+        "examples": str(options.examples), **found.report(),
+        "elapsed": {"load": loaded - begun, "evaluate": time.perf_counter() - loaded},
+    }  # fmt: skip
+    write_report(options.report, report)
+    if options.html:
+        atomic_write(options.html, throws_page(report))
+    told.end()
+
+
+def _of_subjects(examples, wanted: list[str], folder: Path):
+    """The examples of the wanted subjects, all without any. InputError for one that nobody is."""
+    there = sorted({example.subject for example in examples})
+    for name in wanted:
+        if name not in there:
+            raise InputError("--subject", name, f"one of {', '.join(there)}", f"see {folder}")
+    return [example for example in examples if not wanted or example.subject in wanted]
