@@ -8,7 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-_NEXT = np.array([1, 2, 0])
+_ONES = np.ones((3, 1))
+_CROSS = np.zeros((9, 3))  # the nine products of two vectors' components -> their cross product
+_CROSS[[5, 6, 1], [0, 1, 2]], _CROSS[[7, 2, 3], [0, 1, 2]] = 1.0, -1.0
+_SKEW = np.zeros((3, 9))  # a vector -> the matrix of the cross product with it
+_SKEW[[0, 1, 2], [7, 2, 3]], _SKEW[[0, 1, 2], [5, 6, 1]] = 1.0, -1.0
+_EYE = np.eye(3)
 _STRAIGHT = 0.03  # weight of the given hinge against the sine of the bend that the limb shows itself
 _TINY = 1e-12
 
@@ -27,8 +32,8 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
     soft: metres below full length from where the limb eases (`motion.limb.soft_distance`).
 
     Returns turn_upper, turn_lower (..., 3, 3), to be put left of the bones' world rotations, and the end joint's new
-    place (..., 3). Bones keep their lengths; a target out of reach is neared along its line, one too close to `top` kept
-    away by the difference of the bones.
+    place (..., 3). Bones keep their lengths; a target out of reach is neared along its line, one too close to `top` is
+    kept away by the difference of the bones.
     """
     upper, lower = middle - top, end - middle
     long_upper, long_lower = _length(upper, xp), _length(lower, xp)
@@ -42,9 +47,8 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
     cosine = (reach * reach - long_upper * long_upper - long_lower * long_lower) / (2.0 * long_upper * long_lower)
     cosine = xp.clip(cosine, -1.0 + 1e-9, 1.0 - 1e-9)
     bent = cosine * along + xp.sqrt(1.0 - cosine * cosine) * _cross(axis, along)
-    turn_bend = _frame(bent, axis) @ _swapped(_frame(down, _unit(axis - _dot(axis, down) * down, xp)))
-    swing = _shortest(_unit(long_upper * along + long_lower * bent, xp), way / asked, xp)
-    return swing, swing @ turn_bend, top + way * (reach / asked)
+    swing = _shortest(_unit(long_upper * along + long_lower * bent, xp), way / asked)
+    return swing, swing @ _shortest(down, bent), top + way * (reach / asked)
 
 
 def _eased(asked, upper, lower, soft, xp):
@@ -56,46 +60,25 @@ def _eased(asked, upper, lower, soft, xp):
     return xp.maximum(far, xp.abs(upper - lower) + 0.02 * longest)
 
 
-def _shortest(one, other, xp):
+def _shortest(one, other):
     """Rotations (..., 3, 3) that turn unit `one` (..., 3) to unit `other` by the shortest arc."""
     cosine = _dot(one, other)[..., None]
     axis = _cross(one, other)
-    outer = axis[..., :, None] * axis[..., None, :] / (1.0 + cosine + 1e-9)
-    return cosine * np.eye(3) + _skew(axis, xp) + outer
-
-
-def _skew(v, xp):
-    zero = xp.zeros_like(v[..., 0])
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    return xp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape[:-1], 3, 3)
-
-
-def _frame(direction, axis):
-    """Columns: direction, axis, and what is square to both."""
-    return _columns(direction, axis, _cross(direction, axis))
-
-
-def _columns(x, y, z):
-    return x[..., :, None] * _EYE[0] + y[..., :, None] * _EYE[1] + z[..., :, None] * _EYE[2]
-
-
-_EYE = np.eye(3)
-
-
-def _swapped(m):
-    return m.swapaxes(-1, -2)
+    skew = (axis @ _SKEW).reshape(*axis.shape[:-1], 3, 3)
+    return cosine * _EYE + skew + axis[..., :, None] * (axis[..., None, :] / (1.0 + cosine + 1e-9))
 
 
 def _cross(a, b):
-    return (a * b[..., _NEXT] - a[..., _NEXT] * b)[..., _NEXT]
+    products = a[..., :, None] * b[..., None, :]
+    return products.reshape(*products.shape[:-2], 9) @ _CROSS
 
 
 def _dot(a, b):
-    return (a * b).sum(-1)[..., None]
+    return (a * b) @ _ONES
 
 
 def _length(v, xp):
-    return xp.sqrt((v * v).sum(-1)[..., None] + _TINY)
+    return xp.sqrt((v * v) @ _ONES + _TINY)
 
 
 def _unit(v, xp):

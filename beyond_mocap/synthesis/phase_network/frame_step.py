@@ -21,10 +21,10 @@ _SETTLES = 0.12
 
 
 class Step(NamedTuple):
-    """The next frame. pose: as it is to be. state: what the frame after is predicted from: the pose, or for a single network
-    without inverse kinematics its own floating places (§7.2). predicted (4, 3) m: where the networks had the effectors.
-    over (J,): radians by which joints were beyond their limits. floating (j, 3) m: the places that a single network says, or
-    None."""
+    """The next frame. pose: as it is to be. state: what the frame after is predicted from: the pose, or for a single
+    network without inverse kinematics its own floating places (§7.2). predicted (4, 3) m: where the networks had the
+    effectors. over (J,): radians by which joints were beyond their limits. floating (j, 3) m: the places that a
+    single network says, or None."""
 
     pose: Pose
     state: Pose
@@ -44,8 +44,9 @@ class Stepper:
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
     def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: float, limited: bool) -> Step:
-        """Frame n + 1 from the pose and window of n. wanted (4, 3) m: where the effectors are to be; share: how much of the way
-        from what the networks say to there is taken, 0 for none. limited: joints are kept within their limits."""
+        """Frame n + 1 from the pose and window of n. wanted (4, 3) m: where the effectors are to be; share: how much
+        of the way from what the networks say to there is taken, 0 for none. limited: joints are kept within their
+        limits."""
         after, floating = self.predicted(pose, window)
         said = after.positions[self.effectors] if floating is None else self._said(floating)
         over = np.zeros(len(self.model.skeleton))
@@ -107,7 +108,8 @@ def stillness(model: ThrowModel) -> tuple[int, ...]:
 
 @lru_cache(maxsize=8)
 def _fading(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """How much of an offset is left at a window's samples (9, 1), how much less a frame later (9, 1), and in the next frame."""
+    """How much of an offset is left at a window's samples (9, 1), how much less a frame later (9, 1), and in the next
+    frame."""
     seconds = (np.arange(SAMPLES) - BACK) * STEP
 
     def left(t):

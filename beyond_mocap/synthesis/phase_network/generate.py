@@ -24,9 +24,9 @@ class Options:
     """How a motion is generated.
 
     pose_iterations, tolerance: the start pose is predicted again until hands and feet are within `tolerance` metres of
-    where they are to be, or so many times (§7.7.1: 75, 0.01). ik: limbs are corrected in each frame, by `share` of the way
-    to where they are wanted, before the next is predicted (§7.7.3). blend: networks see trajectories that begin where
-    hands and feet are. limits: joints stay within the range of the training data.
+    where they are to be, or so many times (§7.7.1: 75, 0.01). ik: limbs are corrected in each frame, by `share` of
+    the way to where they are wanted, before the next is predicted (§7.7.3). blend: networks see trajectories that
+    begin where hands and feet are. limits: joints stay within the range of the training data.
     """
 
     pose_iterations: int = 75
@@ -47,9 +47,9 @@ class Generated:
     """A generated motion.
 
     effectors, predicted: (T, 4, 3) m, where hands and feet are, and where the networks had them in that frame before
-    anything was corrected. wanted: (T, 4, 3) m. over: (T, J) radians by which joints would have been beyond their limits.
-    floating: (T, j, 3) m, the places that a single network says of the joints `Chains.joints`, else None. iterations: of
-    the start pose. seconds: what it took.
+    anything was corrected. wanted: (T, 4, 3) m. over: (T, J) radians by which joints would have been beyond their
+    limits. floating: (T, j, 3) m, the places that a single network says of the joints `Chains.joints`, else None.
+    iterations: of the start pose. seconds: what it took.
     """
 
     motion: Motion

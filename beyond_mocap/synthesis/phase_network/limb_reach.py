@@ -1,5 +1,5 @@
-"""Hands and feet brought towards where they are wanted, on a pose whose limbs the networks have spoken of: one limb at a
-time with numpy or jax, as the layer that networks are trained with (§9.4), and all four at once for use."""
+"""Hands and feet brought towards where they are wanted, on a pose whose limbs the networks have spoken of: one limb
+at a time with numpy or jax, as the layer that networks are trained with (§9.4), and all four at once for use."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
 def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.ndarray, turn_kept: bool, xp) -> Pose:
     """`after` with limb `number` of `EFFECTORS` brought towards `wanted` (..., 3) m by `share` of the way.
 
-    axes: of `hinge_axes`. turn_kept: hand or foot keeps its turn in the world (a given hand; every foot, so that the toe comes
-    to its place); else it rides on the lower bone. All joints of the limb are right afterwards, in numpy and in jax.
+    axes: of `hinge_axes`. turn_kept: hand or foot keeps its turn in the world (a given hand; every foot, so that the
+    toe comes to its place); else it rides on the lower bone. All joints of the limb are right afterwards, in numpy
+    and in jax.
     """
     upper, middle, end, effector = _joints(chains, number)
     places, turns, parents = after.positions, after.turns, chains.skeleton.parents

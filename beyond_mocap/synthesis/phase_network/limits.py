@@ -2,9 +2,9 @@
 
 A joint's range is kept about the mean of its rotations in the training data: the offset from that mean is a rotation
 vector, and each of its three components stays between the lowest and highest that was seen, widened by a margin. About
-the mean the vectors are short, also where a rig's rest pose lies far from how the joint is used, so the box has no seam.
-A network that is asked for what it has never seen can leave the range (Fredriksson §9.4: "extreme angular velocities");
-`within` brings it back.
+the mean the vectors are short, also where a rig's rest pose lies far from how the joint is used, so the box has no
+seam. A network that is asked for what it has never seen can leave the range (Fredriksson §9.4: "extreme angular
+velocities"); `within` brings it back.
 
 As an array of a model: (J, 3, 3), rows middle (rotation vector, rad), lowest and highest offset (rad) of each joint.
 """
@@ -27,7 +27,10 @@ _SHARE = 0.08  # of the range, on either side
 _ROUNDS = 8
 _CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
 _BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+_OFF = 1e-9  # radians
+_ONES = np.ones(3)
+_PARTS = np.zeros((9, 4))  # a matrix's nine numbers -> its skew part as a vector, and its trace
+_PARTS[[7, 2, 3], [0, 1, 2]], _PARTS[[5, 6, 1], [0, 1, 2]], _PARTS[[0, 4, 8], 3] = 1.0, -1.0, 1.0
 
 
 def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
@@ -77,17 +80,21 @@ class JointLimits:
             raise InputError("joint limits", "a lowest angle above the highest", "lowest, then highest")
         self.skeleton = skeleton
         self.middle = quaternion.to_matrix(quaternion.from_rotation_vector(limits[:, 0]))
+        self._back = np.ascontiguousarray(self.middle.swapaxes(-1, -2))
         self.low, self.high = limits[:, 1], limits[:, 2]
         self.hinges = _hinges(skeleton, self.middle)
-        self._least = float(min(-self.low.max(), self.high.min()))
+        self._joints = np.array([hinge.joint for hinge in self.hinges], dtype=int)
+        self._bones = np.array([hinge.bone for hinge in self.hinges]).reshape(-1, 3, 1)
+        axes = [(np.cross(hinge.across, hinge.along), hinge.along) for hinge in self.hinges]
+        self._axes = np.array(axes).reshape(-1, 2, 3)
 
     def offsets(self, local: np.ndarray) -> np.ndarray:
         """Rotation vectors (..., J, 3) rad from the middle to local rotations (..., J, 3, 3)."""
-        m = self.middle.swapaxes(-1, -2) @ local
-        sine = 0.5 * (m[..., _LAST, _NEXT] - m[..., _NEXT, _LAST])
-        cosine = 0.5 * (m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2] - 1.0)
-        length = np.sqrt((sine * sine).sum(-1))
-        angle = np.arctan2(length, cosine)
+        m = self._back @ local
+        parts = m.reshape(*m.shape[:-2], 9) @ _PARTS  # twice the sine times the axis, and the trace
+        sine = 0.5 * parts[..., :3]
+        length = np.sqrt((sine * sine) @ _ONES)
+        angle = np.arctan2(length, 0.5 * (parts[..., 3] - 1.0))
         scale = np.where(length > 1e-7, angle / np.maximum(length, 1e-7), 1.0)
         return scale[..., None] * sine
 
@@ -95,8 +102,8 @@ class JointLimits:
         """How far local rotations (..., J, 3, 3) lie outside, (..., J) rad: out of the box, or bent backwards."""
         offsets = self.offsets(local)
         out = np.linalg.norm(offsets - np.clip(offsets, self.low, self.high), axis=-1)
-        for hinge in self.hinges:
-            out[..., hinge.joint] = np.maximum(out[..., hinge.joint], np.maximum(-_BACK - bend_of(hinge, local), 0.0))
+        joints = [hinge.joint for hinge in self.hinges]
+        out[..., joints] = np.maximum(out[..., joints], self._backwards(local))
         return out
 
     def within(self, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -104,30 +111,27 @@ class JointLimits:
         offsets = self.offsets(local)
         kept = np.minimum(np.maximum(offsets, self.low), self.high)
         over = np.abs(offsets - kept).max(-1)
-        if over.max() > 1e-9:
+        if over.max() > _OFF:
             turned = self.middle @ quaternion.to_matrix(quaternion.from_rotation_vector(kept))
-            local = np.where((over > 1e-9)[..., None, None], turned, local)
-        for hinge in self.hinges:
-            back = np.maximum(-_BACK - bend_of(hinge, local), 0.0)
-            if back.max() > 1e-9:
-                local, over = _straightened(hinge, local, back), over.copy()
-                over[..., hinge.joint] = np.maximum(over[..., hinge.joint], back)
+            local = np.where((over > _OFF)[..., None, None], turned, local)
+        back = self._backwards(local)
+        if back.any():
+            local, over = local.copy(), over.copy()
+            for number, hinge in enumerate(self.hinges):
+                turn = quaternion.from_rotation_vector(back[..., number, None] * hinge.across)
+                local[..., hinge.joint, :, :] = quaternion.to_matrix(turn) @ local[..., hinge.joint, :, :]
+                over[..., hinge.joint] = np.maximum(over[..., hinge.joint], back[..., number])
         return local, over
 
+    def bends(self, local: np.ndarray) -> np.ndarray:
+        """Bends (..., H) rad of `hinges` in local rotations (..., J, 3, 3): 0 straight, negative backwards."""
+        bones = local[..., self._joints, :, :] @ self._bones
+        shares = self._axes @ bones
+        return np.arctan2(shares[..., 0, 0], shares[..., 1, 0])
 
-def bend_of(hinge: Hinge, local: np.ndarray) -> np.ndarray:
-    """Bend (...,) rad of an elbow or knee in local rotations (..., J, 3, 3): 0 straight, negative backwards."""
-    bone = local[..., hinge.joint, :, :] @ hinge.bone
-    forward = _cross(hinge.across, hinge.along)
-    return np.arctan2(bone @ forward, bone @ hinge.along)
-
-
-def _straightened(hinge: Hinge, local: np.ndarray, back: np.ndarray) -> np.ndarray:
-    """The rotations with the lower bone turned by `back` (...,) rad about the hinge."""
-    turn = quaternion.to_matrix(quaternion.from_rotation_vector(back[..., None] * hinge.across))
-    out = local.copy()
-    out[..., hinge.joint, :, :] = turn @ local[..., hinge.joint, :, :]
-    return out
+    def _backwards(self, local: np.ndarray) -> np.ndarray:
+        """Radians (..., H) by which hinges bend further back than they may."""
+        return np.maximum(-_BACK - self.bends(local), 0.0)
 
 
 def _hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:
@@ -147,7 +151,7 @@ def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hing
     if skeleton.parents[end] != lower:
         return None
     along = _unit(skeleton.offsets[lower])
-    across = _cross(along, _unit(middle[lower] @ skeleton.offsets[end]))
+    across = np.cross(along, _unit(middle[lower] @ skeleton.offsets[end]))
     if np.linalg.norm(across) < np.sin(_CLEAR):
         return None
     return Hinge(lower, end, _unit(across), along, skeleton.offsets[end])
@@ -156,6 +160,3 @@ def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hing
 def _unit(v: np.ndarray) -> np.ndarray:
     return v / max(float(np.linalg.norm(v)), 1e-12)
 
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return (a * b[..., _NEXT] - a[..., _NEXT] * b)[..., _NEXT]

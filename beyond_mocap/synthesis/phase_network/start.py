@@ -63,7 +63,8 @@ def nearest(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb:
     turned = quaternion.turned_level(theirs, turn[:, None])
     swift = quaternion.turned_level(among.velocities[..., :2], turn[:, None])
     cost = ((turned - mine) ** 2).sum((-1, -2)) + ((among.places[..., 2] - places[:, 2]) ** 2).sum(-1)
-    change = ((swift - velocities[:, :2]) ** 2).sum((-1, -2)) + ((among.velocities[..., 2] - velocities[:, 2]) ** 2).sum(-1)
+    change = ((swift - velocities[:, :2]) ** 2).sum((-1, -2))
+    change = change + ((among.velocities[..., 2] - velocities[:, 2]) ** 2).sum(-1)
     cost = cost + _SECONDS**2 * change + (_TURN * turn) ** 2 + (_LATE * among.late) ** 2
     cost = cost + 1e3 * (among.limb != limb)
     best = int(np.argmin(cost))
@@ -71,8 +72,8 @@ def nearest(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb:
 
 
 def placed(model: ThrowModel, example: int, frame: int, turn: float, places: np.ndarray) -> Pose:
-    """The pose of an example's frame, turned by `turn` radians and moved over the ground so that its effectors lie about
-    places (4, 3) m; its joints move as they do there."""
+    """The pose of an example's frame, turned by `turn` radians and moved over the ground so that its effectors lie
+    about places (4, 3) m; its joints move as they do there."""
     motion = model.examples[example].motion
     both = slice(max(frame - 1, 0), frame + 1)
     local = matrices(motion.frames(both.start, both.stop))

@@ -1,4 +1,5 @@
-"""Networks that know the truth by heart give the motion back; a wrong start is found out of; what is asked wrongly is told."""
+"""Networks that know the truth by heart give the motion back; a wrong start is found out of; what is asked wrongly is
+told."""
 
 from dataclasses import replace
 
@@ -60,8 +61,8 @@ def knowing(examples, **settings):
     rows = training_set(examples, settings)
     return ThrowModel(
         settings, examples[0].motion.skeleton, {name: by_heart(rows[name]) for name in settings.networks},
-        leg_reach(examples), tuple(examples), joint_limits=learn(np.concatenate([e.motion.rotations for e in examples])),
-    )  # fmt: skip
+        leg_reach(examples), tuple(examples), joint_limits=learn(np.concatenate([e.motion.rotations for e in
+        examples])), )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
