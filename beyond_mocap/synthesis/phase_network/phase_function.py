@@ -29,6 +29,21 @@ def weights(phase, points: int = 4, xp=np):
     return xp.concatenate([first, every[..., 2:-2], last], -1)
 
 
+def weights_at(phase: float, points: int = 4) -> list[float]:
+    """The same for one phase, without numpy: many times as fast for one frame. eq. 3.25 (corrected) and 3.26."""
+    if points == 1:
+        return [1.0]
+    along = min(max(phase, 0.0), 1.0) * (points - 1)
+    k = min(int(along), points - 2)
+    t = along - k
+    out = [0.0] * points
+    out[max(k - 1, 0)] += t * (t * (1.0 - 0.5 * t) - 0.5)
+    out[k] += 1.0 + t * t * (1.5 * t - 2.5)
+    out[k + 1] += t * (t * (2.0 - 1.5 * t) + 0.5)
+    out[min(k + 2, points - 1)] += t * t * (0.5 * t - 0.5)
+    return out
+
+
 def _kernel(d, xp):
     """A point's weight at a distance of `d` >= 0 points."""
     near = 1.0 + d * d * (1.5 * d - 2.5)

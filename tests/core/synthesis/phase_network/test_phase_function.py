@@ -42,3 +42,10 @@ def test_weights_glide_and_do_not_close():
 def test_leading_axes_are_free_and_phases_beyond_the_ends_count_as_the_ends():
     assert phase_function.weights(np.zeros((5, 2)), 4).shape == (5, 2, 4)
     np.testing.assert_array_equal(phase_function.weights(1.7), phase_function.weights(1.0))
+
+
+@pytest.mark.parametrize("points", [1, 2, 3, 4, 7])
+def test_one_phase_is_weighed_as_many_are(points):
+    phases = [-0.3, 0.0, 0.2, 1 / 3, 0.5, 0.66, 0.999, 1.0, 1.2]
+    one_by_one = [phase_function.weights_at(phase, points) for phase in phases]
+    np.testing.assert_allclose(one_by_one, phase_function.weights(np.array(phases), points), atol=1e-12)

@@ -1,0 +1,174 @@
+"""What the networks of a hierarchy say of the next frame of one body, as fast as numpy goes: the same as `features` and
+`answers` say, without free axes and jax, all four limbs at once. Tests hold both together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .answers import predicted
+from .chains import HIERARCHY, LIMB_OF, Chains
+from .description import Windows
+from .kinematics import Pose
+from .model import ThrowModel
+from .phase_function import weights_at
+
+_SIX = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # no turn
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+_TINY = 1e-12
+_GROUND = np.array([1.0, 1.0, 0.0])
+
+
+class OneFrame:
+    """The networks of a hierarchy, ready to say one frame after the other. It keeps nothing between frames."""
+
+    def __init__(self, model: ThrowModel, chains: Chains):
+        """`model`: of kind hierarchy. `chains`: of its skeleton."""
+        settings = model.settings
+        self.chains, self.points = chains, settings.points
+        self.static, self.given = settings.frame == "static", settings.wrist == "given"
+        self.networks = [model.networks[name].frame for name in HIERARCHY]
+        self.reach = [model.leg_reach[name[:-4]] for name in LIMB_OF[2:]]
+        self.plans = {name: _plan(chains, name) for name in HIERARCHY}
+        self.said = [list(predicted(name, chains, settings)) for name in HIERARCHY]
+        self.limb_joints = [joint for said in self.said[2:] for joint in said]
+        self.hip_sees, self.body_sees = list(chains.hip_sees), list(chains.body_sees)
+        self.references = [chains.references[name] for name in LIMB_OF]
+        self.sockets = chains.skeleton.offsets[list(chains.sockets)][:, :, None]
+        self.trunk = [chains.hips, *chains.members["body"]]
+        self.others = [[i for i, joint in enumerate(self.trunk) if joint != reference] for reference in self.references[:2]]
+        self.leg_sees, self.shoulders = list(chains.leg_sees), self.references[:2]
+
+    def __call__(self, pose: Pose, window: Windows) -> Pose:
+        """Frame n + 1 from the state and the window of n, both of one frame. `moved` stays that of n."""
+        theta = np.array(weights_at(float(window.phase), self.points), np.float32)
+        after = Pose(pose.root, pose.local.copy(), pose.positions.copy(), pose.turns.copy(), pose.moved)
+        sixes = pose.turns.swapaxes(1, 2)[:, :2].reshape(-1, 6)
+        relative = pose.local.swapaxes(1, 2)[:, :2].reshape(-1, 6)
+        after = self._hips(after, self.networks[0](self._hip_input(pose, window, sixes), theta), pose)
+        turns = _rotations(self.networks[1](self._body_input(pose, after, window, relative), theta))
+        after.local[self.said[1]] = turns
+        _spread(self.plans["body"], after, {})
+        turns = _rotations(self._limbs(pose, after, window, relative, theta))
+        after.local[self.limb_joints] = turns
+        for number, name in enumerate(LIMB_OF):
+            hand = self.given and number < 2
+            given = {self.chains.effectors[number]: window.hands_next[number]} if hand else {}
+            _spread(self.plans[name], after, given)
+        return after
+
+    def _hip_input(self, pose: Pose, window: Windows, sixes: np.ndarray) -> np.ndarray:
+        start = pose.positions[self.chains.hips] * (0.0 if self.static else _GROUND)
+        trajectories = np.concatenate([window.points - start, window.deltas], axis=1)
+        places = pose.positions[self.hip_sees] - start
+        return _row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_sees])
+
+    def _hips(self, after: Pose, y: np.ndarray, pose: Pose) -> Pose:
+        """The body with its hips where the first network says; joints above them only move."""
+        y, hips, offsets = y.astype(float), self.chains.hips, self.chains.skeleton.offsets
+        place = y[:3] + (0.0 if self.static else pose.positions[hips] * _GROUND)
+        turn = _rotations(y[3:])[0]
+        root, above = place, None
+        for joint in (*self.chains.above, hips):
+            if joint:
+                root = root - above @ offsets[joint]
+            above = after.local[joint] if above is None else above @ after.local[joint]
+        after = after._replace(root=root)
+        _spread(self.plans["hip"], after, {hips: turn})
+        return after
+
+    def _body_input(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray) -> np.ndarray:
+        joint = self.chains.references["body"]
+        origin, axes = after.positions[joint], after.turns[joint]
+        points, deltas = (window.points[:2] - origin) @ axes, window.deltas[:2] @ axes
+        toes, impact = (window.next[2:] - origin) @ axes, (window.impact - origin) @ axes
+        turned = _six(pose.turns[joint].T @ axes) - _SIX
+        places = (pose.positions[self.body_sees] - origin) @ axes
+        turns = _six(axes.T @ pose.turns[self.body_sees])
+        return _row(window.sides, impact, np.concatenate([points, deltas], axis=1), toes, turned,
+                    relative[self.said[1]], places, turns)  # fmt: skip
+
+    def _limbs(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """What the networks of arms and legs say, one after the other: (rotations * 6,)."""
+        origins, axes = after.positions[self.references], after.turns[self.references]
+        points, deltas = (window.points - origins[:, None]) @ axes, window.deltas @ axes
+        trajectories = np.concatenate([points, deltas], axis=1)
+        following = ((window.next - origins)[:, None] @ axes)[:, 0]
+        back = axes.swapaxes(1, 2)
+        turned = _six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _SIX
+        way = window.next - (origins + (axes @ self.sockets)[:, :, 0])
+        stretch = np.sqrt((way * way).sum(-1))
+        arms = self._arm_inputs(after, window, origins, axes, back)
+        legs = self._leg_inputs(after, origins, axes, back)
+        answers = []
+        for number, network in enumerate(self.networks[2:]):
+            said = relative[self.said[2 + number]]
+            begin = trajectories[number], following[number], turned[number]
+            if number < 2:
+                wrist, *rest = arms[number]
+                x = _row(window.sides, *begin, *wrist, stretch[number : number + 1], said, *rest)
+            else:
+                x = _row(*begin, stretch[number : number + 1], said, *legs[number - 2])
+                low, high = self.reach[number - 2]
+                phase = (float(stretch[number]) - low) / (high - low)
+                theta = np.array(weights_at(phase, self.points), np.float32)
+            answers.append(network(x, theta))
+        return np.concatenate(answers)
+
+    def _arm_inputs(self, after: Pose, window: Windows, origins, axes, back) -> list[tuple]:
+        """Of each arm: its hand's turn (nothing where that is inferred), the trunk's places and its turns."""
+        places = (after.positions[self.trunk] - origins[:2, None]) @ axes[:2]
+        turns = _six(back[:2, None] @ after.turns[self.trunk])
+        wrists = _six(back[:2] @ window.hands_next) if self.given else None
+        return [([wrists[arm]] if self.given else [], places[arm, self.others[arm]], turns[arm]) for arm in (0, 1)]
+
+    def _leg_inputs(self, after: Pose, origins, axes, back) -> list[tuple]:
+        """Of each leg: the places of head and shoulders, and the turns of the trunk."""
+        shoulders = origins[:2] + (axes[:2] @ self.sockets[:2])[:, :, 0]
+        seen = np.concatenate([after.positions[self.chains.head][None], shoulders])
+        places = (seen - origins[2:, None]) @ axes[2:]
+        turns = _six(back[2:, None] @ after.turns[self.leg_sees])
+        return list(zip(places, turns))
+
+
+def _plan(chains: Chains, name: str) -> list[tuple[int, int, np.ndarray]]:
+    """Joint, parent and offset of all joints that are known with a chain, parents first."""
+    skeleton = chains.skeleton
+    return [(joint, skeleton.parents[joint], skeleton.offsets[joint]) for joint in chains.known[name]]
+
+
+def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[int, np.ndarray]) -> None:
+    """Puts the joints of a plan, in `after` itself, where its local rotations bring them. given: turns in the world."""
+    local, places, turns = after.local, after.positions, after.turns
+    for joint, parent, offset in plan:
+        if parent < 0:
+            local[joint] = turns[joint] = given.get(joint, local[joint])
+            places[joint] = after.root
+            continue
+        base = turns[parent]
+        if joint in given:
+            turns[joint] = given[joint]
+            local[joint] = base.T @ given[joint]
+        else:
+            np.dot(base, local[joint], out=turns[joint])
+        places[joint] = places[parent] + base @ offset
+
+
+def _row(*parts: np.ndarray) -> np.ndarray:
+    """Parts as one input, float32."""
+    return np.concatenate([part.reshape(-1) for part in parts], dtype=np.float32, casting="same_kind")
+
+
+def _six(turns: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) as (..., 6)."""
+    return turns.swapaxes(-1, -2)[..., :2, :].reshape(*turns.shape[:-2], 6)
+
+
+def _rotations(values: np.ndarray) -> np.ndarray:
+    """The rotations (N, 3, 3) nearest to values (6 N,): Gram-Schmidt, the x axis first."""
+    both = values.astype(float).reshape(-1, 2, 3)
+    first, second = both[:, 0], both[:, 1]
+    first = first / np.sqrt((first * first).sum(1)[:, None] + _TINY)
+    second = second - (first * second).sum(1)[:, None] * first
+    second = second / np.sqrt((second * second).sum(1)[:, None] + _TINY)
+    third = first[:, _NEXT] * second[:, _LAST] - first[:, _LAST] * second[:, _NEXT]
+    return np.stack([first, second, third], axis=2)
