@@ -15,6 +15,7 @@ from .kinematics import Pose
 from .limb_reach import LimbReach, posed
 from .limits import JointLimits, learn
 from .model import SINGLE, ThrowModel
+from .one_frame import OneFrame
 
 _SETTLES = 0.12
 """Seconds in which tanh brings an offset trajectory back to the wanted one by three quarters (§7.7.3)."""
@@ -41,6 +42,7 @@ class Stepper:
         self.chains = chains_of(model.skeleton)
         self.limits = JointLimits(model.skeleton, _limits_of(model))
         self.effectors = list(self.chains.effectors)
+        self.hierarchy = OneFrame(model, self.chains) if model.settings.kind == "hierarchy" else None
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
     def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: float, limited: bool) -> Step:
@@ -62,16 +64,13 @@ class Stepper:
 
     def predicted(self, pose: Pose, window: Windows) -> tuple[Pose, np.ndarray | None]:
         """What the networks say of the next frame; of a single network also the places of the joints that it moves."""
-        model, after, floating = self.model, pose, None
-        for name in model.settings.networks:
-            network = model.networks[name]
-            phase = features.phase_of(name, self.chains, after, window, model.leg_reach)
-            x = features.network_input(name, self.chains, model.settings, pose, after, window)
-            y = network.frame(x, phase_function.weights(phase, network.points)).astype(float)
-            after = answers.answered(name, self.chains, model.settings, y, pose, after, window)
-            if name == SINGLE:
-                floating = answers.floating(self.chains, model.settings, y, pose)[0]
-        return after, floating
+        if self.hierarchy is not None:
+            return self.hierarchy(pose, window), None
+        network, settings = self.model.networks[SINGLE], self.model.settings
+        theta = phase_function.weights_at(float(window.phase), network.points)
+        y = network.frame(features.single_input(self.chains, settings, pose, window), theta).astype(float)
+        floating = answers.floating(self.chains, settings, y, pose)[0]
+        return answers.answered(SINGLE, self.chains, settings, y, pose, pose, window), floating
 
     def _said(self, floating: np.ndarray) -> np.ndarray:
         return floating[[self.chains.joints.index(joint) for joint in self.effectors]]
