@@ -67,6 +67,17 @@ class Chains:
         return (*self.middles, *self.effectors[:2], *self.ankles)
 
     @cached_property
+    def trunk(self) -> tuple[int, ...]:
+        """Hips and body."""
+        return (self.hips, *self.members["body"])
+
+    @cached_property
+    def arm_sees(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The (7) joints of the trunk whose places the left and right arm network sees: all but its own reference."""
+        left, right = (tuple(j for j in self.trunk if j != self.references[arm]) for arm in LIMB_OF[:2])
+        return left, right
+
+    @cached_property
     def leg_sees(self) -> tuple[int, ...]:
         """The (6) joints of the body whose turns the leg networks see."""
         carriers = (self.references[arm] for arm in LIMB_OF[:2])
@@ -130,11 +141,14 @@ def _between(parents, high: int, low: int) -> tuple[int, ...]:
 
 
 def _known(skeleton: Skeleton, members: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
-    """Every joint with the chain of the nearest chain joint at or above it; the joints over the hips with the hip."""
+    """Every joint with the chain of the nearest chain joint at or above it, the joints over the hips with the hip; and
+    the first joint of a limb also with the chain that it hangs on, which tells its place."""
     owner = {joint: name for name, joints in members.items() for joint in joints}
     found: dict[str, list[int]] = {name: [] for name in HIERARCHY}
     of: list[str] = []
     for joint, parent in enumerate(skeleton.parents):
         of.append(owner.get(joint, of[parent] if parent >= 0 else "hip"))
         found[of[-1]].append(joint)
+        if parent >= 0 and of[parent] != of[-1]:
+            found[of[parent]].append(joint)
     return {name: tuple(joints) for name, joints in found.items()}

@@ -7,6 +7,7 @@ jax.numpy) last, and writes into no array, so that training and use run the same
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 
 _TINY = 1e-12  # below any square of a length that matters: gradients of a root stay finite
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 class Pose(NamedTuple):
@@ -61,7 +63,8 @@ def from_six(values, xp=np):
     first = _unit(values[..., :3], xp)
     second = values[..., 3:]
     second = _unit(second - xp.sum(first * second, axis=-1, keepdims=True) * first, xp)
-    return xp.stack([first, second, xp.cross(first, second)], axis=-1)
+    third = first[..., _NEXT] * second[..., _LAST] - first[..., _LAST] * second[..., _NEXT]
+    return xp.stack([first, second, third], axis=-1)
 
 
 def _unit(vectors, xp):
@@ -90,7 +93,12 @@ def flat(values, axes: int):
 
 def picked(values, joints: tuple[int, ...], axis: int, xp=np):
     """Some joints of values whose joints lie along `axis` (-2 for places, -3 for rotations)."""
-    return xp.take(values, np.array(joints), axis=axis)
+    return xp.take(values, _index(joints), axis=axis)
+
+
+@lru_cache(maxsize=256)
+def _index(joints: tuple[int, ...]) -> np.ndarray:
+    return np.array(joints)
 
 
 def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local: dict, given: dict, xp=np) -> Pose:
@@ -121,7 +129,12 @@ def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local:
 
 
 def _put(values, new: dict, axis: int, xp):
-    """Values with those of some joints replaced."""
+    """Values with those of some joints replaced, in a new array."""
+    if xp is np:
+        changed = values.copy()
+        for joint, value in new.items():
+            changed[(..., joint, *(slice(None),) * (-1 - axis))] = value
+        return changed
     order = np.arange(values.shape[axis])
     order[list(new)] = len(order) + np.arange(len(new))
     return xp.take(xp.concatenate([values, xp.stack(list(new.values()), axis=axis)], axis=axis), order, axis=axis)
