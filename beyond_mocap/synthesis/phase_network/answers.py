@@ -34,26 +34,14 @@ def answered(
     if name == "hip":
         place = y[..., :3] + origin(chains, settings, pose)
         return _hips_at(chains, after, place, from_six(y[..., 3:9], xp), xp)
-    return _relative((name,), chains, settings, y, after, window, xp)
-
-
-def limbs_answered(chains: Chains, settings: ModelSettings, answers: dict, after: Pose, window: Windows, xp=np) -> Pose:
-    """`after` with the answers {name: y} of both arms and both legs, at once, which is faster than one after the other."""
-    y = xp.concatenate([answers[name] for name in LIMB_OF], axis=-1)
-    return _relative(LIMB_OF, chains, settings, y, after, window, xp)
-
-
-def _relative(names: tuple[str, ...], chains, settings, y, after: Pose, window: Windows, xp) -> Pose:
-    """`after` with the relative rotations that networks of body and limbs say, their answers y one behind the other."""
-    joints = tuple(joint for name in names for joint in predicted(name, chains, settings))
+    joints = predicted(name, chains, settings)
     turns = from_six(y.reshape(*y.shape[:-1], len(joints), 6), xp)
     local = {joint: turns[..., i, :, :] for i, joint in enumerate(joints)}
     given = {}
-    if settings.wrist == "given":
-        arms = [LIMB_OF.index(name) for name in names if name in LIMB_OF[:2]]
-        given = {chains.effectors[arm]: window.hands_next[..., arm, :, :] for arm in arms}
-    known = tuple(joint for name in names for joint in chains.known[name])
-    return spread(chains.skeleton, after, known, after.root, local, given, xp)
+    if name in LIMB_OF[:2] and settings.wrist == "given":
+        number = LIMB_OF.index(name)
+        given = {chains.effectors[number]: window.hands_next[..., number, :, :]}
+    return spread(chains.skeleton, after, chains.known[name], after.root, local, given, xp)
 
 
 def floating(chains: Chains, settings: ModelSettings, y, pose: Pose, xp=np):

@@ -23,8 +23,6 @@ Where the text leaves something open, this is what was decided:
   and the body's joints except the reference itself, a_k¹ those of hips and body.
 - **Leg**: p_i¹ are the head and both shoulders (upper arms), a_k¹ six joints of the body: lowest, chest, both joints
   that carry the arms, neck, head.
-- **Order** of the values: sides, places (impact, trajectory, o, joints) and then the trajectory's differences, δa_o, d,
-  relative rotations, absolute ones.
 - **Wrist inferred**: no r¹, and the hand's relative rotation joins those of the arm, in input and output.
 - **Phase**: of a leg, that of d in n + 1, which stands in the input; of all others the motion phase of frame n.
 """
@@ -77,16 +75,16 @@ def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Wi
 
 def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
     """(b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), j = 10 with him, i = 8 (§7.3)."""
-    frame, seen = _Frame(chains.references["body"], pose, after, xp), chains.body_sees
-    wrists, impact = window.points[..., :2, :, :], window.impact[..., None, :]
-    points = wrists.reshape(*wrists.shape[:-3], -1, 3)
-    places = [impact, points, window.next[..., 2:, :], picked(pose.positions, seen, -2, xp)]
-    deltas = window.deltas[..., :2, :, :].reshape(points.shape)
+    frame = _Frame(chains.references["body"], pose, after, xp)
+    seen = chains.body_sees
     return xp.concatenate([
         window.sides,
-        flat(frame.seen(places, deltas), 2),
+        frame.place(window.impact),
+        *(_trajectory(frame, window, number) for number in (0, 1)),
+        *(frame.place(window.next[..., number, :]) for number in (2, 3)),
         frame.turned,
         flat(six(picked(pose.local, chains.members["body"], -3, xp), xp), 2),
+        flat(frame.places(picked(pose.positions, seen, -2, xp)), 2),
         flat(six(frame.turns(picked(pose.turns, seen, -3, xp)), xp), 2),
     ], axis=-1)  # fmt: skip
 
@@ -97,17 +95,18 @@ def arm_input(
     """(b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of the arm 0 (left) or 1 (§7.3)."""
     name = LIMB_OF[number]
     frame = _Frame(chains.references[name], pose, after, xp)
-    seen = _limb_seen(frame, number, window, picked(after.positions, chains.arm_sees[number], -2, xp))
-    turns = picked(after.turns, chains.trunk, -3, xp)
-    if settings.wrist == "given":
-        turns = xp.concatenate([window.hands_next[..., number, None, :, :], turns], axis=-3)
+    given = settings.wrist == "given"
+    wrist = [six(frame.turn(window.hands_next[..., number, :, :]), xp)] if given else []
     return xp.concatenate([
         window.sides,
-        flat(seen, 2),
+        _trajectory(frame, window, number),
+        frame.place(window.next[..., number, :]),
         frame.turned,
+        *wrist,
         stretch(number, chains, after, window, xp),
         flat(six(picked(pose.local, predicted(name, chains, settings), -3, xp), xp), 2),
-        flat(six(frame.turns(turns), xp), 2),
+        flat(frame.places(picked(after.positions, chains.arm_sees[number], -2, xp)), 2),
+        flat(six(frame.turns(picked(after.turns, chains.trunk, -3, xp)), xp), 2),
     ], axis=-1)  # fmt: skip
 
 
@@ -117,10 +116,12 @@ def leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Wind
     frame = _Frame(chains.references[name], pose, after, xp)
     others = (chains.head, *chains.sockets[:2])
     return xp.concatenate([
-        flat(_limb_seen(frame, number, window, picked(after.positions, others, -2, xp)), 2),
+        _trajectory(frame, window, number),
+        frame.place(window.next[..., number, :]),
         frame.turned,
         stretch(number, chains, after, window, xp),
         flat(six(picked(pose.local, chains.members[name], -3, xp), xp), 2),
+        flat(frame.places(picked(after.positions, others, -2, xp)), 2),
         flat(six(frame.turns(picked(after.turns, chains.leg_sees, -3, xp)), xp), 2),
     ], axis=-1)  # fmt: skip
 
@@ -151,20 +152,32 @@ class _Frame:
         step = xp.matmul(transposed(pose.turns[..., joint, :, :], xp), self.axes)
         self.turned = six(step - np.eye(3), xp)
 
-    def seen(self, places: list, ways):
-        """Places [(..., N, 3)] and ways (..., M, 3) of the world, in this frame: (..., sum of N + M, 3)."""
-        here = self.xp.concatenate(places, axis=-2) - self.origin[..., None, :]
-        return self.xp.matmul(self.xp.concatenate([here, ways], axis=-2), self.axes)
+    def place(self, place):
+        """(..., 3) world -> this frame."""
+        return self.xp.matmul(self.back, (place - self.origin)[..., None])[..., 0]
+
+    def places(self, places):
+        """(..., N, 3) world -> this frame."""
+        return self.xp.matmul(places - self.origin[..., None, :], self.axes)
+
+    def ways(self, ways):
+        """Differences (..., N, 3) world -> this frame."""
+        return self.xp.matmul(ways, self.axes)
+
+    def turn(self, turn):
+        """(..., 3, 3) world -> this frame."""
+        return self.xp.matmul(self.back, turn)
 
     def turns(self, turns):
         """(..., N, 3, 3) world -> this frame."""
         return self.xp.matmul(self.back[..., None, :, :], turns)
 
 
-def _limb_seen(frame: _Frame, number: int, window: Windows, others):
-    """t and o of a limb's end, and places of other joints (..., N, 3), in the limb's frame: (..., 19 + N, 3)."""
-    places = [window.points[..., number, :, :], window.next[..., number, None, :], others]
-    return frame.seen(places, window.deltas[..., number, :, :])
+def _trajectory(frame: _Frame, window: Windows, number: int):
+    """t of one effector, 54 values, in a chain's frame (eq. 7.1)."""
+    points = frame.places(window.points[..., number, :, :])
+    deltas = frame.ways(window.deltas[..., number, :, :])
+    return flat(frame.xp.concatenate([points, deltas], axis=-2), 2)
 
 
 def _motion(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp) -> list:

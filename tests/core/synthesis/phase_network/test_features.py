@@ -9,7 +9,7 @@ from beyond_mocap.motion.motion import Motion, forward_kinematics, place
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.motion.throws import throw
 from beyond_mocap.synthesis.phase_network import kinematics
-from beyond_mocap.synthesis.phase_network.answers import answered, ends, floating, limbs_answered, network_output
+from beyond_mocap.synthesis.phase_network.answers import answered, ends, floating, network_output
 from beyond_mocap.synthesis.phase_network.chains import HIERARCHY, LIMB_OF, chains_of
 from beyond_mocap.synthesis.phase_network.description import places_at, scaled, windows
 from beyond_mocap.synthesis.phase_network.example import Example, describe, example_of, mirrored, poses
@@ -18,8 +18,8 @@ from beyond_mocap.synthesis.phase_network.model import ModelSettings
 from beyond_mocap.synthesis.phase_network.training_set import leg_reach, steps, training_set, with_mirrors
 
 TARGET = np.array([12.0, 3.0, 1.2])
-ALL = [ModelSettings(kind, wrist=wrist, frame=frame)
-       for kind in ("hierarchy", "single") for wrist in ("given", "inferred") for frame in ("hip", "static")]  # fmt: skip
+KINDS, WRISTS, FRAMES = ("hierarchy", "single"), ("given", "inferred"), ("hip", "static")
+ALL = [ModelSettings(kind, wrist=wrist, frame=frame) for kind in KINDS for wrist in WRISTS for frame in FRAMES]
 
 
 @pytest.fixture(scope="module")
@@ -79,10 +79,6 @@ def test_truth_comes_back(made, settings, rig):
     after, truth, chains = decoded(example, settings)
     assert np.abs(after.positions - truth.positions).max() < 1e-6
     assert np.abs(after.turns - truth.turns).max() < 1e-6
-    if settings.kind == "hierarchy":
-        answers = {name: network_output(name, chains, settings, *steps(example)[:2]) for name in LIMB_OF}
-        at_once = limbs_answered(chains, settings, answers, after, steps(example).window)
-        assert np.abs(at_once.positions - truth.positions).max() < 1e-6
     again = kinematics.pose_of(example.motion.skeleton, after.root, after.local)
     assert np.abs(again.positions - truth.positions).max() < 1e-6
 
@@ -136,7 +132,7 @@ def test_the_input_follows_the_paper(example):
     arm = network_input("right_arm", chains, ModelSettings(), pose, after, window)
     socket = after.positions[:, chains.sockets[1]]
     assert np.all(arm[:, :2] == (0.0, 1.0))
-    assert np.allclose(arm[:, 2 + 54 + 3 + (body * 3) + 6], np.linalg.norm(window.next[:, 1] - socket, axis=-1))
+    assert np.allclose(arm[:, 2 + 54 + 3 + 6 + 6], np.linalg.norm(window.next[:, 1] - socket, axis=-1))
     phase = phase_of("left_leg", chains, after, window, reach)
     distance = np.linalg.norm(window.next[:, 2] - after.positions[:, chains.sockets[2]], axis=-1)
     assert np.allclose(phase, (distance - reach["left"][0]) / np.ptp(reach["left"]))
