@@ -33,10 +33,9 @@ class OneFrame:
         self.limb_joints = [joint for said in self.said[2:] for joint in said]
         self.hip_sees, self.body_sees = list(chains.hip_sees), list(chains.body_sees)
         self.references = [chains.references[name] for name in LIMB_OF]
-        self.sockets = chains.skeleton.offsets[list(chains.sockets)][:, :, None]
-        self.trunk = [chains.hips, *chains.members["body"]]
-        self.others = [[i for i, joint in enumerate(self.trunk) if joint != reference] for reference in self.references[:2]]
-        self.leg_sees, self.shoulders = list(chains.leg_sees), self.references[:2]
+        self.sockets, self.trunk = list(chains.sockets), list(chains.trunk)
+        self.others = [[self.trunk.index(joint) for joint in seen] for seen in chains.arm_sees]
+        self.leg_sees = list(chains.leg_sees)
 
     def __call__(self, pose: Pose, window: Windows) -> Pose:
         """Frame n + 1 from the state and the window of n, both of one frame. `moved` stays that of n."""
@@ -78,56 +77,45 @@ class OneFrame:
 
     def _body_input(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray) -> np.ndarray:
         joint = self.chains.references["body"]
-        origin, axes = after.positions[joint], after.turns[joint]
-        points, deltas = (window.points[:2] - origin) @ axes, window.deltas[:2] @ axes
-        toes, impact = (window.next[2:] - origin) @ axes, (window.impact - origin) @ axes
+        axes = after.turns[joint]
+        wrists, seen = window.points[:2].reshape(-1, 3), pose.positions[self.body_sees]
+        places = np.concatenate([window.impact[None], wrists, window.next[2:], seen]) - after.positions[joint]
         turned = _six(pose.turns[joint].T @ axes) - _SIX
-        places = (pose.positions[self.body_sees] - origin) @ axes
-        turns = _six(axes.T @ pose.turns[self.body_sees])
-        return _row(window.sides, impact, np.concatenate([points, deltas], axis=1), toes, turned,
-                    relative[self.said[1]], places, turns)  # fmt: skip
+        return _row(window.sides, places @ axes, window.deltas[:2].reshape(-1, 3) @ axes, turned,
+                    relative[self.said[1]], _six(axes.T @ pose.turns[self.body_sees]))  # fmt: skip
 
     def _limbs(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """What the networks of arms and legs say, one after the other: (rotations * 6,)."""
-        origins, axes = after.positions[self.references], after.turns[self.references]
-        points, deltas = (window.points - origins[:, None]) @ axes, window.deltas @ axes
-        trajectories = np.concatenate([points, deltas], axis=1)
-        following = ((window.next - origins)[:, None] @ axes)[:, 0]
+        origins, axes = after.positions[self.references][:, None], after.turns[self.references]
         back = axes.swapaxes(1, 2)
+        ends = (np.concatenate([window.points, window.next[:, None]], axis=1) - origins) @ axes
+        deltas = window.deltas @ axes
         turned = _six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _SIX
-        way = window.next - (origins + (axes @ self.sockets)[:, :, 0])
+        sockets = after.positions[self.sockets]
+        way = window.next - sockets
         stretch = np.sqrt((way * way).sum(-1))
-        arms = self._arm_inputs(after, window, origins, axes, back)
-        legs = self._leg_inputs(after, origins, axes, back)
+        trunk = (after.positions[self.trunk] - origins[:2]) @ axes[:2]
+        above = np.concatenate([after.positions[self.chains.head][None], sockets[:2]])
+        others = *(trunk[arm, self.others[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
+        turns = *self._arm_turns(after, window, back), *_six(back[2:, None] @ after.turns[self.leg_sees])
         answers = []
         for number, network in enumerate(self.networks[2:]):
-            said = relative[self.said[2 + number]]
-            begin = trajectories[number], following[number], turned[number]
-            if number < 2:
-                wrist, *rest = arms[number]
-                x = _row(window.sides, *begin, *wrist, stretch[number : number + 1], said, *rest)
-            else:
-                x = _row(*begin, stretch[number : number + 1], said, *legs[number - 2])
-                low, high = self.reach[number - 2]
-                phase = (float(stretch[number]) - low) / (high - low)
-                theta = np.array(weights_at(phase, self.points), np.float32)
-            answers.append(network(x, theta))
+            x = _row(*([window.sides] if number < 2 else []), ends[number], others[number], deltas[number], turned[number],
+                     stretch[number : number + 1], relative[self.said[2 + number]], turns[number])  # fmt: skip
+            answers.append(network(x, theta if number < 2 else self._leg_theta(number, stretch[number])))
         return np.concatenate(answers)
 
-    def _arm_inputs(self, after: Pose, window: Windows, origins, axes, back) -> list[tuple]:
-        """Of each arm: its hand's turn (nothing where that is inferred), the trunk's places and its turns."""
-        places = (after.positions[self.trunk] - origins[:2, None]) @ axes[:2]
-        turns = _six(back[:2, None] @ after.turns[self.trunk])
-        wrists = _six(back[:2] @ window.hands_next) if self.given else None
-        return [([wrists[arm]] if self.given else [], places[arm, self.others[arm]], turns[arm]) for arm in (0, 1)]
+    def _arm_turns(self, after: Pose, window: Windows, back: np.ndarray) -> np.ndarray:
+        """Turns (2, N, 6) of the hand, where it is given, and the trunk in the frames of both arms."""
+        turns = np.broadcast_to(after.turns[self.trunk], (2, len(self.trunk), 3, 3))
+        if self.given:
+            turns = np.concatenate([window.hands_next[:, None], turns], axis=1)
+        return _six(back[:2, None] @ turns)
 
-    def _leg_inputs(self, after: Pose, origins, axes, back) -> list[tuple]:
-        """Of each leg: the places of head and shoulders, and the turns of the trunk."""
-        shoulders = origins[:2] + (axes[:2] @ self.sockets[:2])[:, :, 0]
-        seen = np.concatenate([after.positions[self.chains.head][None], shoulders])
-        places = (seen - origins[2:, None]) @ axes[2:]
-        turns = _six(back[2:, None] @ after.turns[self.leg_sees])
-        return list(zip(places, turns))
+    def _leg_theta(self, number: int, stretch: float) -> np.ndarray:
+        """Control point weights of a leg that reaches `stretch` metres (eq. 7.3)."""
+        low, high = self.reach[number - 2]
+        return np.array(weights_at((float(stretch) - low) / (high - low), self.points), np.float32)
 
 
 def _plan(chains: Chains, name: str) -> list[tuple[int, int, np.ndarray]]:
