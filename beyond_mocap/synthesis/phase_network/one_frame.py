@@ -77,40 +77,35 @@ class OneFrame:
 
     def _body_input(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray) -> np.ndarray:
         joint = self.chains.references["body"]
-        axes = after.turns[joint]
-        wrists, seen = window.points[:2].reshape(-1, 3), pose.positions[self.body_sees]
-        places = np.concatenate([window.impact[None], wrists, window.next[2:], seen]) - after.positions[joint]
+        origin, axes = after.positions[joint], after.turns[joint]
+        trajectories = np.concatenate([window.points[:2] - origin, window.deltas[:2]], axis=1) @ axes
+        toes, impact = (window.next[2:] - origin) @ axes, (window.impact - origin) @ axes
         turned = _six(pose.turns[joint].T @ axes) - _SIX
-        return _row(window.sides, places @ axes, window.deltas[:2].reshape(-1, 3) @ axes, turned,
-                    relative[self.said[1]], _six(axes.T @ pose.turns[self.body_sees]))  # fmt: skip
+        places = (pose.positions[self.body_sees] - origin) @ axes
+        return _row(window.sides, impact, trajectories, toes, turned, relative[self.said[1]], places,
+                    _six(axes.T @ pose.turns[self.body_sees]))  # fmt: skip
 
     def _limbs(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """What the networks of arms and legs say, one after the other: (rotations * 6,)."""
         origins, axes = after.positions[self.references][:, None], after.turns[self.references]
         back = axes.swapaxes(1, 2)
-        ends = (np.concatenate([window.points, window.next[:, None]], axis=1) - origins) @ axes
-        deltas = window.deltas @ axes
+        ways = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins], axis=1) @ axes
         turned = _six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _SIX
         sockets = after.positions[self.sockets]
-        way = window.next - sockets
-        stretch = np.sqrt((way * way).sum(-1))
+        stretch = np.sqrt(((window.next - sockets) ** 2).sum(-1))
         trunk = (after.positions[self.trunk] - origins[:2]) @ axes[:2]
         above = np.concatenate([after.positions[self.chains.head][None], sockets[:2]])
         others = *(trunk[arm, self.others[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
-        turns = *self._arm_turns(after, window, back), *_six(back[2:, None] @ after.turns[self.leg_sees])
+        turns = *_six(back[:2, None] @ after.turns[self.trunk]), *_six(back[2:, None] @ after.turns[self.leg_sees])
+        hands = _six(back[:2] @ window.hands_next) if self.given else ()
         answers = []
         for number, network in enumerate(self.networks[2:]):
-            x = _row(*([window.sides] if number < 2 else []), ends[number], others[number], deltas[number], turned[number],
-                     stretch[number : number + 1], relative[self.said[2 + number]], turns[number])  # fmt: skip
-            answers.append(network(x, theta if number < 2 else self._leg_theta(number, stretch[number])))
+            arm = number < 2
+            x = _row(*([window.sides] if arm else []), ways[number], turned[number],
+                     *([hands[number]] if arm and self.given else []), stretch[number : number + 1],
+                     relative[self.said[2 + number]], others[number], turns[number])  # fmt: skip
+            answers.append(network(x, theta if arm else self._leg_theta(number, stretch[number])))
         return np.concatenate(answers)
-
-    def _arm_turns(self, after: Pose, window: Windows, back: np.ndarray) -> np.ndarray:
-        """Turns (2, N, 6) of the hand, where it is given, and the trunk in the frames of both arms."""
-        turns = np.broadcast_to(after.turns[self.trunk], (2, len(self.trunk), 3, 3))
-        if self.given:
-            turns = np.concatenate([window.hands_next[:, None], turns], axis=1)
-        return _six(back[:2, None] @ turns)
 
     def _leg_theta(self, number: int, stretch: float) -> np.ndarray:
         """Control point weights of a leg that reaches `stretch` metres (eq. 7.3)."""
