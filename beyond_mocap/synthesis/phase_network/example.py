@@ -8,9 +8,10 @@ import numpy as np
 
 from ...errors import InputError
 from ...motion import quaternion
+from ...motion.between_frames import cubic_at
 from ...motion.humanoid import identify, stature
 from ...motion.mirror import mirror
-from ...motion.motion import Motion, at_frames, forward_kinematics, place
+from ...motion.motion import Motion, forward_kinematics, place
 from ...motion.skeleton import frozen_array
 from .chains import EFFECTORS, chains_of
 from .description import AHEAD, BACK, STEP, Description
@@ -91,7 +92,7 @@ def example_of(
 def _normalised(motion: Motion, impact: np.ndarray, frame: float, name: str) -> tuple[Motion, float, np.ndarray]:
     """The motion in the frame where the hips' place over the ground at `frame` is the origin and the impact lies on
     +X; by which angle (radians) it was turned about the world's Z and by which vector (3,) m then moved."""
-    root, rotations = at_frames(motion, np.array([frame]))
+    root, rotations = cubic_at(motion, np.array([frame]))
     places, _ = forward_kinematics(Motion(motion.skeleton, root, rotations, motion.fps))
     hips = places[0, identify(motion.skeleton).hips] * (1.0, 1.0, 0.0)
     way = impact - hips
@@ -115,7 +116,7 @@ def _resampled(motion: Motion, frames: np.ndarray, first: float, fps: float) -> 
     """Frames (N,) counted at `fps` from second `first`, or None where there are none."""
     if not len(frames):
         return None
-    root, rotations = at_frames(motion, (first + frames / fps) * motion.fps)
+    root, rotations = cubic_at(motion, (first + frames / fps) * motion.fps)
     return Motion(motion.skeleton, root, rotations, fps)
 
 
