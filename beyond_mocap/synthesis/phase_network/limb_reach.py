@@ -11,6 +11,11 @@ from .kinematics import Pose, places_and_turns, spread, transposed
 from .limits import JointLimits
 
 
+_STRETCH = 0.995  # share of a limb's length beyond which the body goes along
+_MOST = 0.05  # metres that it goes in one frame
+_ROUNDS = 4
+
+
 def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
     """Unit axes (4, 3) about which elbows and knees bend, in the axes of the middle joint's parent.
 
@@ -57,6 +62,8 @@ class LimbReach:
         self._above_upper, self._above_middle, self._above_end = (
             [parents[joint] for joint in column] for column in (self._upper, self._middle, self._end)
         )
+        middle, end = (self._way_down(high, low) for high, low in ((self._upper, self._middle), (self._middle, self._end)))
+        self._lengths = middle + end
         self._kept = [0, 1, 2, 3] if hands_given else [2, 3]
 
     def __call__(self, pose: Pose, wanted: np.ndarray, share: float) -> Pose:
@@ -64,6 +71,8 @@ class LimbReach:
         places, turns = pose.positions, pose.turns
         tip, end = places[self._tip], places[self._end]
         target = toward(tip, wanted, share) - (tip - end)
+        given = self._give(places[self._upper], end, target)
+        places, end, root = places + given, end + given, pose.root + given
         hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
         first, second, _ = bend_to(places[self._upper], places[self._middle], end, target, hinge, np)
         local = pose.local.copy()
@@ -72,7 +81,31 @@ class LimbReach:
         local[self._middle] = bent @ second @ turns[self._middle]
         carried = transposed(second @ turns[self._above_end])
         local[[self._end[n] for n in self._kept]] = (carried @ turns[self._end])[self._kept]
-        return posed(self.chains, pose.root, local)
+        return posed(self.chains, root, local)
+
+    def _way_down(self, high: list[int], low: list[int]) -> np.ndarray:
+        """Lengths (4,) m of bones from joints down to others, joints between them at rest."""
+        ways = []
+        for top, joint in zip(high, low):
+            way = np.zeros(3)
+            while joint != top:
+                way, joint = way + self.chains.skeleton.offsets[joint], self.chains.skeleton.parents[joint]
+            ways.append(np.linalg.norm(way))
+        return np.array(ways)
+
+    def _give(self, top: np.ndarray, end: np.ndarray, target: np.ndarray) -> np.ndarray:
+        """How far (3,) m the whole body goes towards targets (4, 3) m that lie out of the limbs' reach; top, end (4, 3)
+        m of the limbs, which reach as far as they already do at least."""
+        given, now = np.zeros(3), end - top
+        reach = np.maximum(_STRETCH * self._lengths, np.sqrt((now * now).sum(-1)))
+        for _ in range(_ROUNDS):
+            way = target - top - given
+            far = np.sqrt((way * way).sum(-1))
+            short = np.maximum(far - reach, 0.0)
+            if short.max() < 1e-6:
+                break
+            given = given + (way * (short / far)[:, None]).sum(0)
+        return given * min(1.0, _MOST / max(float(np.sqrt(given @ given)), 1e-9))
 
 
 def posed(chains: Chains, root: np.ndarray, local: np.ndarray) -> Pose:
