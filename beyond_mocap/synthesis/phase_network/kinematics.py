@@ -47,6 +47,28 @@ def places_and_turns(offsets, parents, root, local, xp=np):
     return xp.stack(positions, axis=-2), xp.stack(turns, axis=-3)
 
 
+def one_pose(offsets, parents: tuple[int, ...], root, local) -> tuple[np.ndarray, np.ndarray]:
+    """The same for one pose with numpy: root (3,), local (J, 3, 3). All joints of one depth at once, turn and place as
+    one 4 x 4 matrix; several times as fast."""
+    moves = np.zeros((len(parents), 4, 4))
+    moves[:, :3, :3], moves[:, :3, 3], moves[:, 3, 3] = local, offsets, 1.0
+    moves[0, :3, 3] = root
+    for joints, above in _levels(tuple(parents)):
+        moves[joints] = moves[above] @ moves[joints]
+    return moves[:, :3, 3].copy(), moves[:, :3, :3].copy()
+
+
+@lru_cache(maxsize=32)
+def _levels(parents: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Joints of each depth below the root, and their parents."""
+    depths = []
+    for parent in parents:
+        depths.append(0 if parent < 0 else depths[parent] + 1)
+    depths, above = np.array(depths), np.array(parents)
+    every = [np.flatnonzero(depths == depth) for depth in range(1, depths.max() + 1)]
+    return [(joints, above[joints]) for joints in every]
+
+
 def pose_of(skeleton: Skeleton, root, local, xp=np) -> Pose:
     """The state of a body, from its root's place (..., 3) m and local rotations (..., J, 3, 3), at rest."""
     positions, turns = places_and_turns(skeleton.offsets, skeleton.parents, root, local, xp)

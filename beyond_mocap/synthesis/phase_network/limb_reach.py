@@ -7,7 +7,7 @@ import numpy as np
 
 from .chains import LIMB_OF, Chains
 from .correct import bend_to, toward
-from .kinematics import Pose, places_and_turns, spread, transposed
+from .kinematics import Pose, one_pose, spread, transposed
 from .limits import JointLimits
 
 
@@ -110,7 +110,7 @@ class LimbReach:
 
 def posed(chains: Chains, root: np.ndarray, local: np.ndarray) -> Pose:
     """The pose with these local rotations (J, 3, 3); how far its joints moved is not known (zero)."""
-    places, turns = places_and_turns(chains.skeleton.offsets, chains.skeleton.parents, root, local)
+    places, turns = one_pose(chains.skeleton.offsets, chains.skeleton.parents, root, local)
     return Pose(root, local, places, turns, np.zeros_like(places))
 
 

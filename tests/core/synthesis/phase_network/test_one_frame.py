@@ -13,7 +13,7 @@ from beyond_mocap.synthesis.phase_network.chains import HIERARCHY, chains_of
 from beyond_mocap.synthesis.phase_network.description import Windows, windows
 from beyond_mocap.synthesis.phase_network.example import describe, example_of, poses
 from beyond_mocap.synthesis.phase_network.features import network_input, phase_of, widths
-from beyond_mocap.synthesis.phase_network.kinematics import Pose
+from beyond_mocap.synthesis.phase_network.kinematics import Pose, matrices, one_pose, places_and_turns
 from beyond_mocap.synthesis.phase_network.model import ModelSettings, ThrowModel
 from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
 from beyond_mocap.synthesis.phase_network.one_frame import OneFrame
@@ -77,6 +77,16 @@ def plainly(model, chains, pose, window):
 
 def row(arrays, frame):
     return type(arrays)(*(None if array is None else array[frame] for array in arrays))
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_one_pose_at_once_is_the_same_kinematics(plain_and_dressed, which):
+    motion = plain_and_dressed[which].motion
+    skeleton, local = motion.skeleton, matrices(motion)[40]
+    expected = places_and_turns(skeleton.offsets, skeleton.parents, motion.root_positions[40], local)
+    got = one_pose(skeleton.offsets, skeleton.parents, motion.root_positions[40], local)
+    for one, other in zip(got, expected):
+        np.testing.assert_allclose(one, other, atol=1e-12)
 
 
 @pytest.mark.parametrize("which", [0, 1])
