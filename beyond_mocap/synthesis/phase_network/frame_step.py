@@ -45,21 +45,21 @@ class Stepper:
         self.hierarchy = OneFrame(model, self.chains) if model.settings.kind == "hierarchy" else None
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
-    def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: float, limited: bool) -> Step:
-        """Frame n + 1 from the pose and window of n. wanted (4, 3) m: where the effectors are to be; share: how much
-        of the way from what the networks say to there is taken, 0 for none. limited: joints are kept within their
-        limits."""
+    def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: np.ndarray | None, limited: bool) -> Step:
+        """Frame n + 1 from the pose and window of n. wanted (4, 3) m: where the effectors are to be; share (4,): how
+        much of the way from what the networks say to there each is taken, None for none of them. limited: joints are
+        kept within their limits."""
         after, floating = self.predicted(pose, window)
         said = after.positions[self.effectors] if floating is None else self._said(floating)
         over = np.zeros(len(self.model.skeleton))
         if limited:
             after, over = self._limited(after)
-        if share > 0.0:
+        if share is not None:
             after = self.reach(after, wanted, share)
             if limited:
                 after, more = self._limited(after)
                 over = np.maximum(over, more)
-        state = after if floating is None or share > 0.0 else self._afloat(after, floating)
+        state = after if floating is None or share is not None else self._afloat(after, floating)
         return Step(after, state._replace(moved=state.positions - pose.positions), said, over, floating)
 
     def predicted(self, pose: Pose, window: Windows) -> tuple[Pose, np.ndarray | None]:

@@ -16,6 +16,8 @@ from .kinematics import Pose, motion_of
 from .model import ThrowModel
 from .start import start_pose
 
+_STILL, _MOVING = 0.15, 0.6  # m/s: a toe that is to be slower stands, a faster one does not
+_LOW = 0.03  # metres above its lowest place up to which a toe may stand
 _PATIENCE = 8  # iterations of the start pose that may pass without a millimetre's gain
 
 
@@ -25,8 +27,9 @@ class Options:
 
     pose_iterations, tolerance: the start pose is predicted again until hands and feet are within `tolerance` metres of
     where they are to be, or so many times (§7.7.1: 75, 0.01). ik: limbs are corrected in each frame, by `share` of
-    the way to where they are wanted, before the next is predicted (§7.7.3). blend: networks see trajectories that
-    begin where hands and feet are. limits: joints stay within the range of the training data.
+    the way to where they are wanted (feet that are to stand, all of it), before the next is predicted (§7.7.3).
+    blend: networks see trajectories that begin where hands and feet are. limits: joints stay within the range of the
+    training data.
     """
 
     pose_iterations: int = 75
@@ -105,13 +108,14 @@ class _Loop:
         self.ready, self.options = ready, options
         self.wanted = description.effectors
         self.fps, self.limb = description.fps, description.limb
-        self.share = options.share if options.ik else 0.0
+        self.shares = _shares(description, options) if options.ik else None
 
     def step(self, pose: Pose, window: Windows, now: int, then: int) -> Step:
         """Frame `then` out of the pose of frame `now`."""
         if self.options.blend:
             window = blended(window, pose.positions[self.ready.effectors] - self.wanted[now], self.fps)
-        return self.ready.step(pose, window, self.wanted[then], self.share, self.options.limits)
+        share = None if self.shares is None else self.shares[then]
+        return self.ready.step(pose, window, self.wanted[then], share, self.options.limits)
 
     def start(self, pose: Pose | None, window: Windows) -> tuple[Step, int]:
         """The first frame (§7.7.1): the best of what the iterations came by, and how many there were."""
@@ -136,6 +140,16 @@ class _Loop:
     def _floating(self, pose: Pose) -> np.ndarray | None:
         single = self.ready.model.settings.kind == "single"
         return pose.positions[list(self.ready.chains.joints)] if single else None
+
+
+def _shares(description: Description, options: Options) -> np.ndarray:
+    """How much of the way to where it is wanted each effector is taken (T, 4): feet that are to stand, all of it."""
+    places = description.effectors
+    speed = np.linalg.norm(np.gradient(places, 1.0 / description.fps, axis=0), axis=-1)
+    height = places[..., 2] - places[..., 2].min(axis=0)
+    still = np.clip((_MOVING - speed) / (_MOVING - _STILL), 0.0, 1.0) * np.clip(2.0 - height / _LOW, 0.0, 1.0)
+    still[:, :2] = 0.0
+    return options.share + (1.0 - options.share) * still
 
 
 def _windows(model: ThrowModel, description: Description) -> list[Windows]:

@@ -66,11 +66,12 @@ class LimbReach:
         self._lengths = middle + end
         self._kept = [0, 1, 2, 3] if hands_given else [2, 3]
 
-    def __call__(self, pose: Pose, wanted: np.ndarray, share: float) -> Pose:
-        """The pose with its effectors brought towards wanted (4, 3) m; root and trunk as they are."""
+    def __call__(self, pose: Pose, wanted: np.ndarray, share: np.ndarray) -> Pose:
+        """The pose with its effectors brought towards wanted (4, 3) m by their shares (4,) of the way; root and trunk
+        keep their turns."""
         places, turns = pose.positions, pose.turns
         tip, end = places[self._tip], places[self._end]
-        target = toward(tip, wanted, share) - (tip - end)
+        target = toward(tip, wanted, share[:, None]) - (tip - end)
         given = self._give(places[self._upper], end, target)
         places, end, root = places + given, end + given, pose.root + given
         hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
