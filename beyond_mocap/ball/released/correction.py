@@ -36,7 +36,7 @@ CLOSE = 1e-3
 # What costs as much as a metre of moved wrist: radians of turning, share of pace, seconds of release, m/s of speed
 # that is asked for and of speed that is not, metres of ball.
 _TURN, _PACE, _LATER, _SPEED, _OWN_SPEED, _REST = 8.0, 1.5, 1.5, 30.0, 300.0, 10.0
-_ROUNDS, _GRID = 12, 41
+_ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41
 _STEP = 1e-3  # of frames, metres, m/s and radians, in differences
 _NUDGE = np.array([0.005, 0.005, 0.005, 0.2, 0.2, 0.2])  # m, m/s, by which a limb is tried
 _ASHORE = 0.8  # m/s, a foot that is slower stands
@@ -345,7 +345,7 @@ class _Search:
         frame = source / (1.0 + change.pace)
         limb = _Led.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps))
         best, base, step, follows = None, change, 1.0, None
-        for _ in range(_ROUNDS):
+        for number in range(_ROUNDS):
             now = limb.shifted(change.row[:6])
             points, velocities = _carried(self.part, now, np.array([frame]))
             found = self._judged(motion, now, frame, source, change, start, points, velocities)
@@ -353,7 +353,8 @@ class _Search:
                 if follows is None or found.missed > 0.1 * best.missed:
                     follows = limb.follows(change.row[:6], frame, points, velocities)
                 best, base, step = found, change, 1.0
-                rows, _ = self._best(points, velocities, change, start, limb.shifts.cost, follows, fixed=(6, 7))
+                costs = limb.shifts.cost, follows
+                rows, _ = self._best(points, velocities, change, start, *costs, fixed=(6, 7), near=number >= _FREE_ROUNDS)
             else:
                 step *= 0.4
             if best.missed < CLOSE:
@@ -379,9 +380,12 @@ class _Search:
         there = batch.after(balls, self.ball, np.maximum(seconds, 1e-3), most_bounces=0).position
         return there, gap, np.linalg.norm(velocity, axis=-1)
 
-    def _best(self, points, velocities, now: _Change, start, cost, follows, fixed=()) -> tuple[np.ndarray, np.ndarray]:
+    def _best(
+        self, points, velocities, now: _Change, start, cost, follows, fixed=(), near=False
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Changes (N, 9 + F) in all, and what they cost (N,), of parts at N releases, of which `now` is changed
-        already: the least with which the ball would hit if all went on along its slopes."""
+        already: the least with which the ball would hit if all went on along its slopes. near: the least away from `now`
+        instead, which comes to the target where the slopes do not hold for long."""
         short, slopes, speed, faster = self._slopes(points, velocities, now, start, follows)
         count, size = len(points), len(now.row)
         weight = np.zeros((size, size))
@@ -389,10 +393,12 @@ class _Search:
             weight[np.ix_([axis, 3 + axis], [axis, 3 + axis])] = cost
         weight[6, 6], weight[7, 7] = 1.0 / _TURN**2, 1.0 / _PACE**2
         weight[range(8, size - 1), range(8, size - 1)] = 1.0 / _REST**2
-        weight[-1, -1] = 1e-9
+        weight[-1, -1] = 1e-2 if near else 1e-9
         wish, worth = (self.speed, 1.0 / _SPEED**2) if self.speed else (speed, 1.0 / _OWN_SPEED**2)
         hessian = weight + worth * faster[:, :, None] * faster[:, None, :]
         pull = worth * faster * (wish - speed + faster @ now.row)[:, None]
+        if near:
+            hessian, pull = np.tile(weight, (count, 1, 1)), np.tile(weight @ now.row, (count, 1))
         level = slopes @ now.row - short
         free = [i for i in range(size) if i not in set(fixed) and not (i in (6, 7) and not self.bounds[i - 6])]
         rows = self._least(hessian, pull, slopes, level, np.tile(now.row, (count, 1)), free)
