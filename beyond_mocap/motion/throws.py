@@ -19,6 +19,7 @@ from . import quaternion
 from .adult import adult_skeleton
 from .footsteps import lift_off_ground
 from .gestures import LEFT, RIGHT
+from .grip import grip_in
 from .humanoid import identify
 from .keyed import keyed
 from .mirror import mirror
@@ -154,11 +155,7 @@ class _Swing:
         self.hand = body.left.hand if arm == "left" else body.right.hand
         self.arm = arm
         self.motion = mirror(motion) if arm == "left" else motion
-        side = 1.0 if arm == "left" else -1.0
-        size = neutral.leg / tables.LEG
-        # in a hanging hand: between the fingers, on the palm's side
-        held = np.array([0.012, -0.036 * side, -0.105]) * size
-        self.grip = quaternion.rotate(quaternion.inverse(neutral.rotations[self.hand]), held)
+        self.grip = grip_in(neutral, arm)
         places, turns = forward_kinematics(self.motion)
         self.ball = places[:, self.hand] + quaternion.rotate(turns[:, self.hand], self.grip)
         self.velocity = np.gradient(self.ball, 1.0 / _PLAN, axis=0)

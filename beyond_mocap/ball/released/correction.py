@@ -200,6 +200,16 @@ def corrected(
     return _Search(motion, part, float(frame), target, ball, freedom, speed).whole()
 
 
+def leaving(
+    motion: Motion, part: InHand | AtFoot, frame: float, target: np.ndarray, ball: Ball
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position (3,) m, velocity (3,) m/s and spin (3,) rad/s with which the ball leaves the motion as it is, at the
+    fractional `frame`; target (3,) m: on which side of the foot a ball lies whose place is free."""
+    points, velocities = _carried(part, motion, np.array([frame]))
+    rest = part.rest(motion, frame, np.asarray(target, float), ball)
+    return tuple(value[0] for value in part.leaves(points, velocities, rest[None], ball)[:3])
+
+
 def grip_point(motion: Motion, part: InHand | AtFoot, frames: np.ndarray) -> np.ndarray:
     """(N, K, 3) m: the ball in the hand, or the ends of the foot's line, at fractional frames (N,)."""
     root, local = cubic_at(motion, frames)
