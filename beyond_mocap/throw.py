@@ -196,6 +196,25 @@ def throw_at(
     return work.thrown(plan, motion, release, raw)
 
 
+def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None = None) -> InHand | AtFoot:
+    """What lets the ball go. lies (3,) m: where a ball lies that is kicked, None: where it suits."""
+    side, what = EFFECTORS[limb].split("_")
+    return AtFoot(side, lies) if what == "foot" else InHand(side, grip_of(skeleton, side, ball.radius))
+
+
+@lru_cache(maxsize=8)
+def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+    """Where (E, 3) m and how fast (E, 3) m/s such a ball leaves each example of the model; zero for those of another
+    limb."""
+    part = part_of(model.skeleton, limb, ball)
+    none = np.zeros(3), np.zeros(3)
+    found = [
+        leaving(example.motion, part, example.release, example.impact, ball)[:2] if example.limb == limb else none
+        for example in model.examples
+    ]
+    return tuple(np.array(values) for values in zip(*found))
+
+
 class _Work:
     """One order on its way."""
 
@@ -209,7 +228,6 @@ class _Work:
         self.own_limb = self.limb ^ 1 if self.mirrored else self.limb
         kind = order.ball or ("football" if self.kicks else "baseball")
         self.ball = KINDS[kind] if isinstance(kind, str) else kind
-        self.side = EFFECTORS[self.limb].split("_")[0]
         self.target = np.maximum(np.asarray(order.target, float), [-np.inf, -np.inf, self.ball.radius])
         self.warnings: list[str] = []
 
@@ -234,20 +252,12 @@ class _Work:
         """m/s that a human gives a ball this way."""
         return FASTEST["foot"] if self.kicks else FASTEST_HAND
 
-    def part(self, skeleton: Skeleton, side: str, ball_place=None) -> InHand | AtFoot:
-        """What lets the ball go."""
-        if self.kicks:
-            return AtFoot(side, ball_place)
-        return InHand(side, grip_of(skeleton, side, self.ball.radius))
-
     # Planning: in the model's size, the target straight ahead.
 
     def plan(self) -> Planned:
         """What the motion is to be."""
         examples = self.model.examples
-        side = EFFECTORS[self.own_limb].split("_")[0]
-        left = [self._left(example, side) for example in examples]
-        places, self.launches = (np.array(values) for values in zip(*left))
+        places, self.launches = launches_of(self.model, self.own_limb, self.ball)
         own = [n for n, example in enumerate(examples) if example.limb == self.own_limb]
         if not own:
             raise InputError("model", f"no example with the {EFFECTORS[self.limb].replace('_', ' ')}", "some with it")
@@ -259,14 +269,6 @@ class _Work:
         self._check_reach(float(np.linalg.norm(self.launches[own], axis=1).max()))
         wish = self._wish(own, ahead)
         return planned(examples, self.launches, wish, self.order.seed)
-
-    def _left(self, example, side: str) -> tuple[np.ndarray, np.ndarray]:
-        """Where and how the ball left an example, (3,) m and (3,) m/s."""
-        if example.limb != self.own_limb:
-            return np.zeros(3), np.zeros(3)
-        part = self.part(example.motion.skeleton, side)
-        place, velocity, _ = leaving(example.motion, part, example.release, example.impact, self.ball)
-        return place, velocity
 
     def _anchor(self, example, place: np.ndarray) -> np.ndarray:
         """(2,) m in the normalised frame: the point of the example that the order puts somewhere."""
@@ -345,7 +347,7 @@ class _Work:
             motion = mirror(motion)
         if not motion.skeleton.same_bones(self.skeleton):
             motion = Retargeter(motion, self.skeleton).carry(motion)
-        part = self.part(self.skeleton, self.side)
+        part = part_of(self.skeleton, self.limb, self.ball)
         frame = release * motion.fps
         hips = motion.root_positions[0, :2]
         motion = place(motion, 0.0, (-hips[0], -hips[1], 0.0))
@@ -373,7 +375,7 @@ class _Work:
         lies = None
         if self.order.ball_place is not None:
             lies = np.array([*self._where(), self.ball.radius])
-        part = self.part(self.skeleton, self.side, lies)
+        part = part_of(self.skeleton, self.limb, self.ball, lies)
         found = corrected(
             motion, part, release * motion.fps, self.target, self.ball, self.order.freedom, self.order.speed
         )

@@ -354,21 +354,24 @@ class _Search:
         motion = self._moved(change)
         frame = source / (1.0 + change.pace)
         limb = _Led.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps))
-        best, base, step, follows = None, change, 1.0, None
+        best, base, step = None, change, 1.0
+        follows, known = _at_once(grip_point(motion, self.part, np.array([frame])).shape[1]), False
         for number in range(_ROUNDS):
             now = limb.shifted(change.row[:6])
             points, velocities = _carried(self.part, now, np.array([frame]))
             found = self._judged(motion, now, frame, source, change, start, points, velocities)
-            if best is None or found.missed < best.missed:
-                if follows is None or found.missed > 0.1 * best.missed:
-                    follows = limb.follows(change.row[:6], frame, points, velocities)
-                best, base, step = found, change, 1.0
-                costs = limb.shifts.cost, follows
-                rows, _ = self._best(points, velocities, change, start, *costs, fixed=(6, 7), near=number >= _FREE_ROUNDS)
-            else:
-                step *= 0.4
+            better = best is None or found.missed < best.missed
+            slow = best is not None and found.missed > 0.1 * best.missed
+            if better:
+                best, base, step, there = found, change, 1.0, (points, velocities)
             if best.missed < CLOSE:
                 break
+            if slow and (better or not known):
+                follows, known = limb.follows(base.row[:6], frame, *there), True
+            if better or slow:
+                costs = limb.shifts.cost, follows
+                rows, _ = self._best(*there, base, start, *costs, fixed=(6, 7), near=number >= _FREE_ROUNDS)
+            step = 1.0 if better else 0.4 * step
             change = _Change(base.row + step * (rows[0] - base.row))
         return best
 
