@@ -45,7 +45,6 @@ _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be
 _MORE = 1.04  # times the slowest launch that reaches the target, at least
 _ROUNDS = 6  # of finding where the body begins
 _GOES_ON = 1.0  # s that the ball is followed behind its target
-_LONGEST = 12.0  # s
 
 
 @dataclass(frozen=True)
@@ -382,12 +381,12 @@ class _Work:
         left = found.frame / motion.fps
         start = 0.0 if self.order.release_time is None else self.order.release_time - left
         launch = Launch(start + left, found.position, found.velocity, found.spin)
-        flight = fly(launch, self.ball, min(found.seconds + _GOES_ON, _LONGEST) + found.motion.duration)
+        flight = fly(launch, self.ball, found.seconds + _GOES_ON + found.motion.duration)
         impact = crossing(flight, self.target)
         self._tell(found, impact)
         return Thrown(
             found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
-            ball_path(found, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
+            ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
             found.moved, found.shift, found.turned, found.pace, found.later, self.arcs.slowest,
             self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw,
             tuple(zip(plan.names, map(float, plan.weights))), tuple(self.warnings),
@@ -406,18 +405,34 @@ class _Work:
             self.warnings.append(f"the ball leaves at {speed:.1f} m/s, {self.order.speed:.1f} were asked for")
 
 
-def ball_path(found: Corrected, part: InHand | AtFoot, flight: Flight, start: float, seconds: float) -> BallPath:
+def within(thrown: Thrown, motion: Motion, start: float, release: float, first: int) -> Thrown:
+    """The throw as part of a longer motion that begins at `start` s and shows the throw from its frame `first` on, which
+    the ball leaves at `release` s: as `joined_throw.laid_into` says. The ball is held, or lies, all the time before."""
+    launch = replace(thrown.launch, time=release)
+    flight = fly(launch, thrown.ball, thrown.flight.end - thrown.launch.time + motion.duration)
+    shift = np.zeros((len(motion), 3))
+    shift[first : first + len(thrown.shift)] = thrown.shift[: len(motion) - first]
+    part = part_of(motion.skeleton, EFFECTORS.index(thrown.limb), thrown.ball)
+    seconds = thrown.path.times[-1] - thrown.launch.time
+    return replace(
+        thrown, motion=motion, start_time=start, release=release - start, shift=shift, launch=launch, flight=flight,
+        path=ball_path(motion, part, flight, start, seconds),
+    )
+
+
+def ball_path(motion: Motion, part: InHand | AtFoot, flight: Flight, start: float, seconds: float) -> BallPath:
     """The ball at the motion's rate, from `start` s on the caller's clock until the motion ends and it has flown
     `seconds`."""
-    fps = found.motion.fps
-    last = max(len(found.motion) - 1, int(np.ceil(found.frame + seconds * fps)))
+    fps = motion.fps
+    left = flight.launch.time
+    last = max(len(motion) - 1, int(np.ceil((left - start + seconds) * fps)))
     frames = np.arange(last + 1)
     times = start + frames / fps
-    flies = frames > found.frame
-    positions = flight.at(np.maximum(times, flight.launch.time))
+    flies = times > left
+    positions = flight.at(np.maximum(times, left))
     if isinstance(part, InHand):
         held = frames[~flies]
-        positions[held] = grip_point(found.motion, part, held.astype(float))[:, 0]
+        positions[held] = grip_point(motion, part, held.astype(float))[:, 0]
     rotations = quaternion.identity(len(times)) if not np.any(flight.launch.spin) else flight.rotations(times)
     return BallPath(times, positions, np.zeros(len(times), bool), rotations)
 

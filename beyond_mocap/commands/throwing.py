@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from . import throw_evaluate, throw_examples, throw_train
+from . import throw_evaluate, throw_examples, throw_synthesize, throw_train
 
-OWN = (throw_train.add, throw_evaluate.add, throw_examples.add)
+OWN = (throw_train.add, throw_synthesize.add, throw_evaluate.add, throw_examples.add)
 """What adds a verb below `throw`; each gets the sub-parsers and returns its parser."""
 
 
