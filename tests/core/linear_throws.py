@@ -1,0 +1,53 @@
+"""Models whose networks are linear least squares, for tests that need sensible answers within a second."""
+
+import numpy as np
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.motion.throws import throw
+from beyond_mocap.synthesis.phase_network.example import example_of
+from beyond_mocap.synthesis.phase_network.limits import learn
+from beyond_mocap.synthesis.phase_network.model import ModelSettings, ThrowModel
+from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
+from beyond_mocap.synthesis.phase_network.training_set import leg_reach, training_set
+
+FAR = 1e3  # hidden values are moved by it, so that no unit is ever below 0, where it would bend
+
+
+def planted_examples(count=12, seed=0, fps=30.0):
+    """Made throws of one body at known targets, in the normalised frame."""
+    random, found = np.random.default_rng(seed), []
+    while len(found) < count:
+        speed, far, high = random.uniform(14, 24), random.uniform(8, 20), random.uniform(0.4, 2.0)
+        try:
+            made = throw((far, 0.0, high), speed, fps=120.0)
+        except InputError:
+            continue
+        span = (made.release - 1.2, made.release + 0.8)
+        found.append(example_of(f"throw{len(found)}", "one", made.motion, "right_hand", made.release,
+                                (far, 0.0, high), made.velocity, fps, span))  # fmt: skip
+    return tuple(found)
+
+
+def linear_model(examples, action="throw", ridge=1.0):
+    """The hierarchy that answers by ridge regression on the examples."""
+    rows = training_set(examples, ModelSettings(points=1, layers=1, units=1, action=action))
+    units = max(part.answers.shape[1] for part in rows.values())
+    settings = ModelSettings(points=1, layers=1, units=units, action=action)
+    return ThrowModel(
+        settings, examples[0].motion.skeleton, {name: _linear(part, units, ridge) for name, part in rows.items()},
+        leg_reach(examples), tuple(examples),
+        joint_limits=learn(np.concatenate([example.motion.rotations for example in examples])),
+    )  # fmt: skip
+
+
+def _linear(rows, units, ridge):
+    scales = [(part.mean(0), part.std(0) + 1e-3) for part in (rows.inputs, rows.answers)]
+    x, y = ((part - mean) / scale for part, (mean, scale) in zip((rows.inputs, rows.answers), scales))
+    answers = y.shape[1]
+    slopes = np.zeros((units, x.shape[1]))
+    slopes[:answers] = np.linalg.solve(x.T @ x + ridge * np.eye(x.shape[1]), x.T @ y).T
+    taken = np.eye(answers, units)
+    return PhaseNetwork(
+        (slopes[None], taken[None]), (np.full((1, units), FAR), np.full((1, answers), -FAR)),
+        *scales[0], *scales[1],
+    )  # fmt: skip
