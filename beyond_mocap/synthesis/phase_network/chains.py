@@ -33,7 +33,8 @@ class Chains:
     above: the joints over the hips, held still. members: chain name -> its joints, parents first; arms end with the
     hand, legs with the toe. references: chain -> the joint that it hangs on (-1 for the hip). known: chain -> all
     joints whose place is known once this chain is. effectors: the joints of both hands and both toes. sockets: the
-    first joints of both arms and legs. chest, head: joints, the head the uppermost where there is none.
+    first joints of both arms and legs, middles: elbows and knees, ankles: feet. chest, neck, head: the next below where
+    there is none.
     """
 
     skeleton: Skeleton
@@ -92,15 +93,16 @@ def chains_of(skeleton: Skeleton) -> Chains:
     arms = [_between(parents, limb.upper_arm, limb.hand) for limb in (body.left, body.right)]
     legs = [_between(parents, limb.upper_leg, limb.toe_or_foot) for limb in (body.left, body.right)]
     sockets = (body.left.upper_arm, body.right.upper_arm, body.left.upper_leg, body.right.upper_leg)
+    top = body.neck if body.head is None else body.head
     trunk: set[int] = set()
-    for joint in (*(parents[arm] for arm in sockets[:2]), *([] if body.head is None else [body.head])):
+    for joint in (*(parents[arm] for arm in sockets[:2]), *([] if top is None else [top])):
         trunk |= set(_between(parents, body.hips, joint)) - {body.hips}
     if not trunk:
         raise InputError("skeleton", "no joint between the hips and the arms", "a spine")
     members = dict(zip(HIERARCHY, [(body.hips,), tuple(sorted(trunk)), *arms, *legs]))
     references = dict(zip(HIERARCHY, [-1, body.hips, *(parents[joint] for joint in sockets)]))
     chest = structure.common_ancestor(parents, [parents[arm] for arm in sockets[:2]])
-    head = chest if body.head is None else body.head
+    head = chest if top is None else top
     return Chains(
         skeleton=skeleton,
         hips=body.hips,

@@ -249,3 +249,14 @@ def test_examples_that_make_no_sense_are_refused(made):
     with pytest.raises(InputError):
         training_set([], ModelSettings())
     assert isinstance(example_of("t", "s", made.motion, 1, 0.0, TARGET), Example)
+
+
+def test_a_neck_without_a_head_is_of_the_body(made):
+    skeleton = made.motion.skeleton
+    without, _ = skeleton.part([i for i, name in enumerate(skeleton.names) if name != "Head"])
+    chains = chains_of(without)
+    assert chains.head == chains.neck == without.index("Neck") and chains.neck in chains.members["body"]
+    example = example_of("t", "s", under_a_root(made.motion), "right_hand", made.release, TARGET)
+    chains = chains_of(example.motion.skeleton)
+    names = [example.motion.skeleton.names[joint] for joint in (*chains.above, chains.hips, *chains.effectors)]
+    assert names == ["SimulationBone", "Hips", "LeftHand", "RightHand", "LeftToeBase", "RightToeBase"]
