@@ -19,15 +19,19 @@ from .ball.wall import meets_wall
 from .errors import Cancelled, InputError
 from .files import bvh
 from .files.whole import atomic_write
+from .ball.made_kicks import kick
 from .motion import quaternion
+from .motion.kick_subjects import Kicker, kick_style, kicker
+from .motion.kicks import KICKS
 from .motion.motion import Motion, place
 from .motion.throw_subjects import Subject, subject, subject_throws
 from .motion.throws import GRAVITY
 from .throw_examples import LAUNCH, TABLE_NAME, TARGET
 
-COLUMNS = ("file", "subject", "limb", "release_s", *TARGET, "speed_m_s", *LAUNCH)
+COLUMNS = ("file", "subject", "limb", "release_s", *TARGET, "speed_m_s", *LAUNCH, "ball_x_m", "ball_y_m", "ball_z_m")
 RATE = 120.0
 _TRIES = 50
+_INSIDE = (17.0, 1.2, 0.7)  # m/s and m up to which the inside serves, and how often
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +55,22 @@ def planted_throw(thrower: Subject, chance: np.random.Generator, fps: float = RA
     impact, _ = meets_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
     words, limb = f"throwb high {made.arm}", f"{made.arm}_hand"
     return Planted(made.motion, limb, made.release, made.position, made.velocity, impact, words)
+
+
+def planted_kick(who: Kicker, chance: np.random.Generator, fps: float = RATE) -> Planted:
+    """A kick of this subject at some place of a goal 8 to 22 m away; of the slower ones many with the inside of the foot."""
+    for _ in range(_TRIES):
+        target = chance.uniform((8.0, -3.4, 0.3), (22.0, 3.4, 2.2))
+        speed = float(chance.uniform(12.0, who.fastest))
+        inside = speed < _INSIDE[0] and target[2] < _INSIDE[1] and chance.uniform() < _INSIDE[2]
+        style = kick_style(who, KICKS["inside" if inside else "instep"], speed, chance)
+        try:
+            made = kick(tuple(target), speed, who.foot, style, who.skeleton, fps)
+        except InputError:
+            continue  # too far for this speed, or lower or higher than this foot sends it
+        words = f"kick {made.foot} low {'inside' if inside else 'top'} running"
+        return Planted(made.motion, f"{made.foot}_foot", made.contact, made.ball, made.velocity, target, words)
+    raise InputError("planted kicks", f"{who.name} with {who.fastest:g} m/s", "one who reaches a goal")
 
 
 def _throw_order(fastest: float, chance: np.random.Generator) -> tuple[tuple[float, float, float], float]:
@@ -118,9 +138,9 @@ def _written(folder: Path, who: str, name: str, example: Planted) -> str:
     timeline = Timeline((Span(0.0, end, words),), (KeyMoment(round(example.release, 6), words),))
     atomic_write(place_of / f"{name}.txt", format_timeline(timeline))
     speed = float(np.linalg.norm(example.velocity))
-    numbers = (example.release, *example.impact, speed, *example.velocity)
+    numbers = (example.release, *example.impact, speed, *example.velocity, *example.position)
     return ",".join((f"{who}/{name}.bvh", who, example.limb, *(f"{number:.6f}" for number in numbers)))
 
 
-ACTIONS = {"throw": (planted_throw, subject)}
+ACTIONS = {"throw": (planted_throw, subject), "kick": (planted_kick, kicker)}
 """action -> who makes one of somebody's examples by chance, and who makes somebody by seed."""

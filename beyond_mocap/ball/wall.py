@@ -12,15 +12,17 @@ _STEP = 0.004  # s between the places that are looked at
 
 
 def meets_wall(
-    position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray
+    position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
+    spin: np.ndarray = (0.0, 0.0, 0.0),
 ) -> tuple[np.ndarray, float]:
     """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground where
-    that comes first, and where it is after 6 s where neither does.
+    that comes first, and where it is after 6 s or four times what it would take without air where neither does.
 
-    position (3,) m, velocity (3,) m/s: the launch. foot (2,) m: a point of the wall on the ground, ahead (2,): from where
+    position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground, ahead (2,): from where
     it is thrown towards it, the wall's normal.
     """
-    flight = fly(Launch(0.0, position, velocity), ball, _LONGEST)
+    unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
+    flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST, 0.5 + 4.0 * unhindered))
     touches = [time for time in (*flight.bounces[:1], flight.rolls_from) if time is not None and time > _STEP]
     last = min(touches, default=flight.end)
     times = np.append(np.arange(0.0, last, _STEP), last)

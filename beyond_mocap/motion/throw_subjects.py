@@ -100,9 +100,7 @@ def subject_throws(
 def scattered(manner, scatter: dict[str, float], chance: np.random.Generator):
     """The same manner a little otherwise, by normal chance of the standard deviations `scatter` up to twice as far."""
     off = np.clip(chance.standard_normal(len(scatter)), -2.0, 2.0)
-    names = [field.name for field in fields(manner)]
-    changed = {name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)}
-    return replace(manner, **{name: value for name, value in changed.items() if name in names})
+    return replace(manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)})
 
 
 def styled(base: ThrowStyle, manner: Manner, effort: float = 1.0) -> ThrowStyle:
@@ -113,14 +111,14 @@ def styled(base: ThrowStyle, manner: Manner, effort: float = 1.0) -> ThrowStyle:
     lean = manner.lean * (0.55 + 0.45 * effort)
     spine = [(t, side - manner.slot * _near_release(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine]
     style = ThrowStyle(
-        pelvis=_by(base.pelvis, 1.0, lean, turn),
+        pelvis=by_factors(base.pelvis, 1.0, lean, turn),
         spine=tuple(spine),
         right_arm=tuple((t, a, b, c if c > -60.0 else -60.0 + out * (c + 60.0), e) for t, a, b, c, e in base.right_arm),
-        left_arm=_by(base.left_arm, manner.off_arm, manner.off_arm, 1.0, 1.0),
+        left_arm=by_factors(base.left_arm, manner.off_arm, manner.off_arm, 1.0, 1.0),
         forearm=base.forearm,
-        hips=_by(base.hips, way, 0.4 + 0.6 * way),
-        left_foot=_by(base.left_foot, way, 1.0, raised, raised, turn),
-        right_foot=_by(base.right_foot, way, 1.0, 1.0, 1.0, turn),
+        hips=by_factors(base.hips, way, 0.4 + 0.6 * way),
+        left_foot=by_factors(base.left_foot, way, 1.0, raised, raised, turn),
+        right_foot=by_factors(base.right_foot, way, 1.0, 1.0, 1.0, turn),
     )
     brisk = replace(manner, wind_up=manner.wind_up * (0.6 + 0.4 * effort), follow=manner.follow * (0.7 + 0.3 * effort))
     return ThrowStyle(*(_paced(getattr(style, field.name), brisk) for field in fields(style)))
@@ -130,7 +128,7 @@ def _near_release(time: float) -> float:
     return float(np.exp(-0.5 * (time / 0.25) ** 2))
 
 
-def _by(rows: tuple, *factors: float) -> tuple:
+def by_factors(rows: tuple, *factors: float) -> tuple:
     """Rows (time, values...) with every value times its factor."""
     return tuple((row[0], *(value * factor for value, factor in zip(row[1:], factors))) for row in rows)
 
