@@ -1,0 +1,107 @@
+"""What a training is told: the sizes of the networks and how they are trained; read from a small JSON
+(docs/throws-training.md has a table of all names)."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.files import json_values as values
+from beyond_mocap.synthesis.phase_network.model import ModelSettings
+
+PAGE = "docs/throws-training.md"
+LIMITS = {
+    "epochs": (1, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
+    "final_rate": (0.0, 1.0), "keep": (0.05, 1.0), "l1": (0.0, 10.0), "limb_weight": (0.0, 1000.0),
+    "body_weight": (0.0, 1000.0), "rollout": (1, 64), "single_frames": (0.0, 1.0), "noise": (0.0, 0.5),
+    "seed": (0, 2**31 - 1), "examples": (1, 1000),
+}
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """How networks are trained; the defaults are those of the shipped weights.
+
+    settings: what the model is. epochs: times through all frames. macro: epochs between two checkpoints (§7.6). batch:
+    frames a step. learning_rate: Adam's at the start; it falls along a cosine to final_rate times that. keep: share of
+    the values that dropout keeps, in single, hip and body (§7.6). l1: lambda 1 of eq. 7.5, on the mean of the weights'
+    sizes. limb_weight, body_weight: lambda 2 of eq. 7.5, per metre, for arms and legs and for hip and body.
+    effector_loss: whether lambda 2 counts at all. single_effector: whether it does for the single network too (§9.2).
+    rollout: frames that are fed back before the loss is counted; 1 is one frame from the truth, as in §7.5.
+    single_frames: share of the training that goes by single frames before that. noise: radians by which the pose at the
+    start of a stretch is off. mirrored: whether each example is also taken mirrored. examples: most that the model
+    keeps to start from (§7.7.1). seed: of first weights, order, dropout and noise.
+    """
+
+    settings: ModelSettings = field(default_factory=lambda: ModelSettings(conditioned=True))
+    epochs: int = 400
+    macro: int = 10
+    batch: int = 512
+    learning_rate: float = 1e-3
+    final_rate: float = 0.01
+    keep: float = 1.0
+    l1: float = 0.01
+    limb_weight: float = 50.0
+    body_weight: float = 33.0
+    effector_loss: bool = True
+    single_effector: bool = False
+    rollout: int = 8
+    single_frames: float = 0.3
+    noise: float = 0.02
+    mirrored: bool = True
+    examples: int = 40
+    seed: int = 0
+
+    def __post_init__(self):
+        for name, (low, high) in LIMITS.items():
+            if not low <= getattr(self, name) <= high:
+                raise InputError(f"training: {name}", f"{getattr(self, name):g}", f"{low:g} to {high:g}", f"see {PAGE}")
+
+    def with_settings(self, **changes) -> "TrainingConfig":
+        """The same with other settings of the model."""
+        return replace(self, settings=replace(self.settings, **changes))
+
+    def flat(self) -> dict:
+        """All names of the JSON with their values."""
+        own = {name: value for name, value in asdict(self).items() if name != "settings"}
+        return {**asdict(self.settings), **own}
+
+
+def read_config(path: str | os.PathLike | None, **changes) -> TrainingConfig:
+    """The training that a JSON file describes, what it leaves out by default; without a file the default.
+
+    changes: values that stand above the file's, None where there is none. InputError, one line: no such file, no JSON,
+    an unknown name, a value out of its range.
+    """
+    told = {} if path is None else _object(Path(path))
+    return config_of({**told, **{name: value for name, value in changes.items() if value is not None}}, path or "config")
+
+
+def config_of(told: dict, where: object = "config") -> TrainingConfig:
+    """The training that names and values describe. InputError as for `read_config`."""
+    known = TrainingConfig().flat()
+    values.check_names(told, str(where), known, ())
+    read = {name: _value(value, known[name], f"{where}: {name}") for name, value in told.items()}
+    of_model = {one.name for one in fields(ModelSettings)}
+    start = TrainingConfig()
+    settings = replace(start.settings, **{name: value for name, value in read.items() if name in of_model})
+    return replace(start, settings=settings, **{name: value for name, value in read.items() if name not in of_model})
+
+
+def _object(path: Path) -> dict:
+    try:
+        text = path.read_text("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(path, "is no text", "JSON in UTF-8", f"see {PAGE}") from None
+    return values.object_of(text, str(path), PAGE)
+
+
+def _value(value, default, where: str):
+    """A value of the kind that the default has."""
+    if isinstance(default, bool):
+        return values.truth(value, where)
+    if isinstance(default, int):
+        return values.whole_number(value, where)
+    return values.number(value, where) if isinstance(default, float) else values.text(value, where)
