@@ -1,0 +1,139 @@
+"""Adam on any problem: epochs, macro-epochs with a checkpoint, a falling learning rate, a limit of time.
+
+The same seed gives the same bits on one machine, broken off and resumed or not; with a limit of time the result depends
+on how fast the machine is.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+
+from beyond_mocap.errors import Cancelled, InputError
+
+from . import checkpoint as kept
+from .batches import batches, stretches
+from .config import TrainingConfig
+
+CLIP = 1.0
+"""Longest gradient that is followed; a frame fed back many times can make a long one."""
+
+
+class Problem(Protocol):
+    """What is trained. lengths: frames of each example. fits: settings and recordings as one text."""
+
+    lengths: Sequence[int]
+    fits: str
+
+    def first(self, key) -> dict:
+        """The parameters to begin with."""
+
+    def loss(self, params, rows, key, frames: int):
+        """The loss (), and its parts by name, of stretches rows (B, 2) of so many frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """params: as the problem has them. epochs: done. seconds: spent. losses: of each epoch. parts: of the last epoch, by
+    name."""
+
+    params: dict
+    epochs: int
+    seconds: float
+    losses: tuple[float, ...]
+    parts: dict[str, float]
+
+
+def fit(
+    problem: Problem,
+    config: TrainingConfig,
+    *,
+    checkpoint: Path | None = None,
+    resume: bool = False,
+    minutes: float | None = None,
+    progress: Callable[[float, str], None] = lambda fraction, text: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Trained:
+    """Trains a problem. checkpoint: where one is written after each macro-epoch and when cancelled. resume: from there.
+
+    InputError where no example is long enough, where the checkpoint is of another training, or where the loss is no
+    number any more; Cancelled when asked to stop.
+    """
+    adam = optax.chain(optax.clip_by_global_norm(CLIP), optax.scale_by_adam())
+    params = problem.first(jax.random.key(config.seed))
+    state = (params, adam.init(params))
+    epoch, spent, losses = 0, 0.0, ()
+    if resume and checkpoint is not None:
+        old = kept.read(checkpoint, state, problem.fits)
+        state, epoch, spent, losses = old.state, old.epoch, old.seconds, old.losses
+    begun = time.perf_counter() - spent
+    steps, parts = _steps(problem, adam), {}
+
+    def keep() -> None:
+        if checkpoint is not None:
+            seconds = time.perf_counter() - begun
+            kept.write(checkpoint, kept.Checkpoint(state, epoch, seconds, losses, problem.fits))
+
+    while (share := _share(epoch, time.perf_counter() - begun, config, minutes)) < 1.0:
+        progress(share, f"epoch {epoch + 1}, loss {losses[-1]:.4f}" if losses else "compiling")
+        if cancelled():
+            keep()
+            raise Cancelled(f"cancelled after {epoch} epochs" + ("; --resume goes on" if checkpoint else ""))
+        frames = config.rollout if share >= config.single_frames else 1
+        state, parts = _epoch(problem, config, steps, state, epoch, frames, rate_at(share, config))
+        losses, epoch = (*losses, parts["loss"]), epoch + 1
+        if not np.isfinite(losses[-1]):
+            raise InputError("training", f"the loss is no number after {epoch} epochs", "a lower learning_rate")
+        if epoch % config.macro == 0:
+            keep()
+    keep()
+    return Trained(state[0], epoch, time.perf_counter() - begun, losses, parts)
+
+
+def rate_at(share: float, config: TrainingConfig) -> float:
+    """Adam's rate when `share` of the training is done: along half a cosine from learning_rate to final_rate of it, after
+    a short rise."""
+    falling = config.final_rate + (1.0 - config.final_rate) * 0.5 * (1.0 + np.cos(np.pi * share))
+    return config.learning_rate * falling * min(1.0, 0.1 + share / 0.01)
+
+
+def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | None) -> float:
+    """How much of the training is done, by epochs or by time, whichever is further."""
+    return max(epoch / config.epochs, 0.0 if minutes is None else seconds / (60.0 * minutes))
+
+
+def _steps(problem: Problem, adam):
+    """The compiled step, one for each number of frames."""
+
+    @partial(jax.jit, static_argnames="frames", donate_argnums=0)
+    def step(state, rows, key, rate, frames: int):
+        params, optimizer = state
+        (loss, parts), gradient = jax.value_and_grad(problem.loss, has_aux=True)(params, rows, key, frames)
+        updates, optimizer = adam.update(gradient, optimizer, params)
+        params = jax.tree.map(lambda p, u: p - rate * u, params, updates)
+        return (params, optimizer), {"loss": loss, **parts}
+
+    return step
+
+
+def _epoch(problem, config, step, state, epoch, frames, rate):
+    """Once through all examples: the new state, and the mean of the losses."""
+    rows = stretches(problem.lengths, frames, config.seed, epoch)
+    if not len(rows):
+        raise InputError("training", f"no example has {frames + 1} frames", "longer examples, or a shorter rollout")
+    key = jax.random.fold_in(jax.random.key(config.seed + 1), epoch)
+    told = []
+    for number, batch in enumerate(batches(rows, max(1, config.batch // frames))):
+        state, parts = step(state, jnp.asarray(batch), jax.random.fold_in(key, number), jnp.float32(rate), frames=frames)
+        told.append(parts)
+    told = jax.device_get(told)
+    return state, {name: float(np.mean([parts[name] for parts in told])) for name in told[0]}
