@@ -1,0 +1,153 @@
+"""The networks of a model trained on recordings, in the three ways there are: each alone on the truth (§7.5, §7.6), in
+order, so that children see what their parents predict (§9.4), and with several frames fed back as in use."""
+
+from __future__ import annotations
+
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.synthesis.phase_network import phase_function
+from beyond_mocap.synthesis.phase_network.chains import LIMB_OF, Chains
+from beyond_mocap.synthesis.phase_network.description import Windows
+from beyond_mocap.synthesis.phase_network.features import answered, network_input, network_output, phase_of
+from beyond_mocap.synthesis.phase_network.kinematics import Pose, places_and_turns
+from beyond_mocap.synthesis.phase_network.model import SINGLE
+from beyond_mocap.synthesis.phase_network.network import forward
+
+from .config import TrainingConfig
+from .losses import effector_error, joint_error, sizes
+from .networks import first_weights, scales_of
+from .recordings import Recordings, inputs_and_outputs
+
+DROPPED = (SINGLE, "hip", "body")
+"""Networks that are trained with dropout (§7.6)."""
+ROOT_NOISE = 0.3
+"""Metres by which the root is off at the start of a stretch, for each radian of noise."""
+
+
+class Networks:
+    """The problem that `fit` solves: all networks of one model. Recordings are moved to the device once."""
+
+    def __init__(self, recorded: Recordings, chains: Chains, config: TrainingConfig, leg_reach: dict):
+        """leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3. InputError where networks that are
+        trained alone are asked to feed frames back."""
+        if config.rollout > 1 and not config.settings.conditioned and config.settings.kind == "hierarchy":
+            raise InputError("training: rollout", f"{config.rollout} frames without conditioned",
+                             "conditioned true, or rollout 1", "networks trained alone have no frame to feed back")  # fmt: skip
+        self.config, self.settings, self.chains, self.leg_reach = config, config.settings, chains, leg_reach
+        self.lengths = recorded.lengths
+        self.fits = json.dumps({**config.flat(), "recordings": recorded.digest}, sort_keys=True)
+        self.scales = {}
+        for name in self.settings.networks:
+            x, y = inputs_and_outputs(name, chains, self.settings, recorded)
+            (mean_x, scale_x), (mean_y, scale_y) = scales_of(x), scales_of(y)
+            self.scales[name] = {
+                "input_mean": mean_x, "input_scale": scale_x, "output_mean": mean_y, "output_scale": scale_y,
+            }
+        self._recorded = jax.tree.map(jnp.asarray, recorded._replace(lengths=()))
+
+    def first(self, key) -> dict:
+        """First weights of all networks, by name."""
+        settings = self.settings
+        return {
+            name: first_weights(
+                jax.random.fold_in(key, number), len(self.scales[name]["input_mean"]),
+                len(self.scales[name]["output_mean"]), settings.layers, settings.units, settings.points,
+            )
+            for number, name in enumerate(settings.networks)
+        }
+
+    def loss(self, params, rows, key, frames: int):
+        """eq. 7.5 summed over the networks, mean over stretches rows (B, 2) (example, first frame) and their frames."""
+        example, start = rows[:, 0], rows[:, 1]
+        pose, _ = self._recorded.at(example, start)
+        pose = self._disturbed(pose, jax.random.fold_in(key, frames))
+
+        def one_frame(pose, number):
+            _, window = self._recorded.at(example, start + number)
+            truth, _ = self._recorded.at(example, start + number + 1)
+            return self._frame(params, pose, truth, window, jax.random.fold_in(key, number))
+
+        _, parts = jax.lax.scan(one_frame, pose, jnp.arange(frames))
+        parts = {name: jnp.mean(one) for name, one in parts.items()}
+        parts["sizes"] = self.config.l1 * sizes(params)
+        return sum(parts.values()), parts
+
+    def _frame(self, params, pose: Pose, truth: Pose, window: Windows, key):
+        """One frame on: the state that is predicted, and the losses by name."""
+        after, parts = pose, {}
+        conditioned = self.settings.conditioned or self.settings.kind == SINGLE
+        for number, name in enumerate(self.settings.networks):
+            known = after if conditioned else truth
+            y, wanted = self._said(params, name, pose, known, truth, window, jax.random.fold_in(key, number))
+            scale = self.scales[name]["output_scale"]
+            parts[name] = joint_error(y, wanted, scale)
+            after = answered(name, self.chains, self.settings, y, pose, known, window, jnp)
+            if self._looks_at_ends(name):
+                error = effector_error(name, self.chains, self.settings, y, wanted, after, window)
+                parts[f"{name} ends"] = self._weight(name) ** 2 * error
+        return after._replace(moved=after.positions - pose.positions), parts
+
+    def _said(self, params, name, pose, after, truth, window, key):
+        """What a network answers (B, out), and what it should."""
+        scales, settings = self.scales[name], self.settings
+        x = network_input(name, self.chains, settings, pose, after, window, jnp)
+        phase = phase_of(name, self.chains, after, window, self.leg_reach, jnp)
+        theta = phase_function.weights(phase, settings.points, jnp)
+        normal = (x - scales["input_mean"]) / scales["input_scale"]
+        weights, biases = params[name]["weights"], params[name]["biases"]
+        y = forward(weights, biases, normal, theta, jnp, self._masks(name, weights, len(x), key))
+        wanted = network_output(name, self.chains, settings, pose, truth, jnp)
+        return y * scales["output_scale"] + scales["output_mean"], wanted
+
+    def _masks(self, name: str, weights, rows: int, key):
+        """Dropout (eq. 3.27) of what each layer is given, or None."""
+        share = self.config.keep
+        if share >= 1.0 or name not in DROPPED:
+            return None
+        keys = jax.random.split(key, len(weights))
+        shapes = [(rows, weight.shape[2]) for weight in weights]
+        return [jax.random.bernoulli(one, share, shape) / share for one, shape in zip(keys, shapes)]
+
+    def _looks_at_ends(self, name: str) -> bool:
+        config = self.config
+        return config.single_effector if name == SINGLE else config.effector_loss
+
+    def _weight(self, name: str) -> float:
+        return self.config.limb_weight if name in LIMB_OF or name == SINGLE else self.config.body_weight
+
+    def _disturbed(self, pose: Pose, key) -> Pose:
+        """Poses (B, ...) with a little noise on the root's place and on each joint that networks move: in use the state
+        is never quite the truth."""
+        if not self.config.noise:
+            return pose
+        skeleton, joints = self.chains.skeleton, np.array(self.chains.joints)
+        turn, shift = jax.random.split(key)
+        vectors = self.config.noise * jax.random.normal(turn, (len(pose.root), len(joints), 3))
+        local = pose.local.at[:, joints].set(pose.local[:, joints] @ _small_turns(vectors))
+        root = pose.root + self.config.noise * ROOT_NOISE * jax.random.normal(shift, pose.root.shape)
+        positions, turns = places_and_turns(skeleton.offsets.astype(np.float32), skeleton.parents, root, local, jnp)
+        return Pose(root, local, positions, turns, pose.moved)
+
+
+def _small_turns(vectors):
+    """Rotations (..., 3, 3) by rotation vectors (..., 3) in radians (Rodrigues)."""
+    angle = jnp.sqrt(jnp.sum(vectors**2, -1) + 1e-12)[..., None, None]
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    zero = jnp.zeros_like(x)
+    skew = jnp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*vectors.shape[:-1], 3, 3)
+    return jnp.eye(3) + jnp.sin(angle) / angle * skew + (1 - jnp.cos(angle)) / angle**2 * (skew @ skew)
+
+
+def leg_reach(recorded: Recordings, chains: Chains) -> dict[str, tuple[float, float]]:
+    """Shortest and longest distance (m) from the top of each leg to its toe in the recordings (eq. 7.3)."""
+    found = {}
+    for side, number in (("left", 2), ("right", 3)):
+        toes = recorded.pose.positions[:, :, chains.effectors[number]]
+        distance = np.linalg.norm(toes - recorded.pose.positions[:, :, chains.sockets[number]], axis=-1)
+        found[side] = (float(distance.min()), float(distance.max()))
+    return found

@@ -1,0 +1,73 @@
+"""Examples as arrays of one length, in float32, as a training reads them frame by frame."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.synthesis.phase_network.chains import Chains
+from beyond_mocap.synthesis.phase_network.description import Windows, windows
+from beyond_mocap.synthesis.phase_network.example import Example, describe, poses
+from beyond_mocap.synthesis.phase_network.features import network_input, network_output
+from beyond_mocap.synthesis.phase_network.kinematics import Pose
+from beyond_mocap.synthesis.phase_network.model import ModelSettings
+
+MOST_FRAMES = 20_000
+"""Frames that means and deviations are taken from."""
+
+
+class Recordings(NamedTuple):
+    """N examples, each held at its last frame up to the longest, T frames. pose, window: their arrays (N, T, ...).
+    lengths (N,): frames of each example."""
+
+    pose: Pose
+    window: Windows
+    lengths: tuple[int, ...]
+
+    def at(self, example, frame):
+        """Poses and windows (B, ...) of frames (B,) of examples (B,)."""
+        return Pose(*(one[example, frame] for one in self.pose)), Windows(*(one[example, frame] for one in self.window))
+
+    @property
+    def digest(self) -> str:
+        """A short hash of all numbers in them."""
+        digest = hashlib.sha256(repr(self.lengths).encode())
+        for one in (self.pose.root, self.pose.local, *self.window):
+            digest.update(np.ascontiguousarray(one).tobytes())
+        return digest.hexdigest()[:16]
+
+
+def recordings(examples: Sequence[Example], reference: np.ndarray | None = None) -> Recordings:
+    """The examples' arrays. reference: of warped phases, or None. InputError where there is no example."""
+    if not examples:
+        raise InputError("training", "no example", "one throw or kick at least")
+    lengths = tuple(len(example.motion) for example in examples)
+    longest = max(lengths)
+    pose = [poses(example) for example in examples]
+    window = [windows(describe(example), reference) for example in examples]
+    return Recordings(Pose(*_padded(pose, longest)), Windows(*_padded(window, longest)), lengths)
+
+
+def _padded(parts: list, longest: int) -> list[np.ndarray]:
+    """Each field of tuples of arrays (T, ...) as one array (N, longest, ...), float32."""
+    out = []
+    for field in zip(*parts):
+        held = [np.concatenate([one, np.repeat(one[-1:], longest - len(one), axis=0)]) for one in field]
+        out.append(np.stack(held).astype(np.float32))
+    return out
+
+
+def inputs_and_outputs(name: str, chains: Chains, settings: ModelSettings, recorded: Recordings, most: int = MOST_FRAMES):
+    """X (F, in) and Y (F, out) of a network over all frames that have one after them; at most `most`, evenly."""
+    rows = np.concatenate([
+        np.stack([np.full(length - 1, i), np.arange(length - 1)], axis=1) for i, length in enumerate(recorded.lengths)
+    ])
+    rows = rows[:: max(1, -(-len(rows) // most))]
+    pose, window = recorded.at(rows[:, 0], rows[:, 1])
+    after, _ = recorded.at(rows[:, 0], rows[:, 1] + 1)
+    x = network_input(name, chains, settings, pose, after, window)
+    return x, network_output(name, chains, settings, pose, after)
