@@ -11,13 +11,17 @@ import numpy as np
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.synthesis.phase_network import phase_function
+from beyond_mocap.synthesis.phase_network.answers import answered, network_output
 from beyond_mocap.synthesis.phase_network.chains import LIMB_OF, Chains
 from beyond_mocap.synthesis.phase_network.description import Windows
-from beyond_mocap.synthesis.phase_network.features import answered, network_input, network_output, phase_of
+from beyond_mocap.synthesis.phase_network.features import network_input, phase_of
 from beyond_mocap.synthesis.phase_network.kinematics import Pose, places_and_turns
+from beyond_mocap.synthesis.phase_network.limb_reach import bent_limb, hinge_axes
+from beyond_mocap.synthesis.phase_network.limits import JointLimits
 from beyond_mocap.synthesis.phase_network.model import SINGLE
 from beyond_mocap.synthesis.phase_network.network import forward
 
+from .arrays import ARRAYS
 from .config import TrainingConfig
 from .losses import effector_error, joint_error, sizes
 from .networks import first_weights, scales_of
@@ -28,17 +32,23 @@ DROPPED = (SINGLE, "hip", "body")
 ROOT_NOISE = 0.3
 """Metres by which the root is off at the start of a stretch, for each radian of noise."""
 
+IK_SHARE = 0.5
+"""How much of the way the layer of inverse kinematics brings a limb, as `generate.Options.share` has it."""
+
 
 class Networks:
     """The problem that `fit` solves: all networks of one model. Recordings are moved to the device once."""
 
-    def __init__(self, recorded: Recordings, chains: Chains, config: TrainingConfig, leg_reach: dict):
-        """leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3. InputError where networks that are
-        trained alone are asked to feed frames back."""
+    def __init__(
+        self, recorded: Recordings, chains: Chains, config: TrainingConfig, leg_reach: dict, limits: JointLimits
+    ):
+        """leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3. limits: which say the way in which elbows
+        and knees bend. InputError where networks that are trained alone are asked to feed frames back."""
         if config.rollout > 1 and not config.settings.conditioned and config.settings.kind == "hierarchy":
             raise InputError("training: rollout", f"{config.rollout} frames without conditioned",
                              "conditioned true, or rollout 1", "networks trained alone have no frame to feed back")  # fmt: skip
         self.config, self.settings, self.chains, self.leg_reach = config, config.settings, chains, leg_reach
+        self.axes = hinge_axes(chains, limits).astype(np.float32)
         self.lengths = recorded.lengths
         self.fits = json.dumps({**config.flat(), "recordings": recorded.digest}, sort_keys=True)
         self.scales = {}
@@ -86,23 +96,31 @@ class Networks:
             y, wanted = self._said(params, name, pose, known, truth, window, jax.random.fold_in(key, number))
             scale = self.scales[name]["output_scale"]
             parts[name] = joint_error(y, wanted, scale)
-            after = answered(name, self.chains, self.settings, y, pose, known, window, jnp)
+            after = answered(name, self.chains, self.settings, y, pose, known, window, ARRAYS)
             if self._looks_at_ends(name):
                 error = effector_error(name, self.chains, self.settings, y, wanted, after, window)
                 parts[f"{name} ends"] = self._weight(name) ** 2 * error
+            if self.settings.ik_layer and name in LIMB_OF:
+                after = self._bent(LIMB_OF.index(name), after, window)
         return after._replace(moved=after.positions - pose.positions), parts
 
     def _said(self, params, name, pose, after, truth, window, key):
         """What a network answers (B, out), and what it should."""
         scales, settings = self.scales[name], self.settings
-        x = network_input(name, self.chains, settings, pose, after, window, jnp)
-        phase = phase_of(name, self.chains, after, window, self.leg_reach, jnp)
+        x = network_input(name, self.chains, settings, pose, after, window, ARRAYS)
+        phase = phase_of(name, self.chains, after, window, self.leg_reach, ARRAYS)
         theta = phase_function.weights(phase, settings.points, jnp)
         normal = (x - scales["input_mean"]) / scales["input_scale"]
         weights, biases = params[name]["weights"], params[name]["biases"]
         y = forward(weights, biases, normal, theta, jnp, self._masks(name, weights, len(x), key))
-        wanted = network_output(name, self.chains, settings, pose, truth, jnp)
+        wanted = network_output(name, self.chains, settings, pose, truth, ARRAYS)
         return y * scales["output_scale"] + scales["output_mean"], wanted
+
+    def _bent(self, number: int, after: Pose, window: Windows) -> Pose:
+        """The pose with a limb brought towards where its end is to be, as use does it."""
+        kept = number >= 2 or self.settings.wrist == "given"
+        wanted = window.next[..., number, :]
+        return bent_limb(number, self.chains, after, wanted, IK_SHARE, self.axes, kept, ARRAYS)
 
     def _masks(self, name: str, weights, rows: int, key):
         """Dropout (eq. 3.27) of what each layer is given, or None."""
@@ -130,7 +148,7 @@ class Networks:
         vectors = self.config.noise * jax.random.normal(turn, (len(pose.root), len(joints), 3))
         local = pose.local.at[:, joints].set(pose.local[:, joints] @ _small_turns(vectors))
         root = pose.root + self.config.noise * ROOT_NOISE * jax.random.normal(shift, pose.root.shape)
-        positions, turns = places_and_turns(skeleton.offsets.astype(np.float32), skeleton.parents, root, local, jnp)
+        positions, turns = places_and_turns(skeleton.offsets.astype(np.float32), skeleton.parents, root, local, ARRAYS)
         return Pose(root, local, positions, turns, pose.moved)
 
 
@@ -141,13 +159,3 @@ def _small_turns(vectors):
     zero = jnp.zeros_like(x)
     skew = jnp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*vectors.shape[:-1], 3, 3)
     return jnp.eye(3) + jnp.sin(angle) / angle * skew + (1 - jnp.cos(angle)) / angle**2 * (skew @ skew)
-
-
-def leg_reach(recorded: Recordings, chains: Chains) -> dict[str, tuple[float, float]]:
-    """Shortest and longest distance (m) from the top of each leg to its toe in the recordings (eq. 7.3)."""
-    found = {}
-    for side, number in (("left", 2), ("right", 3)):
-        toes = recorded.pose.positions[:, :, chains.effectors[number]]
-        distance = np.linalg.norm(toes - recorded.pose.positions[:, :, chains.sockets[number]], axis=-1)
-        found[side] = (float(distance.min()), float(distance.max()))
-    return found

@@ -8,9 +8,11 @@ import jax.numpy as jnp
 
 from beyond_mocap.synthesis.phase_network.chains import LIMB_OF, Chains
 from beyond_mocap.synthesis.phase_network.description import Windows
-from beyond_mocap.synthesis.phase_network.features import ends
+from beyond_mocap.synthesis.phase_network.answers import ends
 from beyond_mocap.synthesis.phase_network.kinematics import Pose
 from beyond_mocap.synthesis.phase_network.model import ModelSettings
+
+from .arrays import ARRAYS
 
 
 def joint_error(y, wanted, scale):
@@ -30,7 +32,7 @@ def effector_error(
         number = LIMB_OF.index(name)
         missed = after.positions[..., chains.effectors[number], :] - window.next[..., number, :]
     else:
-        missed = ends(name, chains, settings, y, jnp) - ends(name, chains, settings, wanted, jnp)
+        missed = ends(name, chains, settings, y, ARRAYS) - ends(name, chains, settings, wanted, ARRAYS)
     return jnp.mean(jnp.sum(missed**2, axis=-1))
 
 

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from beyond_mocap.errors import InputError
+from beyond_mocap.synthesis.phase_network.answers import network_output
 from beyond_mocap.synthesis.phase_network.chains import Chains
 from beyond_mocap.synthesis.phase_network.description import Windows, windows
 from beyond_mocap.synthesis.phase_network.example import Example, describe, poses
-from beyond_mocap.synthesis.phase_network.features import network_input, network_output
+from beyond_mocap.synthesis.phase_network.features import network_input
 from beyond_mocap.synthesis.phase_network.kinematics import Pose
 from beyond_mocap.synthesis.phase_network.model import ModelSettings
 
