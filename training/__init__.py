@@ -3,3 +3,8 @@
 Not part of the extension: it needs jax and optax (`make training`). What it makes is a file of weights that
 `beyond_mocap.synthesis.phase_network` uses with numpy alone.
 """
+
+import os
+
+if (os.cpu_count() or 1) <= 4:  # threads that wait for each other cost more than they bring
+    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")

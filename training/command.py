@@ -32,7 +32,7 @@ def train_folder(options, told: Told) -> None:
         examples, config, checkpoint=checkpoint.path_of(options.out), resume=options.resume, minutes=options.minutes,
         progress=progress, cancelled=told.cancelled,
     )
-    write_model(options.out, model, half=options.half)
+    write_model(model, options.out, half=options.half)
     told.end()
     weights = sum(network.parameters for network in model.networks.values())
     seconds = time.perf_counter() - begun

@@ -31,7 +31,8 @@ class TrainingConfig:
     effector_loss: whether lambda 2 counts at all. single_effector: whether it does for the single network too (§9.2).
     rollout: frames that are fed back before the loss is counted; 1 is one frame from the truth, as in §7.5.
     single_frames: share of the training that goes by single frames before that. noise: radians by which the pose at the
-    start of a stretch is off. mirrored: whether each example is also taken mirrored. examples: most that the model
+    start of a stretch is off. mirrored: whether each example is also taken mirrored.
+    linear_start: whether networks start from what linear regression says, else at random. examples: most that the model
     keeps to start from (§7.7.1). seed: of first weights, order, dropout and noise.
     """
 
@@ -51,6 +52,7 @@ class TrainingConfig:
     single_frames: float = 0.3
     noise: float = 0.02
     mirrored: bool = True
+    linear_start: bool = True
     examples: int = 40
     seed: int = 0
 

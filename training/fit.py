@@ -29,15 +29,20 @@ CLIP = 1.0
 
 
 class Problem(Protocol):
-    """What is trained. lengths: frames of each example. fits: settings and recordings as one text."""
+    """What is trained. lengths: frames of each example. fits: settings and recordings as one text. data: a tree of arrays
+    that the loss is given."""
 
     lengths: Sequence[int]
     fits: str
+    data: object
 
     def first(self, key) -> dict:
         """The parameters to begin with."""
 
-    def loss(self, params, rows, key, frames: int):
+    def frames(self, share: float) -> int:
+        """Frames that are fed back when `share` of the training is done; 0: none, single frames."""
+
+    def loss(self, params, data, rows, key, frames: int):
         """The loss (), and its parts by name, of stretches rows (B, 2) of so many frames."""
 
 
@@ -68,7 +73,7 @@ def fit(
     InputError where no example is long enough, where the checkpoint is of another training, or where the loss is no
     number any more; Cancelled when asked to stop.
     """
-    adam = optax.chain(optax.clip_by_global_norm(CLIP), optax.scale_by_adam())
+    adam = optax.chain(_clipped(), optax.scale_by_adam())
     params = problem.first(jax.random.key(config.seed))
     state = (params, adam.init(params))
     epoch, spent, losses = 0, 0.0, ()
@@ -88,8 +93,7 @@ def fit(
         if cancelled():
             keep()
             raise Cancelled(f"cancelled after {epoch} epochs" + ("; --resume goes on" if checkpoint else ""))
-        frames = config.rollout if share >= config.single_frames else 1
-        state, parts = _epoch(problem, config, steps, state, epoch, frames, rate_at(share, config))
+        state, parts = _epoch(problem, config, steps, state, epoch, problem.frames(share), rate_at(share, config))
         losses, epoch = (*losses, parts["loss"]), epoch + 1
         if not np.isfinite(losses[-1]):
             raise InputError("training", f"the loss is no number after {epoch} epochs", "a lower learning_rate")
@@ -111,13 +115,23 @@ def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | 
     return max(epoch / config.epochs, 0.0 if minutes is None else seconds / (60.0 * minutes))
 
 
+def _clipped() -> optax.GradientTransformation:
+    """Gradients no longer than CLIP, each network's by itself, so that networks trained alone do not know each other."""
+
+    def update(updates, state, params=None):
+        clip = optax.clip_by_global_norm(CLIP).update
+        return {name: clip(one, optax.EmptyState())[0] for name, one in updates.items()}, state
+
+    return optax.GradientTransformation(lambda params: optax.EmptyState(), update)
+
+
 def _steps(problem: Problem, adam):
     """The compiled step, one for each number of frames."""
 
     @partial(jax.jit, static_argnames="frames", donate_argnums=0)
-    def step(state, rows, key, rate, frames: int):
+    def step(state, data, rows, key, rate, frames: int):
         params, optimizer = state
-        (loss, parts), gradient = jax.value_and_grad(problem.loss, has_aux=True)(params, rows, key, frames)
+        (loss, parts), gradient = jax.value_and_grad(problem.loss, has_aux=True)(params, data, rows, key, frames)
         updates, optimizer = adam.update(gradient, optimizer, params)
         params = jax.tree.map(lambda p, u: p - rate * u, params, updates)
         return (params, optimizer), {"loss": loss, **parts}
@@ -127,13 +141,15 @@ def _steps(problem: Problem, adam):
 
 def _epoch(problem, config, step, state, epoch, frames, rate):
     """Once through all examples: the new state, and the mean of the losses."""
-    rows = stretches(problem.lengths, frames, config.seed, epoch)
+    length = max(1, frames)
+    rows = stretches(problem.lengths, length, config.seed, epoch)
     if not len(rows):
-        raise InputError("training", f"no example has {frames + 1} frames", "longer examples, or a shorter rollout")
+        raise InputError("training", f"no example has {length + 1} frames", "longer examples, or a shorter rollout")
     key = jax.random.fold_in(jax.random.key(config.seed + 1), epoch)
     told = []
-    for number, batch in enumerate(batches(rows, max(1, config.batch // frames))):
-        state, parts = step(state, jnp.asarray(batch), jax.random.fold_in(key, number), jnp.float32(rate), frames=frames)
+    for number, batch in enumerate(batches(rows, max(1, config.batch // length))):
+        one = jax.random.fold_in(key, number)
+        state, parts = step(state, problem.data, jnp.asarray(batch), one, jnp.float32(rate), frames=frames)
         told.append(parts)
     told = jax.device_get(told)
     return state, {name: float(np.mean([parts[name] for parts in told])) for name in told[0]}

@@ -23,9 +23,9 @@ from beyond_mocap.synthesis.phase_network.network import forward
 
 from .arrays import ARRAYS
 from .config import TrainingConfig
-from .losses import effector_error, joint_error, sizes
-from .networks import first_weights, scales_of
-from .recordings import Recordings, inputs_and_outputs
+from .losses import effector_error, joint_error, missed_ends, sizes
+from .networks import first_weights, linear_start, scales_of
+from .recordings import Recordings, single_steps
 
 DROPPED = (SINGLE, "hip", "body")
 """Networks that are trained with dropout (§7.6)."""
@@ -51,14 +51,24 @@ class Networks:
         self.axes = hinge_axes(chains, limits).astype(np.float32)
         self.lengths = recorded.lengths
         self.fits = json.dumps({**config.flat(), "recordings": recorded.digest}, sort_keys=True)
-        self.scales = {}
+        self.scales, self._linear, alone = {}, {}, {}
         for name in self.settings.networks:
-            x, y = inputs_and_outputs(name, chains, self.settings, recorded)
+            x, y, phase = single_steps(name, chains, self.settings, recorded, leg_reach)
             (mean_x, scale_x), (mean_y, scale_y) = scales_of(x), scales_of(y)
             self.scales[name] = {
                 "input_mean": mean_x, "input_scale": scale_x, "output_mean": mean_y, "output_scale": scale_y,
             }
-        self._recorded = jax.tree.map(jnp.asarray, recorded._replace(lengths=()))
+            x = (x - mean_x) / scale_x
+            self._linear[name] = linear_start(x, (y - mean_y) / scale_y) if config.linear_start else None
+            alone[name] = (x, y, phase_function.weights(phase, self.settings.points).astype(np.float32))
+        firsts = np.concatenate([[0], np.cumsum(np.array(self.lengths[:-1], int) - 1)])
+        self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
+
+    def frames(self, share: float) -> int:
+        """Frames that are fed back when `share` of the training is done; 0: each network alone, one frame from the
+        truth."""
+        conditioned = self.settings.conditioned or self.settings.kind == SINGLE and self.config.rollout > 1
+        return self.config.rollout if conditioned and share >= self.config.single_frames else 0
 
     def first(self, key) -> dict:
         """First weights of all networks, by name."""
@@ -67,36 +77,60 @@ class Networks:
             name: first_weights(
                 jax.random.fold_in(key, number), len(self.scales[name]["input_mean"]),
                 len(self.scales[name]["output_mean"]), settings.layers, settings.units, settings.points,
+                self._linear[name],
             )
             for number, name in enumerate(settings.networks)
         }
 
-    def loss(self, params, rows, key, frames: int):
-        """eq. 7.5 summed over the networks, mean over stretches rows (B, 2) (example, first frame) and their frames."""
+    def loss(self, params, data, rows, key, frames: int):
+        """eq. 7.5 summed over the networks, mean over stretches rows (B, 2) (example, first frame) and their frames;
+        frames: of `frames`. data: `data`, handed in so that it is no constant of what is compiled."""
+        recorded, alone, firsts = data
+        if frames == 0:
+            parts = self._alone(params, alone, firsts[rows[:, 0]] + rows[:, 1], key)
+        else:
+            parts = self._fed_back(params, recorded, rows, key, frames)
+        parts["sizes"] = self.config.l1 * sizes(params)
+        return sum(parts.values()), parts
+
+    def _alone(self, params, alone, steps, key):
+        """Losses by name of single steps (B,), every network on the truth."""
+        parts = {}
+        for number, name in enumerate(self.settings.networks):
+            x, wanted, theta = (one[steps] for one in alone[name])
+            y = self._answer(params, name, x, theta, jax.random.fold_in(key, number))
+            parts[name] = joint_error(y, wanted, self.scales[name]["output_scale"])
+            if self._looks_at_ends(name):
+                error = missed_ends(name, self.chains, self.settings, y, wanted)
+                parts[f"{name} ends"] = self._weight(name) ** 2 * error
+        return parts
+
+    def _fed_back(self, params, recorded: Recordings, rows, key, frames: int):
+        """Losses by name of stretches in which every frame is predicted from the one predicted before."""
         example, start = rows[:, 0], rows[:, 1]
-        pose, _ = self._recorded.at(example, start)
+        pose, _ = recorded.at(example, start)
         pose = self._disturbed(pose, jax.random.fold_in(key, frames))
 
         def one_frame(pose, number):
-            _, window = self._recorded.at(example, start + number)
-            truth, _ = self._recorded.at(example, start + number + 1)
+            _, window = recorded.at(example, start + number)
+            truth, _ = recorded.at(example, start + number + 1)
             return self._frame(params, pose, truth, window, jax.random.fold_in(key, number))
 
         _, parts = jax.lax.scan(one_frame, pose, jnp.arange(frames))
-        parts = {name: jnp.mean(one) for name, one in parts.items()}
-        parts["sizes"] = self.config.l1 * sizes(params)
-        return sum(parts.values()), parts
+        return {name: jnp.mean(one) for name, one in parts.items()}
 
     def _frame(self, params, pose: Pose, truth: Pose, window: Windows, key):
         """One frame on: the state that is predicted, and the losses by name."""
         after, parts = pose, {}
-        conditioned = self.settings.conditioned or self.settings.kind == SINGLE
         for number, name in enumerate(self.settings.networks):
-            known = after if conditioned else truth
-            y, wanted = self._said(params, name, pose, known, truth, window, jax.random.fold_in(key, number))
-            scale = self.scales[name]["output_scale"]
-            parts[name] = joint_error(y, wanted, scale)
-            after = answered(name, self.chains, self.settings, y, pose, known, window, ARRAYS)
+            x = network_input(name, self.chains, self.settings, pose, after, window, ARRAYS)
+            phase = phase_of(name, self.chains, after, window, self.leg_reach, ARRAYS)
+            x = (x - self.scales[name]["input_mean"]) / self.scales[name]["input_scale"]
+            theta = phase_function.weights(phase, self.settings.points, jnp)
+            y = self._answer(params, name, x, theta, jax.random.fold_in(key, number))
+            wanted = network_output(name, self.chains, self.settings, pose, truth, ARRAYS)
+            parts[name] = joint_error(y, wanted, self.scales[name]["output_scale"])
+            after = answered(name, self.chains, self.settings, y, pose, after, window, ARRAYS)
             if self._looks_at_ends(name):
                 error = effector_error(name, self.chains, self.settings, y, wanted, after, window)
                 parts[f"{name} ends"] = self._weight(name) ** 2 * error
@@ -104,17 +138,11 @@ class Networks:
                 after = self._bent(LIMB_OF.index(name), after, window)
         return after._replace(moved=after.positions - pose.positions), parts
 
-    def _said(self, params, name, pose, after, truth, window, key):
-        """What a network answers (B, out), and what it should."""
-        scales, settings = self.scales[name], self.settings
-        x = network_input(name, self.chains, settings, pose, after, window, ARRAYS)
-        phase = phase_of(name, self.chains, after, window, self.leg_reach, ARRAYS)
-        theta = phase_function.weights(phase, settings.points, jnp)
-        normal = (x - scales["input_mean"]) / scales["input_scale"]
-        weights, biases = params[name]["weights"], params[name]["biases"]
-        y = forward(weights, biases, normal, theta, jnp, self._masks(name, weights, len(x), key))
-        wanted = network_output(name, self.chains, settings, pose, truth, ARRAYS)
-        return y * scales["output_scale"] + scales["output_mean"], wanted
+    def _answer(self, params, name, x, theta, key):
+        """What a network says, (B, out), of normalised inputs x (B, in)."""
+        weights, scales = params[name]["weights"], self.scales[name]
+        y = forward(weights, params[name]["biases"], x, theta, jnp, self._masks(name, weights, len(x), key))
+        return y * scales["output_scale"] + scales["output_mean"]
 
     def _bent(self, number: int, after: Pose, window: Windows) -> Pose:
         """The pose with a limb brought towards where its end is to be, as use does it."""

@@ -25,14 +25,22 @@ def effector_error(
 ):
     """The third term of eq. 7.5 without its lambda: mean square distance, m^2.
 
-    Of a limb that of its wrist or toe from where the description has it in frame n + 1; of hip, body and the single
-    network that of the ends that the answer leads to from those of the truth, in the chain's own frame.
+    Of a limb that of its wrist or toe in `after` from where the description has it in frame n + 1; else `missed_ends`.
     """
-    if name in LIMB_OF:
-        number = LIMB_OF.index(name)
-        missed = after.positions[..., chains.effectors[number], :] - window.next[..., number, :]
-    else:
-        missed = ends(name, chains, settings, y, ARRAYS) - ends(name, chains, settings, wanted, ARRAYS)
+    if name not in LIMB_OF:
+        return missed_ends(name, chains, settings, y, wanted)
+    number = LIMB_OF.index(name)
+    return _mean_square(after.positions[..., chains.effectors[number], :] - window.next[..., number, :])
+
+
+def missed_ends(name: str, chains: Chains, settings: ModelSettings, y, wanted):
+    """Mean square distance, m^2, of the ends that answers y (B, out) lead to from those of the truth, in the chain's own
+    reference frame."""
+    reached, told = (ends(name, chains, settings, one, ARRAYS) for one in (y, wanted))
+    return _mean_square(reached - told)
+
+
+def _mean_square(missed):
     return jnp.mean(jnp.sum(missed**2, axis=-1))
 
 

@@ -13,12 +13,9 @@ from beyond_mocap.synthesis.phase_network.answers import network_output
 from beyond_mocap.synthesis.phase_network.chains import Chains
 from beyond_mocap.synthesis.phase_network.description import Windows, windows
 from beyond_mocap.synthesis.phase_network.example import Example, describe, poses
-from beyond_mocap.synthesis.phase_network.features import network_input
+from beyond_mocap.synthesis.phase_network.features import network_input, phase_of
 from beyond_mocap.synthesis.phase_network.kinematics import Pose
 from beyond_mocap.synthesis.phase_network.model import ModelSettings
-
-MOST_FRAMES = 20_000
-"""Frames that means and deviations are taken from."""
 
 
 class Recordings(NamedTuple):
@@ -62,13 +59,14 @@ def _padded(parts: list, longest: int) -> list[np.ndarray]:
     return out
 
 
-def inputs_and_outputs(name: str, chains: Chains, settings: ModelSettings, recorded: Recordings, most: int = MOST_FRAMES):
-    """X (F, in) and Y (F, out) of a network over all frames that have one after them; at most `most`, evenly."""
-    rows = np.concatenate([
-        np.stack([np.full(length - 1, i), np.arange(length - 1)], axis=1) for i, length in enumerate(recorded.lengths)
-    ])
-    rows = rows[:: max(1, -(-len(rows) // most))]
-    pose, window = recorded.at(rows[:, 0], rows[:, 1])
-    after, _ = recorded.at(rows[:, 0], rows[:, 1] + 1)
+def single_steps(name: str, chains: Chains, settings: ModelSettings, recorded: Recordings, reach: dict):
+    """Inputs X (F, in), outputs Y (F, out) and phases (F,) of a network over all frames that have one after them, example
+    by example, float32. reach: of the legs, as `phase_of` takes it."""
+    example = np.concatenate([np.full(length - 1, i) for i, length in enumerate(recorded.lengths)])
+    frame = np.concatenate([np.arange(length - 1) for length in recorded.lengths])
+    pose, window = recorded.at(example, frame)
+    after, _ = recorded.at(example, frame + 1)
     x = network_input(name, chains, settings, pose, after, window)
-    return x, network_output(name, chains, settings, pose, after)
+    y = network_output(name, chains, settings, pose, after)
+    phase = phase_of(name, chains, after, window, reach)
+    return x.astype(np.float32), y.astype(np.float32), phase.astype(np.float32)
