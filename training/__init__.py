@@ -5,6 +5,10 @@ Not part of the extension: it needs jax and optax (`make training`). What it mak
 """
 
 import os
+import pathlib
 
 if (os.cpu_count() or 1) <= 4:  # threads that wait for each other cost more than they bring
     os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+# Compiling takes longer than a small training: what was compiled once is kept.
+_KEPT = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "beyond-mocap" / "compiled"
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT))
