@@ -36,7 +36,7 @@ class TrainingConfig:
     keeps to start from (§7.7.1). seed: of first weights, order, dropout and noise.
     """
 
-    settings: ModelSettings = field(default_factory=lambda: ModelSettings(conditioned=True))
+    settings: ModelSettings = field(default_factory=lambda: ModelSettings(units=96, conditioned=True))
     epochs: int = 400
     macro: int = 10
     batch: int = 512
