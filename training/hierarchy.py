@@ -58,9 +58,9 @@ class Networks:
             self.scales[name] = {
                 "input_mean": mean_x, "input_scale": scale_x, "output_mean": mean_y, "output_scale": scale_y,
             }
-            x = (x - mean_x) / scale_x
-            self._linear[name] = linear_start(x, (y - mean_y) / scale_y) if config.linear_start else None
-            alone[name] = (x, y, phase_function.weights(phase, self.settings.points).astype(np.float32))
+            x, theta = (x - mean_x) / scale_x, phase_function.weights(phase, self.settings.points).astype(np.float32)
+            self._linear[name] = linear_start(x, (y - mean_y) / scale_y, theta) if config.linear_start else None
+            alone[name] = (x, y, theta)
         firsts = np.concatenate([[0], np.cumsum(np.array(self.lengths[:-1], int) - 1)])
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
 

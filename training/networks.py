@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,44 +16,77 @@ SMALLEST_SCALE = 1e-3
 
 LIFT = 6.0
 """What is added to a value that is to pass an ELU unchanged: so many deviations below its mean hardly any comes."""
-RIDGE = 0.01
-"""Ridge of the linear start for each row of normalised inputs. A tenth of it follows the examples more closely and runs
-away when frames are fed back on another body."""
+RIDGE = {"plain": 0.01, "phased": 0.001}
+"""Ridge of the linear start for each row of normalised inputs, without and with phases. A tenth of either follows the
+examples more closely and runs away when frames are fed back on another body."""
+_ROWS = 2048
 
 
-def first_weights(key, inputs: int, outputs: int, layers: int, units: int, points: int, linear=None) -> dict:
-    """{"weights": [(K, out, in)], "biases": [(K, out)]}: uniform within sqrt(6 / (in + out)) (Glorot and Bengio 2010);
-    all control points begin alike, so that a network starts as its feed-forward twin, and the last layer a tenth as
-    large. linear (out, in) or None: a linear answer that the network starts from, on `outputs` of its units, lifted so
-    that ELUs let it pass, where they are at most half."""
+class Linear(NamedTuple):
+    """A linear answer at each control point: weights (K, out, in), biases (K, out)."""
+
+    weights: np.ndarray
+    biases: np.ndarray
+
+
+def first_weights(
+    key, inputs: int, outputs: int, layers: int, units: int, points: int, linear: Linear | None = None
+) -> dict:
+    """{"weights": [(K, out, in)], "biases": [(K, out)]}: uniform within sqrt(6 / (in + out)) (Glorot and Bengio 2010),
+    alike at all control points, and the last layer a tenth as large. linear: an answer that the network starts from, on
+    `outputs` of its units, lifted so that ELUs let it pass, where they are at most half; else all control points begin
+    alike, so that the network starts as its feed-forward twin."""
     widths = [inputs, *[units] * layers, outputs]
     weights, biases = [], []
     for layer, (width, out) in enumerate(zip(widths, widths[1:])):
         bound = np.sqrt(6.0 / (width + out)) * (0.1 if layer == layers else 1.0)
         one = jax.random.uniform(jax.random.fold_in(key, layer), (out, width), jnp.float32, -bound, bound)
-        bias = jnp.zeros(out, jnp.float32)
+        weight, bias = jnp.tile(one[None], (points, 1, 1)), jnp.zeros((points, out), jnp.float32)
         if linear is not None and 2 * outputs <= units:
-            one, bias = _passing(one, bias, jnp.asarray(linear), layer, layers)
-        weights.append(jnp.tile(one[None], (points, 1, 1)))
-        biases.append(jnp.tile(bias[None], (points, 1)))
+            weight, bias = _passing(weight, bias, linear, layer, layers)
+        weights.append(weight)
+        biases.append(bias)
     return {"weights": weights, "biases": biases}
 
 
-def _passing(weight, bias, linear, layer: int, last: int):
+def _passing(weight, bias, linear: Linear, layer: int, last: int):
     """A layer whose first units carry the linear answer."""
-    count = len(linear)
+    count = linear.weights.shape[1]
     if layer == 0:
-        return weight.at[:count].set(linear), bias.at[:count].set(LIFT)
-    weight = weight.at[:count].set(jnp.eye(count, weight.shape[1]))
+        return weight.at[:, :count].set(linear.weights), bias.at[:, :count].set(linear.biases + LIFT)
+    weight = weight.at[:, :count].set(jnp.eye(count, weight.shape[2]))
     if layer < last:
-        return weight.at[count:, :count].set(0.0), bias
-    return weight, bias.at[:count].set(-LIFT)
+        return weight.at[:, count:, :count].set(0.0), bias
+    return weight, bias.at[:, :count].set(-LIFT)
 
 
-def linear_start(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """The linear answer (out, in) to normalised inputs x (N, in) that comes nearest to y (N, out), by ridge regression."""
-    x, y = x.astype(float), y.astype(float)
-    return np.linalg.solve(x.T @ x + RIDGE * len(x) * np.eye(x.shape[1]), x.T @ y).T.astype(np.float32)
+def linear_start(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> Linear:
+    """The linear answer to normalised inputs x (N, in), whose weights glide with the phase, that comes nearest to y
+    (N, out), by ridge regression. theta: (N, K) control point weights.
+
+    With one control point that is y = W x + b. With several it is y = sum_k theta_k (W + D_k) x + b_k: what is common to
+    all phases and what is not are kept small alike, so that no control point strays where it has few frames.
+    """
+    points, width, total = theta.shape[1], x.shape[1], len(x)
+    count = (width + 1) * (1 if points == 1 else points + 1)
+    squares, products = np.zeros((count, count)), np.zeros((count, y.shape[1]))
+    for first in range(0, total, _ROWS):
+        rows = slice(first, first + _ROWS)
+        columns = _columns(x[rows].astype(float), theta[rows].astype(float))
+        squares += columns.T @ columns
+        products += columns.T @ y[rows].astype(float)
+    ridge = RIDGE["plain" if points == 1 else "phased"] * total
+    found = np.linalg.solve(squares + ridge * np.eye(count), products).reshape(-1, width + 1, y.shape[1])
+    every = found if points == 1 else found[:1] + found[1:]
+    return Linear(every[:, :-1].swapaxes(1, 2).astype(np.float32), every[:, -1].astype(np.float32))
+
+
+def _columns(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """(x, 1), and with several control points also theta_k (x, 1) of each."""
+    x = np.concatenate([x, np.ones((len(x), 1))], axis=1)
+    if theta.shape[1] == 1:
+        return x
+    return np.concatenate([x, (theta[:, :, None] * x[:, None]).reshape(len(x), -1)], axis=1)
 
 
 def scales_of(values: np.ndarray, smallest: float = SMALLEST_SCALE) -> tuple[np.ndarray, np.ndarray]:
