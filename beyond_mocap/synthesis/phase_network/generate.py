@@ -18,6 +18,7 @@ from .start import start_pose
 
 _STILL, _MOVING = 0.15, 0.6  # m/s: a toe that is to be slower stands, a faster one does not
 _LOW = 0.03  # metres above its lowest place up to which a toe may stand
+_FARTHEST = 1e4  # metres from where it began at which a body is lost
 _PATIENCE = 8  # iterations of the start pose that may pass without a millimetre's gain
 
 
@@ -86,8 +87,8 @@ def generate(
     """The motion (T frames, as the description has) of the model's skeleton that follows the description.
 
     start: the state in the first frame, in the normalised frame; without it one of the examples' poses is taken and
-    predicted until it fits. InputError where the description's rate is not the model's, or hands are not given that the
-    model has to be given.
+    predicted until it fits. InputError where the description's rate is not the model's, hands are not given that the
+    model has to be given, or its networks lose the body.
     """
     options = options or Options()
     _check(model, description)
@@ -96,8 +97,10 @@ def generate(
     loop = _Loop(stepper(model), description, options)
     first, iterations = loop.start(start, seen[0])
     steps = [first]
-    for frame in range(len(description) - 1):
-        steps.append(loop.step(steps[-1].state, seen[frame + 1], frame, frame + 1))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        for frame in range(len(description) - 1):
+            steps.append(loop.step(steps[-1].state, seen[frame + 1], frame, frame + 1))
+    _check_numbers(steps)
     return _generated(model, description, steps, iterations, time.perf_counter() - began)
 
 
@@ -173,6 +176,14 @@ def _check(model: ThrowModel, description: Description) -> None:
         raise InputError("description", found, f"the model's {model.settings.fps:g}", "sample it at that rate")
     if description.hands is None and model.settings.kind == "hierarchy" and model.settings.wrist == "given":
         raise InputError("description", "no rotations of the hands", "them, as the model was trained with them")
+
+
+def _check_numbers(steps: list[Step]) -> None:
+    """InputError where networks answered what is no number, as they may where all is far from what they know."""
+    for frame, step in enumerate(steps):
+        if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _FARTHEST):
+            raise InputError("model", f"networks that lose the body in frame {frame}", "a body near its description",
+                             "ask for what its examples are like, or train it longer")  # fmt: skip
 
 
 def _generated(model, description: Description, steps: list[Step], iterations: int, seconds: float) -> Generated:

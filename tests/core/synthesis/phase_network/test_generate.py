@@ -160,6 +160,14 @@ def test_limits_hold_where_networks_go_astray(example, model):
     assert made.over.max() > 0.1 and limits.beyond(matrices(made.motion)).max() < 1e-6
 
 
+@pytest.mark.parametrize("answer", [np.nan, 1e30])
+def test_networks_that_lose_the_body_are_told_in_a_line(example, model, answer):
+    lost = {name: by_heart(rows) for name, rows in training_set([example], model.settings).items()}
+    object.__setattr__(lost["hip"], "said", np.full_like(lost["hip"].said, answer))
+    with pytest.raises(InputError, match="lose the body in frame 1"):
+        generate(replace(model, networks=lost), describe(example), options=PLAIN)
+
+
 def test_what_does_not_fit_the_model_is_told(example, model):
     told = describe(example)
     with pytest.raises(InputError, match="60 frames per second"):
