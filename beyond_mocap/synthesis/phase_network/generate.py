@@ -36,7 +36,7 @@ class Options:
     pose_iterations: int = 75
     tolerance: float = 0.01
     ik: bool = True
-    share: float = 0.5
+    share: float = 0.8
     blend: bool = True
     limits: bool = True
 
