@@ -23,8 +23,10 @@ from .files.content import content
 from .files.tables import number, read_rows
 from .library.scan import Annotations, find_clips
 from .motion import quaternion
-from .motion.humanoid import Humanoid, identify, stature
-from .motion.motion import Motion, end_positions, forward_kinematics, place
+from .motion.between_frames import cubic_at
+from .motion.grip import grip_of
+from .motion.humanoid import Humanoid, identify
+from .motion.motion import Motion, end_positions, forward_kinematics, place, pose_kinematics
 from .motion.retarget import Retargeter
 from .motion.skeleton import Skeleton
 from .synthesis.phase_network.chains import EFFECTORS as LIMBS
@@ -36,9 +38,8 @@ LAUNCH = ("launch_x_m_s", "launch_y_m_s", "launch_z_m_s")
 _SAME_MOMENT = 0.5  # s between key moments that are of one throw
 _AT_REST = 3.0  # m/s, slower balls have not been thrown
 _OF_FOOT = 1.2  # a ball's speed over the foot's: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165 (1.06 to 1.3)
-_IN_HAND = 0.055  # of the stature, from the wrist to the ball's centre: half-way along the hand
 _SHIFTED_FLOOR = 0.03  # m, heights of the lowest point up to which the floor is taken to be at 0
-_LOOK = 0.012  # s before and after the release between which the ball's speed is read
+_LOOK = 0.001  # s before and after the release between which the ball's speed is read, off the joints' splines
 _AROUND = 0.8  # s beyond an example's ends that are read too, for what networks see there
 _ON_GROUND = 0.4  # m, a toe below this kicks a ball that lies
 _LATE = 0.03  # s by which a foot's key moment may lead or follow the contact
@@ -317,57 +318,46 @@ def _joint(body: Humanoid, limb: int) -> int:
     return joint
 
 
-def _places(motion: Motion, limb: int) -> np.ndarray:
-    """Where the ball would be (T, 3) m: in the hand, or at the toe."""
-    places, turns = forward_kinematics(motion)
+def _places(motion: Motion, seconds: np.ndarray, limb: int) -> np.ndarray:
+    """Where the ball would be (N, 3) m at `seconds` (N,): in the hand, or at the toe."""
+    root, local = cubic_at(motion, np.asarray(seconds) * motion.fps)
+    places, turns = pose_kinematics(motion.skeleton, root, local)
     joint = _joint(identify(motion.skeleton), limb)
     if limb >= 2:
         return places[:, joint]
-    skeleton = motion.skeleton
-    ends = [o for p, o in zip(skeleton.end_parents, skeleton.end_offsets) if p == joint]
-    finger = ends[0] if ends else skeleton.offsets[joint]
-    length = np.linalg.norm(finger)
-    along = finger / length if length > 1e-6 else np.array([0.0, 0.0, -1.0])
-    return places[:, joint] + quaternion.rotate(turns[:, joint], along * _IN_HAND * stature(skeleton))
-
-
-def _at(values: np.ndarray, frame: float) -> np.ndarray:
-    low = int(np.clip(np.floor(frame), 0, len(values) - 2))
-    share = np.clip(frame - low, 0.0, 1.0)
-    return (1.0 - share) * values[low] + share * values[low + 1]
+    grip = grip_of(motion.skeleton, ("left", "right")[limb], BASEBALL.radius)
+    return places[:, joint] + quaternion.rotate(turns[:, joint], grip)
 
 
 def _ball(motion: Motion, seconds: float, limb: int) -> np.ndarray:
-    return _at(_places(motion, limb), seconds * motion.fps)
+    return _places(motion, np.array([seconds]), limb)[0]
 
 
-def _speed(ways: np.ndarray, fps: float, seconds: float) -> np.ndarray:
-    """Velocity (3,) m/s of a way (T, 3) m at a second."""
-    half = max(_LOOK, 0.5 / fps)
-    return (_at(ways, (seconds + half) * fps) - _at(ways, (seconds - half) * fps)) / (2.0 * half)
+def _velocity(motion: Motion, seconds: float, limb: int) -> np.ndarray:
+    """Of the ball (3,) m/s as the joints' rotations carry it."""
+    before, after = _places(motion, seconds + np.array([-_LOOK, _LOOK]), limb)
+    return (after - before) / (2.0 * _LOOK)
 
 
 def _fastest(motion: Motion, release: float, action: Action) -> int:
     """The hand or foot that moves faster at the release."""
-    speeds = [np.linalg.norm(_speed(_places(motion, limb), motion.fps, release)) for limb in action.limbs]
+    speeds = [np.linalg.norm(_velocity(motion, release, limb)) for limb in action.limbs]
     return action.limbs[int(np.argmax(speeds))]
 
 
 def _contact(motion: Motion, known: _Known, action: Action) -> float:
     """The second near the key moment at which the foot is fastest: derived key moments lead or follow the contact."""
     limb = _fastest(motion, known.release, action) if known.limb is None else known.limb
-    way = _places(motion, limb)
     seconds = known.release + np.linspace(-_LATE, _LATE, 13)
-    return float(seconds[int(np.argmax([np.linalg.norm(_speed(way, motion.fps, at)) for at in seconds]))])
+    return float(seconds[int(np.argmax([np.linalg.norm(_velocity(motion, at, limb)) for at in seconds]))])
 
 
 def _launched(motion: Motion, release: float, limb: int, known: _Known) -> tuple[np.ndarray, np.ndarray]:
     """The ball's place (3,) m and velocity (3,) m/s as it leaves."""
-    way = _places(motion, limb)
-    position = _at(way, release * motion.fps)
+    position = _ball(motion, release, limb)
     if known.launch is not None:
         return position, known.launch
-    velocity = _speed(way, motion.fps, release)
+    velocity = _velocity(motion, release, limb)
     if limb >= 2:
         velocity = _OF_FOOT * velocity * [1.0, 1.0, float(velocity[2] > 0.0)]
         if position[2] < _ON_GROUND:

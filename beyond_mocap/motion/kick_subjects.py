@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .adult import STATURE, adult_skeleton
 from .kicks import KickStyle
 from .skeleton import Skeleton
 from .throw_subjects import body_of, by_factors, scattered
@@ -44,7 +45,10 @@ class Kicker:
 
 
 def kicker(seed: int) -> Kicker:
-    """Somebody of 1.6 to 2.0 m; the same seed gives the same person."""
+    """Somebody of 1.6 to 2.0 m; the same seed gives the same person. Seed 0 is the project's own adult, in the manner of
+    the tables."""
+    if seed == 0:
+        return Kicker("adult", STATURE, adult_skeleton(), "right", 28.0, KickManner())
     chance = np.random.default_rng([seed, 1863])
     stature = float(chance.uniform(1.60, 2.00))
     manner = KickManner(

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from .adult import adult_skeleton
+from .adult import STATURE, adult_skeleton
 from .skeleton import Skeleton
 from .throws import STYLES, Throw, ThrowStyle, throw
 
@@ -48,7 +48,10 @@ class Subject:
 
 
 def subject(seed: int) -> Subject:
-    """Somebody of 1.6 to 2.0 m; the same seed gives the same person."""
+    """Somebody of 1.6 to 2.0 m; the same seed gives the same person. Seed 0 is the project's own adult, in the manner of
+    the tables."""
+    if seed == 0:
+        return Subject("adult", STATURE, adult_skeleton(), "right", 34.0, Manner())
     chance = np.random.default_rng([seed, 1907])
     stature = float(chance.uniform(1.60, 2.00))
     manner = Manner(
