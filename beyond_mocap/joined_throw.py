@@ -7,6 +7,9 @@ Around its release the throw stays bit for bit what was generated, since the bal
 first and last parts go over into what surrounds it. It begins on a frame of the motion it is laid
 into, so the release comes up to half a frame sooner or later than asked.
 
+`around` does the first of these for a motion that is there already: the synthesizer has a few seconds of it before and
+behind the throw, and the rest stays as it is.
+
 With a library the throw becomes a clip of it, in memory, whose key moment is the release. The player's track is led
 through the place where the throw is, for the target is aimed at from there, and the synthesizer finds the way in and
 out. Without one the throw is eased into the motion that is there, which goes on from where the throw ends.
@@ -26,7 +29,7 @@ from .evaluation.jerk import jerk, uncut_windows, windowed
 from .library.features import joined as joined_frames
 from .library.library import Clip, Library, described
 from .motion import contacts, quaternion
-from .motion.humanoid import heading, heading_from_positions, identify
+from .motion.humanoid import heading, heading_from_positions, identify, stature
 from .motion.motion import (
     Motion, at_frames, forward_kinematics, place, pose_kinematics, resample, world_rotation,
 )
@@ -66,6 +69,10 @@ _LEADS = (1.0, 4.0)  # s that leading the track to the throw and back takes, at 
 _SMOOTH = 0.7  # s of the window that takes the sway out of the throw's own path
 _TURNED_TELLS, _MOVED_TELLS = np.radians(60.0), 0.05
 _PERCENT = 99.0
+_ENDS = 0.5  # s at either end of a stretch that faces as the motion around it
+REACH = 4.5
+"""Seconds before and behind a throw in which a body may leave its own way."""
+
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +169,14 @@ def run_up_and_recovery(
     action: str = "throw",
     progress: Callable[[float, str], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
+    between: Motion | None = None,
 ) -> RunUp:
     """The player's motion with the throw as one of the library's clips, released at about `at` s on the track's clock.
 
     throw: where it has to be on the pitch, on any humanoid skeleton. The plan's track is led through it. Key moments of
-    the plan within the throw are left out, and told. The exact throw is then put in by `laid_into`. InputError for a
-    throw that lies outside the track.
+    the plan within the throw are left out, and told. The exact throw is then put in by `laid_into`. between: the motion
+    that it comes from and goes back to, frame for frame: it faces as that does at either end. InputError for a throw
+    that lies outside the track.
     """
     from threadpoolctl import threadpool_limits
 
@@ -188,7 +197,7 @@ def run_up_and_recovery(
     report = progress or (lambda done, text: None)
     more = with_clip(with_made_gaits(library, plain, report), own, release, action)
     with threadpool_limits(limits=1):
-        found = _Way(more, plain, own, at - release, report, cancelled).gone()
+        found = _Way(more, plain, own, at - release, report, cancelled, between).gone()
     motion = Motion(bones, found.root * size, found.rotations, plan.fps)
     if not same:
         motion = Retargeter(motion, throw.skeleton, example=throw, keeps_travel=True).carry(motion)
@@ -198,8 +207,8 @@ def run_up_and_recovery(
 class _Way:
     """A player on his way through a throw, which is the last clip of the library and begins at second `begin`."""
 
-    def __init__(self, library: Library, plan: Plan, throw: Motion, begin: float, report, cancelled):
-        self.library, self.plan, self.throw, self.begin = library, plan, throw, begin
+    def __init__(self, library: Library, plan: Plan, throw: Motion, begin: float, report, cancelled, between):
+        self.library, self.plan, self.throw, self.begin, self.between = library, plan, throw, begin, between
         self.report, self.cancelled = report, cancelled
 
     def gone(self) -> _Gone:
@@ -232,8 +241,59 @@ class _Way:
         is_throw = shown.clip == len(self.library.clips) - 1
         seconds = track.times[is_throw] - self.begin
         kept[is_throw] = np.interp(seconds, np.arange(len(self.throw)) / self.throw.fps, heading(self.throw))
+        if self.between is not None:
+            faces, count = heading(self.between), int(_ENDS * self.plan.fps)
+            for end in (slice(None, count), slice(-count, None)):
+                kept[end] = np.where(np.isnan(kept[end]), faces[end], kept[end])
         firm = firmness(shown.standing, shown.height, self.plan.fps)
         return facing(track.direction, track.speed, shown.velocity, shown.turn, kept, firm, aimed(track))
+
+
+def around(
+    library: Library, own: Motion, start: float, throw: Motion, release: float, at: float, action: str = "throw",
+    progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
+) -> RunUp:
+    """`own`, whose first frame is at `start` s, with a run-up to the throw and a recovery out of `library`.
+
+    Both are on one skeleton. The body leaves its own way some seconds before the throw and is back on it some seconds
+    behind, where both show poses most alike; elsewhere it is as it was, bit for bit. `laid_into` then puts in the throw.
+    """
+    fps = own.fps
+    first = int(round((at - release - start) * fps))
+    own, start, first, end = _long_enough(own, start, first - 1, first + len(resample(throw, fps)) + 1)
+    low, high = max(first - int(REACH * fps), 0), min(end + int(REACH * fps), len(own))
+    part = own.frames(low, high)
+    times = start + np.arange(low, high) / fps
+    path = zero_phase_hann(part.root_positions[:, :2], fps, _SMOOTH)
+    plan = Plan(
+        track=Track(times, path, None), library=library.folder, fps=fps, height=stature(own.skeleton),
+    )  # fmt: skip
+    way = run_up_and_recovery(library, plan, throw, release, at, action, progress, cancelled, part)
+    count = min(len(way.motion), len(part))
+    apart = np.linalg.norm(
+        forward_kinematics(way.motion)[0][:count] - forward_kinematics(part)[0][:count], axis=-1
+    ).mean(axis=1)  # fmt: skip
+    fade = int(FADE * fps)
+    leaves = _likest(apart, 0, first - low - fade, fade) if low else 0
+    comes = _likest(apart, end - low + fade, count, fade) if high < len(own) else count
+    at_frame = np.arange(len(own)) - low
+    before = (leaves + fade - at_frame) / (fade + 1.0) if low else np.zeros(len(own))
+    behind = (at_frame - comes + 1) / (fade + 1.0) if high < len(own) else np.zeros(len(own))
+    share = eased(np.maximum(before, behind), np.ones(len(own)))
+    new = own.root_positions.copy(), own.rotations.copy()
+    new[0][low : low + count], new[1][low : low + count] = way.motion.root_positions[:count], way.motion.rotations[:count]
+    root, rotations = _between(own.skeleton, new, (own.root_positions, own.rotations), share)
+    seams = [low + leaves, *(way.seams + low), low + comes]
+    return RunUp(Motion(own.skeleton, root, rotations, fps), start, np.array(seams), way.warnings)
+
+
+def _likest(apart: np.ndarray, low: int, high: int, fade: int) -> int:
+    """The frame of low .. high from which on two motions, `apart` (T,) m, are most alike for `fade` frames."""
+    low, high = max(low, 0), min(high, len(apart)) - fade
+    if high <= low:
+        return max(min(low, len(apart) - fade), 0)
+    means = np.convolve(apart, np.ones(fade) / fade, mode="valid")
+    return low + int(np.argmin(means[low : high + 1]))
 
 
 def with_clip(library: Library, motion: Motion, release: float, action: str = "throw") -> Library:

@@ -9,6 +9,7 @@ import pytest
 from beyond_mocap import joined_throw
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.errors import InputError
+from beyond_mocap.evaluation.jerk import jerk, windowed
 from beyond_mocap.library.library import build
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading
@@ -154,3 +155,19 @@ def test_what_cannot_be_joined(library, made):
     motion, release, plan = on_library(library, 0.0)
     with pytest.raises(InputError, match="within the track"):
         joined_throw.run_up_and_recovery(library, plan, motion, release, 1.0)
+
+
+def test_out_of_a_walk_and_back_by_the_library(library, made):
+    walk = gait(1.4, 14.0, FPS)
+    begin = joined_throw.begins_at(made.motion, made.release, walk.root_positions[210, :2])
+    motion = place(made.motion, 0.0, (*(begin - made.motion.root_positions[0, :2]), 0.0))
+    way = joined_throw.around(library, walk, 0.0, motion, made.release, 7.0)
+    joined = joined_throw.laid_into(way.motion, way.start, motion, made.release, 7.0)
+    assert same_where_kept(joined, motion) and len(joined.motion) == len(walk)
+    for part in (slice(0, 10), slice(-10, None)):
+        assert np.array_equal(joined.motion.rotations[part], walk.rotations[part])
+        assert np.array_equal(joined.motion.root_positions[part], walk.root_positions[part])
+    usual = joined_throw.usual_jerk(library, FPS)
+    hits = windowed(jerk(forward_kinematics(joined.motion)[0], FPS))
+    assert max(hits[int(seam) - 2] for seam in way.seams) <= usual
+    assert np.all(joined_throw.seam_jerk(joined) <= usual)
