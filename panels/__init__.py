@@ -6,8 +6,8 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, ball, library, markers, menus, path, players, preferences, presets, quality, result, rig, synthesis, timeline,
-    video, view,
+    annotate, ball, library, markers, menus, path, players, preferences, presets, quality, result, rig, synthesis, throws,
+    timeline, video, view,
 )
 
 CLASSES = (
@@ -28,6 +28,7 @@ CLASSES = (
     ball.BEYOND_MOCAP_UL_passes,
     ball.BEYOND_MOCAP_UL_touches,
     ball.BEYOND_MOCAP_PT_ball,
+    throws.BEYOND_MOCAP_PT_throws,
     markers.BEYOND_MOCAP_UL_markers,
     markers.BEYOND_MOCAP_PT_markers,
     view.BEYOND_MOCAP_PT_view,

@@ -26,6 +26,7 @@
 - `ride`        path editing: armatures whose motion rides a curve
 - `passes`      the ball and who keeps it going: hit analysis, passing scenes, who carries the ball, the solved ball
 - `aimed`       a ball aimed at a target that can be dragged; rigid bodies take it over
+- `throws`      throws and kicks at a target, made by a network
 - `stream`      a body that arrives over this machine's own network while it moves
 - `markers`     a recording of optical markers as a cloud that plays, and the way from it to a body
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
@@ -54,6 +55,7 @@ from .ride.settings import BeyondMocapRide
 from .stream import follow as stream_follow
 from .stream import play, receiver
 from .stream import settings as stream
+from .throws import settings as throws
 
 CLASSES = (
     *result.CLASSES,
@@ -61,6 +63,7 @@ CLASSES = (
     *passes.CLASSES,
     *stream.CLASSES,
     aimed.BeyondMocapAim,
+    throws.BeyondMocapThrow,
     *markers.CLASSES,
     video.BeyondMocapVideo,
     view_settings.BeyondMocapView,
@@ -88,6 +91,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_hits", passes.BeyondMocapHits),
     ("Object", "beyond_mocap_ball", passes.BeyondMocapBall),
     ("Object", "beyond_mocap_aim", aimed.BeyondMocapAim),
+    ("Object", "beyond_mocap_throw", throws.BeyondMocapThrow),
     ("Object", "beyond_mocap_cloud", markers.BeyondMocapCloud),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
     ("Scene", "beyond_mocap_markers", markers.BeyondMocapMarkers),

@@ -312,18 +312,25 @@ def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarra
 
 
 def draw_curve(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
-    """The trajectory as a curve of its own, up to where the ball rests; seen in the view, not in a picture."""
-    aim, units = ball.beyond_mocap_aim, units_per_metre(scene)
-    end = solved.flight.rests_from if solved.flight.rests_from is not None else solved.flight.end
-    times = np.unique(np.concatenate([np.arange(0.0, end, CURVE_STEP), solved.flight.bounces, [end]]))
+    """The trajectory as a curve of its own, up to where the ball rests."""
+    aim = ball.beyond_mocap_aim
+    aim.curve = trajectory(scene, aim.curve, ball, solved.flight)
+
+
+def trajectory(
+    scene: bpy.types.Scene, path: bpy.types.Object | None, ball: bpy.types.Object, flight: "Flight"
+) -> bpy.types.Object:
+    """A curve along a flight, up to where the ball rests; `path`, or a new one; seen in the view, not in a picture."""
+    units = units_per_metre(scene)
+    end = flight.rests_from if flight.rests_from is not None else flight.end
+    times = np.unique(np.concatenate([np.arange(0.0, end, CURVE_STEP), flight.bounces, [end]]))
     points = np.ones((len(times), 4), np.float32)
-    points[:, :3] = solved.flight.at(times) * units
-    path = aim.curve
+    points[:, :3] = flight.at(times) * units
     if path is None or path.name not in scene.objects or path.type != "CURVE":
         data = bpy.data.curves.new(f"{ball.name} trajectory", "CURVE")
         data.dimensions = "3D"
         data.materials.append(colour("Trajectory", (0.9, 0.9, 0.9), 0.9))
-        path = aim.curve = bpy.data.objects.new(data.name, data)
+        path = bpy.data.objects.new(data.name, data)
         path[MARK] = True
         path.hide_select = path.hide_render = True
         (ball.users_collection or (scene.collection,))[0].objects.link(path)
@@ -335,6 +342,7 @@ def draw_curve(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -
         line.points.add(len(points) - 1)
     line.points.foreach_set("co", points.ravel())
     path.data.update_tag()
+    return path
 
 
 def lines(solved: Solved) -> list[str]:

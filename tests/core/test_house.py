@@ -52,7 +52,7 @@ EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
     "panels": ["panels", "scene.settings", "scene.preferences", "scene.ride.settings", "scene.ride.figure_lines",
-               "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings",
+               "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings", "scene.throws.settings",
                "scene.markers.settings"],
 }
 

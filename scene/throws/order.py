@@ -1,0 +1,258 @@
+"""What is asked of an armature, as plain values; and the throw that comes of it, worked out in any thread.
+
+Seconds are scene frames over the scene's rate, so the throw's frames are the scene's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import InputError
+from .. import action, armature, channels, linked, preferences, session
+from ..measure import frames_per_second, units_per_metre
+from ..passes import possession
+from ..ride.rigs import is_plain
+from ..settings import absolute
+from .settings import LIMBS, USUAL
+
+FOLLOWED = 3.0
+"""Seconds that the ball is followed behind the target, bouncing and rolling."""
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.ball.flight import Flight
+    from ...beyond_mocap.joined_throw import Joined
+    from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.motion.motion import Motion
+    from ...beyond_mocap.motion.skeleton import Skeleton
+    from ...beyond_mocap.throw import Thrown
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """One throw or kick.
+
+    body: the armature's name. act: "throw" or "kick". skeleton: the armature's. own: what it plays, in the scene's
+    metres, None where it only stands; first: the scene frame with which that begins. place (2,) m and facing rad: where
+    an armature without a motion stands. target (3,) m. at: s of the release. speed: m/s, 0 as usual. ball_place: (3,) m
+    where a ball that is kicked lies, None where it suits. model: a file, "" for what comes with the extension. folder:
+    the library's, "" for none; build: how it is built.
+    """
+
+    body: str
+    act: str
+    limb: str
+    skeleton: "Skeleton"
+    fps: float
+    own: "Motion | None"
+    first: int
+    place: np.ndarray
+    facing: float
+    target: np.ndarray
+    at: float
+    speed: float
+    kind: str
+    ball_place: np.ndarray | None
+    model: str
+    seed: int
+    folder: str
+    unit: float | None
+    library: "Library | None"
+    build: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of an order: the throw, the whole motion that shows it, the ball's way from the release on (seconds 0),
+    and m/s^3 of the seams and what is usual there."""
+
+    order: Order
+    thrown: "Thrown"
+    joined: "Joined"
+    flight: "Flight"
+    library: "Library | None"
+    jerk: float
+    usual_jerk: float
+
+
+def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> Order:
+    """What an armature's settings ask for; InputError where that makes no sense, or where it cannot be animated."""
+    wish, common = body.beyond_mocap_throw, scene.beyond_mocap
+    check(scene, body)
+    skeleton, fps = armature.skeleton_of(body, scene), frames_per_second(scene)
+    own, first = _own(scene, body)
+    place, facing = _stands(scene, body, skeleton)
+    limb = f"{wish.side}_{LIMBS[act]}"
+    model = wish.throw_model if act == "throw" else wish.kick_model
+    folder = absolute(common.library_folder) if wish.library and common.library_folder else ""
+    unit = common.library_unit or None
+    return Order(
+        body=body.name, act=act, limb=limb, skeleton=skeleton, fps=fps, own=own, first=first, place=place,
+        facing=facing, target=_target(scene, wish), at=(wish.frame or scene.frame_current) / fps, speed=wish.speed,
+        kind=USUAL[act] if wish.kind == "usual" else wish.kind, ball_place=_lies(scene, wish) if act == "kick" else None,
+        model=absolute(model) if model else "", seed=wish.seed, folder=folder, unit=unit,
+        library=session.library(folder, unit) if folder else None, build=preferences.for_build(folder) if folder else {},
+    )
+
+
+def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
+    """InputError where an armature or its ball cannot be animated here."""
+    wish = body.beyond_mocap_throw
+    linked.refuse(body, wish.ball)
+    channels.check_free(body)
+    override = body.override_library
+    if override is not None and override.is_system_override:
+        raise InputError(f"armature {body.name}", "an override that cannot be edited", "an editable override",
+                         "make it editable: Outliner, Library Override, Make")
+    if body.beyond_mocap_ride.on:
+        raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not",
+                         "press Keep or Leave first")
+    if body.mode == "EDIT":
+        raise InputError(f"armature {body.name}", "its bones are being edited", "object or pose mode",
+                         "leave edit mode (Tab)")
+    ball = wish.ball
+    if ball is None:
+        return
+    channels.check_free(ball)
+    possession.check_unaimed(ball)
+    ours = ball == wish.flown
+    if ball.parent is not None or not ours and (len(ball.beyond_mocap_ball.holds) or len(ball.constraints)):
+        found = "it has a parent, a constraint or is carried"
+        raise InputError(f"ball {ball.name}", found, "a ball of its own", "free the ball first")
+
+
+def work(order: Order, progress, cancelled, _hurry) -> Result:
+    """The throw, and the motion it is part of. Never touches bpy."""
+    from ...beyond_mocap import joined_throw
+    from ...beyond_mocap.ball.flight import Launch, fly
+    from ...beyond_mocap.library.library import build
+
+    library = order.library
+    if order.folder and library is None:
+        library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    own = order.own
+    stands = own is None
+    if stands:
+        own = joined_throw.standing(order.skeleton, 0.0, order.fps, order.place, order.facing)
+    start = order.first / order.fps
+    thrown = _thrown(order, own, start, library is not None, progress)
+    motion, release = thrown.motion, thrown.release
+    told = ()
+    if library is not None:
+        way = joined_throw.around(
+            library, own, start, motion, release, order.at, order.act, _share(progress, 0.3, 1.0), cancelled
+        )
+        own, start, told = way.motion, way.start, way.warnings
+    joined = joined_throw.laid_into(own, start, motion, release, order.at, goes_on=library is None)
+    usual = joined_throw.usual_jerk(library, order.fps) if library is not None else float("nan")
+    joined = replace(joined, warnings=(*told, *joined.warnings))
+    launch = Launch(0.0, np.asarray(thrown.position), np.asarray(thrown.velocity), np.asarray(thrown.spin))
+    flight = fly(launch, thrown.kind, thrown.seconds + FOLLOWED)
+    return Result(order, thrown, joined, flight, library, float(joined_throw.seam_jerk(joined).max()), usual)
+
+
+def _thrown(order: Order, own: "Motion", start: float, comes_back: bool, progress) -> "Thrown":
+    """The throw where it has to be: begun where an armature that only stands is; where its own motion leads when it is
+    eased out of that; or, with run-up, so that it is at the release where its own motion has it then."""
+    from ...beyond_mocap import joined_throw
+
+    def spot(seconds: float) -> np.ndarray:
+        return own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2]
+
+    model = _model(order)
+    thrown = _thrown_from(order, model, spot(order.at), _share(progress, 0.0, 0.15))
+    if order.own is None or order.ball_place is not None:
+        return thrown
+    begin = spot(order.at - thrown.release)
+    if comes_back:
+        begin = joined_throw.begins_at(thrown.motion, thrown.release, spot(order.at))
+    return _thrown_from(order, model, begin, _share(progress, 0.15, 0.3))
+
+
+def _model(order: Order):
+    """The trained model that is asked for."""
+    from ...beyond_mocap.files.network_npz import read_model
+    from ...beyond_mocap.throw import shipped_model
+
+    return read_model(order.model) if order.model else shipped_model(order.act)
+
+
+def _thrown_from(order: Order, model, place: np.ndarray, progress) -> "Thrown":
+    """The throw whose first frame is at `place` (2,) m."""
+    from ...beyond_mocap import throw
+
+    progress(0.0, "Generating")
+    asked = throw.Order(
+        target=tuple(order.target), limb=order.limb, speed=order.speed or None, place=tuple(place), ball=order.kind,
+        ball_place=None if order.ball_place is None else tuple(order.ball_place), seed=order.seed,
+    )  # fmt: skip
+    return throw.throw_at(model, asked, skeleton=order.skeleton, fps=order.fps)
+
+
+def _share(progress, low: float, high: float):
+    """A progress that fills a part of the bar."""
+    return lambda done, text: progress(low + (high - low) * done, text)
+
+
+def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
+    """What an armature plays without its throw, and the scene frame of its first pose; (None, first frame) where it
+    plays nothing."""
+    before = body.beyond_mocap_throw.before
+    if before.kept:
+        found = before.action
+        slot = next((one for one in found.slots if one.identifier == before.slot), None) if found else None
+    else:
+        found, slot = channels.playing(body)
+        if found is not None and not is_plain(body):
+            raise InputError(
+                f"armature {body.name}", "constraints, drivers or several layers pose it",
+                "an armature whose bones are keyed themselves",
+                "throw with the source armature, then press Bake to Rig",
+            )
+    curves = channels.curves(found, slot) if slot is not None else {}
+    ends = channels.keyed_range({key: curve for key, curve in curves.items() if key[0].startswith("pose.bones")})
+    if ends is None:
+        return None, scene.frame_start
+    motion = action.read(body, scene, found, slot)
+    if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
+        raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
+    return motion, ends[0]
+
+
+def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton") -> tuple[np.ndarray, float]:
+    """Where an armature without a motion stands, (2,) m, and which way it faces, rad."""
+    from ...beyond_mocap.motion import quaternion
+    from ...beyond_mocap.motion.humanoid import heading_from_positions
+    from ...beyond_mocap.motion.motion import pose_kinematics
+
+    lie = armature.placement(body, scene)
+    local = quaternion.identity(len(skeleton))
+    local[0] = lie.rotation
+    places, _ = pose_kinematics(skeleton, np.zeros(3), local)
+    root = lie.to_world(np.array([body.data.bones[skeleton.names[0]].head_local]))[0]
+    return np.asarray(root[:2]), float(heading_from_positions(skeleton, places))
+
+
+def _target(scene: bpy.types.Scene, wish) -> np.ndarray:
+    """(3,) m."""
+    metres = 1.0 / units_per_metre(scene)
+    if wish.target is None:
+        return np.array(scene.cursor.location) * metres
+    if wish.target.name not in scene.objects:
+        raise InputError("target", f"{wish.target.name} is not in this scene", "an object of this scene", "pick another")
+    return np.array(wish.target.matrix_world.translation) * metres
+
+
+def _lies(scene: bpy.types.Scene, wish) -> np.ndarray | None:
+    """(3,) m where the user's ball lies that is to be kicked."""
+    ball = wish.ball
+    if ball is None:
+        return None
+    if ball.name not in scene.objects:
+        raise InputError("ball", f"{ball.name} is not in this scene", "a ball of this scene", "pick another")
+    from .flown import own_place
+
+    return own_place(scene, ball, wish)

@@ -1,0 +1,88 @@
+"""A throw on its armature and ball; what they did before is put aside and comes back, or the throw is kept."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from .. import action, bake, channels, linked, session
+from ..measure import frames_per_second
+from ..set_aside import bring_back, drop, put_aside
+from . import flown, order
+from .settings import MARK
+
+if TYPE_CHECKING:
+    from .order import Result
+
+MOST_LINES = 12
+RESULTS = ("made", "release", "figures", "told")
+
+
+def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> None:
+    """Lay a throw on its armature and its ball."""
+    wish, joined, fps = body.beyond_mocap_throw, result.joined, frames_per_second(scene)
+    order.check(scene, body)
+    if result.library is not None:
+        session.keep_library(result.library, result.order.unit)
+    if not wish.before.kept:
+        put_aside(wish.before, body)
+    channels.discard(body, MARK)
+    name = f"{body.name} {result.order.act}s"
+    action.write(body, joined.motion, scene, joined.start * fps, name, generated=True)[MARK] = True
+    flown.show(scene, body, result)
+    last = joined.start + (len(joined.motion) - 1) / fps
+    bake.lengthen(scene, fps * max(joined.release + result.thrown.seconds, last))
+    wish.made, wish.release = result.order.act, joined.release * fps
+    wish.figures = "\n".join(figures(result))
+    told = [*result.thrown.warnings, *joined.warnings]
+    wish.told = "\n".join(list(dict.fromkeys(str(line) for line in told))[:MOST_LINES])
+
+
+def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
+    """The armature plays what it did before, and so does its ball; what was made for the throw goes."""
+    wish = body.beyond_mocap_throw
+    linked.refuse(body, wish.flown)
+    channels.check_free(body)
+    flown.give_back(scene, wish)
+    if wish.before.kept:
+        bring_back(wish.before, body, MARK)
+    _settle(wish)
+
+
+def keep(body: bpy.types.Object) -> None:
+    """The throw stays as the armature's own motion, its ball as an object of the user's."""
+    wish = body.beyond_mocap_throw
+    linked.refuse(body, wish.flown)
+    for thing in (body, wish.flown):
+        played = channels.playing(thing)[0] if thing is not None else None
+        if played is not None and played.get(MARK):
+            del played[MARK]
+    for before in (wish.before, wish.ball_before):
+        drop(before, MARK)
+    for name in ("flown", "curve"):
+        wish.property_unset(name)
+    _settle(wish)
+
+
+def figures(result: "Result") -> list[str]:
+    """Lines "name: value" about a throw."""
+    thrown, joined, fps = result.thrown, result.joined, result.order.fps
+    velocity = np.asarray(thrown.velocity)
+    speed, level = float(np.linalg.norm(velocity)), float(np.linalg.norm(velocity[:2]))
+    up = np.degrees(np.arctan2(velocity[2], level))
+    limb = "Wrist" if result.order.act == "throw" else "Toe"
+    lines = [
+        f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up",
+        f"Past the target: {100.0 * thrown.miss:.1f} cm after {result.thrown.seconds:.2f} s",
+        f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm",
+    ]
+    if np.isfinite(result.usual_jerk):
+        lines.append(f"Seams, of the library's 99 %: {100.0 * result.jerk / result.usual_jerk:.0f} %")
+    return lines
+
+
+def _settle(wish) -> None:
+    for name in RESULTS:
+        wish.property_unset(name)

@@ -1,0 +1,220 @@
+"""Throws and kicks in Blender: the ball hits, is in the hand before, and all can be taken back."""
+
+import importlib
+import json
+import pathlib
+
+import bpy
+import numpy as np
+import pytest
+import worlds
+from conftest import EXTENSION
+from undo import assert_one_step, press, state
+
+SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
+TARGET = (18.0, 1.0, 1.2)
+
+
+@pytest.fixture
+def room():
+    return lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")
+
+
+@pytest.fixture(scope="module")
+def clips(tmp_path_factory):
+    return worlds.make_places(tmp_path_factory.mktemp("throws")).clips
+
+
+def a_body(clip="standing_1", target=TARGET, frame=60, fps=(30, 1.0)):
+    """An armature that plays a clip, and an Empty that it is to hit."""
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = fps
+    bpy.ops.beyond_mocap.import_clips(filepath=str(SAMPLE / f"{clip}.bvh"))
+    body = bpy.context.object
+    wish = body.beyond_mocap_throw
+    wish.target = an_empty(target)
+    wish.frame = frame
+    return body
+
+
+def an_empty(place):
+    empty = bpy.data.objects.new("Target", None)
+    empty.location = place
+    bpy.context.scene.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    return empty
+
+
+def ball_at(ball, frame):
+    whole = int(np.floor(frame))
+    bpy.context.scene.frame_set(whole, subframe=frame - whole)
+    return np.array(ball.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation)
+
+
+def closest(ball, target, first, last):
+    """How near the ball comes to a place, between frames too: its way is straight from each to the next."""
+    places = np.array([ball_at(ball, frame) for frame in range(first, last)])
+    step = places[1:] - places[:-1]
+    share = np.clip(np.sum((target - places[:-1]) * step, axis=1) / np.maximum(np.sum(step**2, axis=1), 1e-12), 0, 1)
+    return np.linalg.norm(places[:-1] + share[:, None] * step - target, axis=1).min()
+
+
+@pytest.mark.parametrize("fps", [(30, 1.0), (24, 1.001)])
+def test_the_ball_leaves_the_hand_and_hits(room, fps):
+    body = a_body(fps=fps)
+    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    wish = body.beyond_mocap_throw
+    assert wish.made == "throw" and abs(wish.release - 60.0) <= 0.51
+    ball, first = wish.flown, int(np.floor(wish.release))
+    assert closest(ball, np.array(TARGET), first + 1, first + 60) < 0.10
+    # in the hand up to the release, rigid with its bone, and the flight goes on from there
+    bone = body.pose.bones[ball.constraints[0].subtarget]
+    away = []
+    for frame in range(first - 20, first):
+        place = ball_at(ball, frame)
+        away.append(np.array((body.matrix_world @ bone.matrix).inverted() @ bpy_vector(place)))
+    assert np.ptp(away, axis=0).max() < 2e-3 and 0.02 < np.linalg.norm(away[0]) < 0.3
+    steps = [np.linalg.norm(ball_at(ball, f + 1) - ball_at(ball, f)) for f in range(first - 2, first + 4)]
+    assert max(steps) < 1.5 * min(steps[-2:])
+
+
+def bpy_vector(values):
+    from mathutils import Vector
+
+    return Vector(values)
+
+
+def test_a_library_joins_it(room, clips):
+    bpy.context.scene.beyond_mocap.library_folder = str(clips)
+    body = a_body("walking_1_2", frame=70)
+    own = room("action").read(body, bpy.context.scene)
+    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    wish = body.beyond_mocap_throw
+    shares = [line for line in wish.figures.splitlines() if line.startswith("Seams")]
+    assert float(shares[0].split(":")[1].rstrip(" %")) <= 100.0
+    now = room("action").read(body, bpy.context.scene)
+    assert len(now) >= len(own)
+
+
+def test_again_with_another_target_begins_from_the_same_motion(room):
+    body = a_body()
+    before = room("action").read(body, bpy.context.scene)
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    wish = body.beyond_mocap_throw
+    wish.target.location.y += 2.0
+    bpy.context.view_layer.update()
+    count = len(bpy.data.actions), len(bpy.data.objects)
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert (len(bpy.data.actions), len(bpy.data.objects)) == count
+    first = int(np.floor(wish.release))
+    assert closest(wish.flown, np.array(TARGET) + [0.0, 2.0, 0.0], first + 1, first + 60) < 0.10
+    press(bpy.ops.beyond_mocap.leave_throw)
+    after = room("action").read(body, bpy.context.scene)
+    assert np.array_equal(after.rotations, before.rotations) and len(bpy.data.objects) == 2 + 0
+
+
+def test_all_is_as_before_when_it_is_left():
+    body = a_body()
+    wish = body.beyond_mocap_throw
+    ball = bpy.data.objects.new("Ball of mine", bpy.data.meshes.new("Ball of mine"))
+    ball.location = (0.3, 0.2, 0.5)
+    bpy.context.scene.collection.objects.link(ball)
+    wish.ball = ball
+    bpy.context.scene.frame_end = 250
+    before = state()
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert wish.flown == ball and len(ball.constraints) == 1
+    press(bpy.ops.beyond_mocap.leave_throw)
+    after = state()
+    assert {key for key in before if before[key] != after[key]} <= {"materials", "collections", "frames"}
+    assert tuple(ball.location) == pytest.approx((0.3, 0.2, 0.5))
+
+
+def test_kept_it_is_the_own_motion(room):
+    body = a_body()
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    wish = body.beyond_mocap_throw
+    ball, shown = wish.flown, room("action").read(body, bpy.context.scene)
+    press(bpy.ops.beyond_mocap.keep_throw)
+    assert not wish.made and wish.flown is None and ball.name in bpy.context.scene.objects
+    assert np.array_equal(room("action").read(body, bpy.context.scene).rotations, shown.rotations)
+    wish.frame = 200  # the next one begins from it
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert wish.flown != ball
+    now = room("action").read(body, bpy.context.scene)
+    assert np.allclose(now.rotations[:60], shown.rotations[:60], atol=1e-6)
+
+
+def test_an_armature_that_plays_nothing_stands(core):
+    armature = importlib.import_module(f"{EXTENSION}.scene.armature")
+    skeleton = core("motion.adult").adult_skeleton()
+    body = armature.create(bpy.context, skeleton, "Thrower", bpy.context.scene.collection)
+    body.location, body.rotation_euler = (2.0, -1.0, 0.0), (0.0, 0.0, 0.4)
+    worlds.choose(body)
+    bpy.context.scene.cursor.location = (12.0, 3.0, 1.0)
+    bpy.context.scene.frame_set(80)
+    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    wish = body.beyond_mocap_throw
+    first = int(np.floor(wish.release))
+    assert abs(wish.release - 80.0) <= 0.51
+    assert closest(wish.flown, np.array((12.0, 3.0, 1.0)), first + 1, first + 60) < 0.10
+    bpy.context.scene.frame_set(1)
+    hips = body.matrix_world @ body.pose.bones[skeleton.names[0]].head
+    assert np.linalg.norm(np.array(hips)[:2] - [2.0, -1.0]) < 0.05
+
+
+def test_one_step_of_undo():
+    a_body()
+    assert_one_step(bpy.ops.beyond_mocap.throw_at_target)
+    assert_one_step(bpy.ops.beyond_mocap.leave_throw)
+
+
+def test_unit_scale(room):
+    scene = bpy.context.scene
+    scene.unit_settings.scale_length = 0.01
+    body = a_body(target=[100.0 * value for value in TARGET])
+    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    wish = body.beyond_mocap_throw
+    first = int(np.floor(wish.release))
+    assert closest(wish.flown, 100.0 * np.array(TARGET), first + 1, first + 60) < 10.0
+
+
+def refused(match, operator=bpy.ops.beyond_mocap.throw_at_target):
+    before = state()
+    with pytest.raises(RuntimeError, match=match) as caught:
+        operator()
+    assert "Traceback" not in str(caught.value)
+    assert state() == before
+
+
+def test_what_is_refused(tmp_path):
+    body = a_body()
+    wish = body.beyond_mocap_throw
+    wish.throw_model = str(tmp_path / "none.npz")
+    refused("none.npz")
+    (tmp_path / "bad.npz").write_bytes(b"PK\x03\x04 truncated")
+    wish.throw_model = str(tmp_path / "bad.npz")
+    refused("bad.npz")
+    wish.throw_model = ""
+    wish.target.location = (400.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    refused("m/s")
+    wish.target.location = TARGET
+    wish.ball = body.beyond_mocap_throw.target
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = None
+    refused("Select the armature")
+
+
+def test_a_body_without_hands_is_refused(core):
+    skeleton = core("motion.adult").adult_skeleton()
+    legs = [j for j, name in enumerate(skeleton.names) if "Arm" not in name and "Hand" not in name]
+    table = {"names": [skeleton.names[j] for j in legs], "parents": [legs.index(skeleton.parents[j]) if j else -1 for j in legs]}
+    assert json.dumps(table)
+    small = core("motion.skeleton").Skeleton(
+        tuple(table["names"]), tuple(table["parents"]), skeleton.offsets[legs], (), np.zeros((0, 3))
+    )
+    armature = importlib.import_module(f"{EXTENSION}.scene.armature")
+    worlds.choose(armature.create(bpy.context, small, "Legs", bpy.context.scene.collection))
+    bpy.context.scene.cursor.location = (12.0, 0.0, 1.0)
+    refused("hand|arm")
