@@ -17,6 +17,7 @@ out. Without one the throw is eased into the motion that is there, which goes on
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -73,6 +74,8 @@ _ENDS = 0.5  # s at either end of a stretch that faces as the motion around it
 REACH = 4.5
 """Seconds before and behind a throw in which a body may leave its own way."""
 
+
+_usual: weakref.WeakKeyDictionary[Library, dict] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,7 +340,15 @@ def seam_jerk(joined: Joined) -> np.ndarray:
 
 
 def usual_jerk(library: Library, fps: float, percent: float = _PERCENT) -> float:
-    """m/s^3 that so many per cent of the library's uncut recordings stay below within any 17 frames, at `fps`."""
+    """m/s^3 that so many per cent of the library's uncut recordings stay below within any 17 frames, at `fps`; worked
+    out once."""
+    known = _usual.setdefault(library, {})
+    if (fps, percent) not in known:
+        known[fps, percent] = _usual_jerk(library, fps, percent)
+    return known[fps, percent]
+
+
+def _usual_jerk(library: Library, fps: float, percent: float) -> float:
     found = []
     for clip in library.clips:
         if not clip.mirrored and not clip.made:

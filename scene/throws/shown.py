@@ -75,11 +75,11 @@ def figures(result: "Result") -> list[str]:
     limb = "Wrist" if result.order.act == "throw" else "Toe"
     lines = [
         f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up",
-        f"Past the target: {100.0 * thrown.miss:.1f} cm after {result.thrown.seconds:.2f} s",
+        f"Passes the target by: {100.0 * thrown.miss:.1f} cm", f"Flight to the target: {thrown.seconds:.2f} s",
         f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm",
     ]
     if np.isfinite(result.usual_jerk):
-        lines.append(f"Seams, of the library's 99 %: {100.0 * result.jerk / result.usual_jerk:.0f} %")
+        lines.append(f"Seam jerk, of p99: {100.0 * result.jerk / result.usual_jerk:.0f} %")
     return lines
 
 

@@ -224,6 +224,17 @@ def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
 
+def a_target():
+    """Something far away to aim at: the 3D cursor."""
+    bpy.context.scene.cursor.location = (20.0, 1.0, 1.0)
+
+
+def throw():
+    """The active body throws."""
+    a_target()
+    bpy.ops.beyond_mocap.throw_at_target()
+
+
 def unmapped():
     """The rig's map is empty."""
     bpy.context.scene.beyond_mocap.rig.bones.clear()
@@ -326,8 +337,11 @@ ROWS = {
     "import_words": Row("imported", lambda places: {"filepath": f"{places.match}/player1.txt"}),
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
+    "keep_throw": Row("accepted", prepare=throw),
+    "kick_at_target": Row("accepted", prepare=a_target),
     "keep_bone_map": Row("rig", changes=False),
     "leave_aim": Row("accepted", prepare=aim_a_ball),
+    "leave_throw": Row("accepted", prepare=throw),
     "leave_path": Row("accepted", prepare=ride),
     "list_clips": Row("imported", changes=False),
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
@@ -390,6 +404,7 @@ ROWS = {
     "stream_target": Row("imported", lambda places: {"number": 2}, play_live),
     "synthesize": Row("imported"),
     "take_ball": Row("accepted", lambda places: {"first": 3, "last": 8}, a_ball),
+    "throw_at_target": Row("accepted", prepare=a_target),
     "track_object": Row("imported", prepare=draw),
     "unbake": Row("rig", prepare=bake_it),
     "update": Row("synthesized"),

@@ -90,7 +90,7 @@ def test_a_library_joins_it(room, clips):
     own = room("action").read(body, bpy.context.scene)
     assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
     wish = body.beyond_mocap_throw
-    shares = [line for line in wish.figures.splitlines() if line.startswith("Seams")]
+    shares = [line for line in wish.figures.splitlines() if line.startswith("Seam jerk")]
     assert float(shares[0].split(":")[1].rstrip(" %")) <= 100.0
     now = room("action").read(body, bpy.context.scene)
     assert len(now) >= len(own)
