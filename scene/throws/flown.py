@@ -42,7 +42,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> bp
     wish = body.beyond_mocap_throw
     if wish.flown is not None and wish.flown != wish.ball and not (wish.ball is None and wish.flown.get(KEPT)):
         give_back(scene, wish)
-    kind = result.thrown.kind
+    kind = result.thrown.ball
     ball = wish.ball or wish.flown
     if ball is None or ball.name not in scene.objects:
         ball = balls.create(bpy.context, NAMES[result.order.act], bake.collection(scene))
@@ -111,7 +111,7 @@ def keys(
     first = int(round(joined.start * fps))
     if result.order.act == "kick":
         before = np.array([min(first, last - 1), last], float)
-        still = np.repeat(np.asarray(result.thrown.position)[None], 2, axis=0)
+        still = np.repeat(np.asarray(result.thrown.launch.position)[None], 2, axis=0)
         return _all(before, still, np.repeat(turns[:1], 2, axis=0), frames, places, turns, None)
     held = np.arange(first, last + 1)
     spots, spun = in_hand(result, held - first)

@@ -19,8 +19,8 @@ from ..ride.rigs import is_plain
 from ..settings import absolute
 from .settings import LIMBS, USUAL
 
-FOLLOWED = 3.0
-"""Seconds that the ball is followed behind the target, bouncing and rolling."""
+FOLLOWED, LONGEST = 3.0, 10.0
+"""Seconds that the ball is followed behind the target, bouncing and rolling, and that it takes to get there at most."""
 
 if TYPE_CHECKING:
     from ...beyond_mocap.ball.flight import Flight
@@ -66,13 +66,14 @@ class Order:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an order: the throw, the whole motion that shows it, the ball's way from the release on (seconds 0),
-    and m/s^3 of the seams and what is usual there."""
+    """What came of an order: the throw, the whole motion that shows it, the ball's way from the release on (seconds 0), seconds
+    until it passes the target, and m/s^3 of the seams and what is usual there."""
 
     order: Order
     thrown: "Thrown"
     joined: "Joined"
     flight: "Flight"
+    seconds: float
     library: "Library | None"
     jerk: float
     usual_jerk: float
@@ -127,7 +128,7 @@ def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
 def work(order: Order, progress, cancelled, _hurry) -> Result:
     """The throw, and the motion it is part of. Never touches bpy."""
     from ...beyond_mocap import joined_throw
-    from ...beyond_mocap.ball.flight import Launch, fly
+    from ...beyond_mocap.ball.flight import fly
     from ...beyond_mocap.library.library import build
 
     library = order.library
@@ -138,7 +139,7 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     if stands:
         own = joined_throw.standing(order.skeleton, 0.0, order.fps, order.place, order.facing)
     start = order.first / order.fps
-    thrown = _thrown(order, own, start, library is not None, progress)
+    thrown = _thrown(order, own, start, library is not None, _share(progress, 0.0, 0.3), cancelled)
     motion, release = thrown.motion, thrown.release
     told = ()
     if library is not None:
@@ -149,27 +150,28 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     joined = joined_throw.laid_into(own, start, motion, release, order.at, goes_on=library is None)
     usual = joined_throw.usual_jerk(library, order.fps) if library is not None else float("nan")
     joined = replace(joined, warnings=(*told, *joined.warnings))
-    launch = Launch(0.0, np.asarray(thrown.position), np.asarray(thrown.velocity), np.asarray(thrown.spin))
-    flight = fly(launch, thrown.kind, thrown.seconds + FOLLOWED)
-    return Result(order, thrown, joined, flight, library, float(joined_throw.seam_jerk(joined).max()), usual)
+    launch = replace(thrown.launch, time=0.0)
+    seconds = _seconds(fly(launch, thrown.ball, LONGEST), thrown.impact)
+    flight = fly(launch, thrown.ball, seconds + FOLLOWED)
+    return Result(order, thrown, joined, flight, seconds, library, float(joined_throw.seam_jerk(joined).max()), usual)
 
 
-def _thrown(order: Order, own: "Motion", start: float, comes_back: bool, progress) -> "Thrown":
-    """The throw where it has to be: begun where an armature that only stands is; where its own motion leads when it is
-    eased out of that; or, with run-up, so that it is at the release where its own motion has it then."""
-    from ...beyond_mocap import joined_throw
+def _thrown(order: Order, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
+    """The throw where it has to be: begun where an armature that only stands is; over where its own motion has it at
+    the release, if a library joins them; else begun where its own motion leads, since it is eased out of that."""
 
-    def spot(seconds: float) -> np.ndarray:
-        return own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2]
+    def spot(seconds: float) -> tuple[float, ...]:
+        return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
 
     model = _model(order)
-    thrown = _thrown_from(order, model, spot(order.at), _share(progress, 0.0, 0.15))
-    if order.own is None or order.ball_place is not None:
+    if order.ball_place is not None:
+        return _thrown_from(order, model, {"ball_place": tuple(order.ball_place)}, progress, cancelled)
+    if order.own is None:
+        return _thrown_from(order, model, {"start": tuple(order.place)}, progress, cancelled)
+    thrown = _thrown_from(order, model, {"over": spot(order.at)}, progress, cancelled)
+    if joined:
         return thrown
-    begin = spot(order.at - thrown.release)
-    if comes_back:
-        begin = joined_throw.begins_at(thrown.motion, thrown.release, spot(order.at))
-    return _thrown_from(order, model, begin, _share(progress, 0.15, 0.3))
+    return _thrown_from(order, model, {"start": spot(order.at - thrown.release)}, progress, cancelled)
 
 
 def _model(order: Order):
@@ -180,16 +182,22 @@ def _model(order: Order):
     return read_model(order.model) if order.model else shipped_model(order.act)
 
 
-def _thrown_from(order: Order, model, place: np.ndarray, progress) -> "Thrown":
-    """The throw whose first frame is at `place` (2,) m."""
+def _thrown_from(order: Order, model, where: dict, progress, cancelled) -> "Thrown":
+    """The throw that begins, or is at its release, or finds the ball, `where`."""
     from ...beyond_mocap import throw
 
-    progress(0.0, "Generating")
     asked = throw.Order(
-        target=tuple(order.target), limb=order.limb, speed=order.speed or None, place=tuple(place), ball=order.kind,
-        ball_place=None if order.ball_place is None else tuple(order.ball_place), seed=order.seed,
-    )  # fmt: skip
-    return throw.throw_at(model, asked, skeleton=order.skeleton, fps=order.fps)
+        target=tuple(order.target), limb=order.limb, speed=order.speed or None, ball=order.kind, fps=order.fps,
+        seed=order.seed, **where,
+    )
+    return throw.throw_at(model, asked, order.skeleton, progress, cancelled)
+
+
+def _seconds(flight: "Flight", place: np.ndarray) -> float:
+    """When a ball is nearest to a place (3,) m."""
+    times = np.arange(0.0, flight.end, 1.0 / 480.0)
+    apart = np.linalg.norm(flight.at(times) - place, axis=1)
+    return float(times[int(np.argmin(apart))]) if np.all(np.isfinite(place)) else 1.0
 
 
 def _share(progress, low: float, high: float):
@@ -206,11 +214,11 @@ def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None
         slot = next((one for one in found.slots if one.identifier == before.slot), None) if found else None
     else:
         found, slot = channels.playing(body)
-        if found is not None and not is_plain(body):
+        if not is_plain(body) if found is not None else posed_otherwise(body):
             raise InputError(
                 f"armature {body.name}", "constraints, drivers or several layers pose it",
                 "an armature whose bones are keyed themselves",
-                "throw with the source armature, then press Bake to Rig",
+                "throw with another armature, then press Bake to Rig",
             )
     curves = channels.curves(found, slot) if slot is not None else {}
     ends = channels.keyed_range({key: curve for key, curve in curves.items() if key[0].startswith("pose.bones")})
@@ -220,6 +228,16 @@ def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None
     if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
         raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
     return motion, ends[0]
+
+
+def posed_otherwise(body: bpy.types.Object) -> bool:
+    """Whether constraints, drivers or NLA strips have a say in an armature's pose."""
+    data = body.animation_data
+    drivers = data.drivers if data is not None else ()
+    strips = data is not None and data.use_nla and any(len(one.strips) and not one.mute for one in data.nla_tracks)
+    return strips or any(driver.data_path.startswith("pose.") for driver in drivers) or any(
+        not one.mute and one.influence > 0.0 for bone in body.pose.bones for one in bone.constraints
+    )
 
 
 def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton") -> tuple[np.ndarray, float]:

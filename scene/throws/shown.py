@@ -33,7 +33,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
     action.write(body, joined.motion, scene, joined.start * fps, name, generated=True)[MARK] = True
     flown.show(scene, body, result)
     last = joined.start + (len(joined.motion) - 1) / fps
-    bake.lengthen(scene, fps * max(joined.release + result.thrown.seconds, last))
+    bake.lengthen(scene, fps * max(joined.release + result.seconds, last))
     wish.made, wish.release = result.order.act, joined.release * fps
     wish.figures = "\n".join(figures(result))
     told = [*result.thrown.warnings, *joined.warnings]
@@ -69,14 +69,14 @@ def keep(body: bpy.types.Object) -> None:
 def figures(result: "Result") -> list[str]:
     """Lines "name: value" about a throw."""
     thrown, joined, fps = result.thrown, result.joined, result.order.fps
-    velocity = np.asarray(thrown.velocity)
+    velocity = thrown.launch.velocity
     speed, level = float(np.linalg.norm(velocity)), float(np.linalg.norm(velocity[:2]))
     up = np.degrees(np.arctan2(velocity[2], level))
-    limb = "Wrist" if result.order.act == "throw" else "Toe"
+    limb = "Wrist" if result.order.act == "throw" else "Ankle"
     lines = [
         f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up",
-        f"Passes the target by: {100.0 * thrown.miss:.1f} cm", f"Flight to the target: {thrown.seconds:.2f} s",
-        f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm",
+        f"Passes the target by: {100.0 * thrown.impact_error:.1f} cm", f"Flight to the target: {result.seconds:.2f} s",
+        f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm", f"Slowest that gets there: {thrown.slowest:.1f} m/s",
     ]
     if np.isfinite(result.usual_jerk):
         lines.append(f"Seam jerk, of p99: {100.0 * result.jerk / result.usual_jerk:.0f} %")

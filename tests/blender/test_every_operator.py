@@ -18,6 +18,7 @@ import pytest
 import rigs
 import worlds
 from conftest import EXTENSION
+from throw_models import model_file
 from undo import press, state
 
 SAYS_NOTHING = re.compile(
@@ -224,9 +225,10 @@ def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
 
-def a_target():
-    """Something far away to aim at: the 3D cursor."""
+def a_target(act="throw"):
+    """Something far away to aim at: the 3D cursor; and a model that is quickly read."""
     bpy.context.scene.cursor.location = (20.0, 1.0, 1.0)
+    setattr(bpy.context.object.beyond_mocap_throw, f"{act}_model", model_file(act))
 
 
 def throw():
@@ -338,7 +340,7 @@ ROWS = {
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
     "keep_throw": Row("accepted", prepare=throw),
-    "kick_at_target": Row("accepted", prepare=a_target),
+    "kick_at_target": Row("accepted", prepare=lambda: a_target("kick")),
     "keep_bone_map": Row("rig", changes=False),
     "leave_aim": Row("accepted", prepare=aim_a_ball),
     "leave_throw": Row("accepted", prepare=throw),

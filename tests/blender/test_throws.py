@@ -9,10 +9,19 @@ import numpy as np
 import pytest
 import worlds
 from conftest import EXTENSION
+from throw_models import model_file
 from undo import assert_one_step, press, state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
 TARGET = (18.0, 1.0, 1.2)
+
+
+@pytest.fixture(autouse=True)
+def usual_model(monkeypatch):
+    """Bodies throw by that model."""
+    throws = importlib.import_module(f"{EXTENSION}.beyond_mocap.throw")
+    read = importlib.import_module(f"{EXTENSION}.beyond_mocap.files.network_npz").read_model
+    monkeypatch.setattr(throws, "shipped_model", lambda action: read(model_file(action)))
 
 
 @pytest.fixture

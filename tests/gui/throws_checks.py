@@ -1,0 +1,120 @@
+"""Throws & Kicks in the window: a throw by its button, seen, undone, cancelled; the panel's time."""
+
+import importlib
+import time
+
+import bpy
+import numpy as np
+from tab import EXTENSION, PICTURES, assert_no_trouble_since, output, sample, wait_for_work, window, within
+
+LIMIT = 200
+
+
+def body():
+    """The armature; looked up each time, since undo replaces it."""
+    return bpy.data.objects["Thrower"]
+
+
+def scene_of_one():
+    """A sample clip's armature, an Empty to hit, and the sample's library."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 1
+    scene = window.window.scene
+    scene.render.fps = 30
+    scene.beyond_mocap.library_folder = str(sample() / "library")
+    bpy.ops.beyond_mocap.import_clips(filepath=str(sample() / "library" / "walking_1_2.bvh"))
+    one = next(thing for thing in bpy.data.objects if thing.type == "ARMATURE")
+    one.name = "Thrower"
+    target = bpy.data.objects.new("Target", None)
+    target.location, target.empty_display_type, target.empty_display_size = (16.0, 2.0, 1.2), "SPHERE", 0.3
+    scene.collection.objects.link(target)
+    one.beyond_mocap_throw.target, one.beyond_mocap_throw.frame = target, 70
+    window.window.view_layer.objects.active = one
+    bpy.ops.ed.undo_push(message="scene")
+    kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_throws")
+    if kind.bl_category != "Throw Check":
+        bpy.utils.unregister_class(kind)
+        kind.bl_category, kind.bl_options = "Throw Check", set()
+        bpy.utils.register_class(kind)
+    yield from window.open_tab(window.area("VIEW_3D"), "Throw Check")
+    yield 1
+
+
+def press(verb):
+    """Click a button by its call."""
+    area = window.area("VIEW_3D")
+    place = yield from window.find(area, window.sidebar(area), lambda call: f".{verb}(" in call, window.command_under_pointer)
+    yield from window.move(*place)
+    yield from window.press("LEFTMOUSE")
+    yield 0.3
+
+
+def look(frame, name):
+    """The body from the side on a frame, as a picture."""
+    window.window.scene.frame_set(frame)
+    one = body()
+    hips = one.matrix_world @ one.pose.bones[0].head
+    view = window.area("VIEW_3D").spaces.active.region_3d
+    view.view_location, view.view_distance = (hips.x + 1.0, hips.y, 0.9), 6.0
+    yield 0.5
+    window.picture(PICTURES / f"throw-{name}.png")
+
+
+def check_throw():
+    """The button throws in the background; the picture shows ball and curve; one undo takes all away, one redo brings
+    it back."""
+    yield from scene_of_one()
+    began = len(output.text())
+    before = len(bpy.data.objects)
+    yield from press("throw_at_target")
+    start = time.monotonic()
+    yield from wait_for_work()
+    while not body().beyond_mocap_throw.made:
+        assert time.monotonic() - start < 90.0, "no throw came"
+        yield 0.1
+    wish = body().beyond_mocap_throw
+    assert abs(wish.release - 70.0) <= 0.51 and wish.flown is not None, wish.figures
+    for frame, name in ((62, "windup"), (70, "release"), (76, "after")):
+        yield from look(frame, name)
+    there, most = np.array(wish.target.location), 1e9
+    for frame in range(71, 120):
+        window.window.scene.frame_set(frame)
+        most = min(most, float(np.linalg.norm(np.array(wish.flown.matrix_world.translation) - there)))
+    assert most < 0.5, f"the ball passes the target by {most:.2f} m"  # whole frames only: 0.7 m apart at 20 m/s
+    bpy.ops.ed.undo()
+    yield 0.5
+    assert not body().beyond_mocap_throw.made and len(bpy.data.objects) == before
+    bpy.ops.ed.redo()
+    yield 0.5
+    assert body().beyond_mocap_throw.made == "throw"
+    assert_no_trouble_since(began)
+
+
+def check_cancel():
+    """ESC while it works changes nothing."""
+    yield from scene_of_one()
+    before = len(bpy.data.objects), len(bpy.data.actions)
+    yield from press("throw_at_target")
+    yield from window.press("ESC")
+    yield from wait_for_work()
+    yield 1
+    assert not body().beyond_mocap_throw.made and (len(bpy.data.objects), len(bpy.data.actions)) == before
+
+
+def check_panel_is_quick():
+    """Drawing the panel takes no time to speak of."""
+    yield from scene_of_one()
+    panel = importlib.import_module(f"{EXTENSION}.panels.throws").BEYOND_MOCAP_PT_throws
+    drawn, took = panel.draw, []
+
+    def timed(self, context):
+        start = time.perf_counter()
+        drawn(self, context)
+        took.append(time.perf_counter() - start)
+
+    panel.draw = timed
+    for _ in range(20):
+        window.sidebar(window.area("VIEW_3D")).tag_redraw()
+        yield 0.1
+    panel.draw = drawn
+    within("ms to draw Throws & Kicks", 1000.0 * float(np.median(took)), 2.0)
