@@ -105,6 +105,30 @@ def test_a_library_joins_it(room, clips):
     assert len(now) >= len(own)
 
 
+def test_a_ball_that_lies_is_kicked_into_the_target(room):
+    goal = (16.0, 3.0, 0.8)
+    body = a_body(target=goal)
+    ball = importlib.import_module(f"{EXTENSION}.scene.ball").create(
+        bpy.context, "Ball of mine", bpy.context.scene.collection
+    )
+    ball.location = (1.5, 0.5, 0.11)
+    wish = body.beyond_mocap_throw
+    wish.ball = ball
+    assert press(bpy.ops.beyond_mocap.kick_at_target) == {"FINISHED"}
+    assert wish.made == "kick" and wish.flown == ball and not ball.constraints
+    first = int(np.floor(wish.release))
+    assert closest(ball, np.array(goal), first + 1, first + 60) < 0.10
+    for frame in (1, first - 10, first):
+        assert ball_at(ball, frame) == pytest.approx((1.5, 0.5, 0.11), abs=1e-4)
+    # the foot is at the ball when it leaves
+    toe = room("passes.possession").bone_of(bpy.context.scene, body, "foot", "right")
+    bpy.context.scene.frame_set(first)
+    away = np.array(body.matrix_world @ body.pose.bones[toe].head) - (1.5, 0.5, 0.11)
+    assert np.linalg.norm(away) < 0.5
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert tuple(ball.location) == pytest.approx((1.5, 0.5, 0.11)) and ball.animation_data is None
+
+
 def test_again_with_another_target_begins_from_the_same_motion(room):
     body = a_body()
     before = room("action").read(body, bpy.context.scene)
@@ -204,6 +228,8 @@ def test_what_is_refused(tmp_path):
     (tmp_path / "bad.npz").write_bytes(b"PK\x03\x04 truncated")
     wish.throw_model = str(tmp_path / "bad.npz")
     refused("bad.npz")
+    wish.throw_model = model_file("kick")
+    refused("trained for")
     wish.throw_model = ""
     wish.target.location = (400.0, 0.0, 0.0)
     bpy.context.view_layer.update()

@@ -51,3 +51,20 @@ def _linear(rows, units, ridge):
         (slopes[None], taken[None]), (np.full((1, units), FAR), np.full((1, answers), -FAR)),
         *scales[0], *scales[1],
     )  # fmt: skip
+
+
+def planted_kicks(count=5, seed=0, fps=30.0):
+    """Made kicks of one body at known targets, in the normalised frame."""
+    from beyond_mocap.ball.made_kicks import kick
+
+    random, found = np.random.default_rng(seed), []
+    while len(found) < count:
+        speed, far, high = random.uniform(14, 24), random.uniform(9, 22), random.uniform(0.3, 1.6)
+        try:
+            made = kick((far, 0.0, high), speed, fps=120.0)
+        except InputError:
+            continue
+        span = (made.contact - 1.1, made.contact + 0.8)
+        found.append(example_of(f"kick{len(found)}", "one", made.motion, "right_foot", made.contact,
+                                (far, 0.0, high), made.velocity, fps, span))  # fmt: skip
+    return tuple(found)
