@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .ball.arcs import Arcs, arcs
+from .ball.arcs import arcs
 from .ball.flight import Flight, Launch, fly
 from .ball.impact import crossing
-from .ball.physics import BALLS, FASTEST, FOOTBALL, THROWN, Ball
-from .ball.released.correction import AtFoot, Corrected, Freedom, InHand, corrected, grip_point, leaving
+from .ball.physics import BALLS, FASTEST, THROWN, Ball
+from .ball.released.correction import Corrected, Freedom, corrected
+from .ball.released.letting_go import AtFoot, InHand, grip_point, leaving
 from .errors import InputError
 from .motion import quaternion
 from .motion.between_frames import cubic_at
@@ -52,12 +53,12 @@ class Order:
     """What is asked for.
 
     target: (3,) m, world, that the ball's centre is to go through. limb: of EFFECTORS, None: what the examples use.
-    speed: m/s wished for as the ball leaves, None: what suits. ball: a kind's name or a `Ball`, None: baseball in a hand,
-    football at a foot. One of start, over, ball_place (each (2,) or (3,) m over the ground) says where: where the hips
-    are in the first frame; where they are at the release; where the ball lies that is kicked. None: start at the
-    origin. The body faces as the examples do, against the target. release_time: s on the caller's clock at which the ball
-    leaves, None: the motion begins at 0. fps: of the result, None: the model's. seed: another motion with the same aim.
-    freedom: what the correction may change beside wrist or ankle.
+    speed: m/s wished for as the ball leaves, None: what suits. ball: a kind's name or a `Ball`, None: baseball in a
+    hand, football at a foot. One of start, over, ball_place (each (2,) or (3,) m over the ground) says where: where
+    the hips are in the first frame; where they are at the release; where the ball lies that is kicked. None: start at
+    the origin. The body faces as the examples do, against the target. release_time: s on the caller's clock at which
+    the ball leaves, None: the motion begins at 0. fps: of the result, None: the model's. seed: another motion with
+    the same aim. freedom: what the correction may change beside wrist or ankle.
     """
 
     target: tuple[float, float, float]
@@ -93,12 +94,14 @@ class Thrown:
     """A throw or kick that hits as well as physics lets it.
 
     motion; start_time: s of its first frame on the caller's clock; release: s from its first frame at which the ball
-    leaves. limb: of EFFECTORS. ball: its kind. grip: (3,) m, the ball in the hand joint's axes, None for kicks. path: the
-    ball at the motion's rate, carried or lying, then in flight, beyond the motion's end until it is past its target.
-    launch, flight. target, impact: (3,) m. moved: m that the wrist or ankle was moved at most, by shift (T, 3) m.
-    turned rad, pace, later s: how else the motion was changed (see `Corrected`). slowest: m/s below which no ball gets
-    there. generated: the motion before the correction, where it was. examples: names and weights of what it was planned
-    from. warnings: lines for people.
+    leaves. limb: of EFFECTORS. ball: its kind. grip: (3,) m, the ball in the hand joint's axes, None for kicks. path:
+    the ball at the motion's rate, carried or lying, then in flight, beyond the motion's end until it is past its
+    target. launch, flight. target, impact: (3,) m. moved: m that the wrist or ankle was moved at most, by shift (T,
+    3) m. turned rad, pace, later s: how else the motion was changed (see `Corrected`). slowest: m/s below which no
+    ball gets there. generated: the motion before the correction, where it was; generated_release: s in it;
+    raw_deviation: m that hands and feet were off their wanted ways before any inverse kinematics, on average. beyond:
+    rad that a joint of the corrected limb is beyond the range of the model's examples at most, nan on other bones.
+    examples: names and weights of what it was planned from. warnings: lines for people.
     """
 
     motion: Motion
@@ -122,6 +125,7 @@ class Thrown:
     generated: Motion
     generated_release: float
     raw_deviation: float
+    beyond: float
     examples: tuple[tuple[str, float], ...]
     warnings: tuple[str, ...] = ()
 
@@ -153,8 +157,8 @@ class Thrown:
             "impact_m": self.impact, "impact_error_m": self.impact_error, "moved_m": self.moved,
             "corrected_frames": [int(frames[0]), int(frames[-1])] if len(frames) else [],
             "turned_deg": np.degrees(self.turned), "pace": self.pace, "release_later_s": self.later,
-            "raw_deviation_m": self.raw_deviation, "examples": {name: weight for name, weight in self.examples},
-            "warnings": list(self.warnings),
+            "raw_deviation_m": self.raw_deviation, "joint_beyond_deg": np.degrees(self.beyond),
+            "examples": {name: weight for name, weight in self.examples}, "warnings": list(self.warnings),
         }  # fmt: skip
 
 
@@ -202,13 +206,13 @@ def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None =
 
 
 @lru_cache(maxsize=8)
-def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
-    """Where (E, 3) m and how fast (E, 3) m/s such a ball leaves each example of the model; zero for those of another
-    limb."""
+def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where (E, 3) m, how fast (E, 3) m/s and with which spin (E, 3) rad/s such a ball leaves each example of the
+    model; zero for those of another limb."""
     part = part_of(model.skeleton, limb, ball)
-    none = np.zeros(3), np.zeros(3)
+    none = np.zeros((3, 3))
     found = [
-        leaving(example.motion, part, example.release, example.impact, ball)[:2] if example.limb == limb else none
+        leaving(example.motion, part, example.release, example.impact, ball) if example.limb == limb else none
         for example in model.examples
     ]
     return tuple(np.array(values) for values in zip(*found))
@@ -256,15 +260,19 @@ class _Work:
     def plan(self) -> Planned:
         """What the motion is to be."""
         examples = self.model.examples
-        places, self.launches = launches_of(self.model, self.own_limb, self.ball)
+        places, self.launches, spins = launches_of(self.model, self.own_limb, self.ball)
         own = [n for n, example in enumerate(examples) if example.limb == self.own_limb]
         if not own:
             raise InputError("model", f"no example with the {EFFECTORS[self.limb].replace('_', ' ')}", "some with it")
         ahead = self._from_anchor(np.median([self._anchor(examples[n], places[n]) for n in own], axis=0))
         if ahead < NEAREST:
-            raise InputError("target", f"{ahead:.2f} m from the body", f"{NEAREST:g} m or more", "move one of them away")
+            found = f"{ahead:.2f} m from the body"
+            raise InputError("target", found, f"{NEAREST:g} m or more", "move one of them away")
         place = np.median(places[own], axis=0)
-        self.arcs = arcs(np.array([place[0], 0.0, place[2]]), np.array([ahead, 0.0, self.target[2]]), self.ball)
+        start, end = np.array([place[0], 0.0, place[2]]), np.array([ahead, 0.0, self.target[2]])
+        self._check_human(_slowest_without_air(start, end, self.ball.gravity))
+        self.arcs = arcs(start, end, self.ball, np.median(spins[own], axis=0))
+        self._check_human(self.arcs.slowest)
         self._check_reach(float(np.linalg.norm(self.launches[own], axis=1).max()))
         wish = self._wish(own, ahead)
         return planned(examples, self.launches, wish, self.order.seed)
@@ -284,8 +292,8 @@ class _Work:
         return np.asarray(given, float)[:2]
 
     def _from_anchor(self, anchor: np.ndarray) -> float:
-        """m over the ground from where the hips begin to the target, if `anchor` (2,) of the normalised frame lies where
-        the order has it."""
+        """m over the ground from where the hips begin to the target, if `anchor` (2,) of the normalised frame lies
+        where the order has it."""
         begin, _ = self._laid(anchor)
         return float(np.linalg.norm(self.target[:2] - begin))
 
@@ -300,15 +308,19 @@ class _Work:
             begin = spot - quaternion.turned_level(anchor, np.array(turn))
         return begin, turn
 
-    def _check_reach(self, own: float) -> None:
-        """InputError for a target that no human, or no example, sends a ball to."""
-        slowest, most = self.arcs.slowest, self.fastest
-        kind = "kick" if self.kicks else "throw"
+    def _check_human(self, slowest: float) -> None:
+        """InputError for a target that takes a faster ball than a human gives."""
+        far, most = np.linalg.norm(self.target[:2] - self._where()), self.fastest
         if slowest > most:
             raise InputError(
-                "target", f"{np.linalg.norm(self.target[:2] - self._where()):.0f} m away: that takes {slowest:.0f} m/s",
-                f"at most {most:.0f} m/s, which is what a human gives a {kind}", "choose a nearer or lower target",
+                "target", f"{far:.0f} m away: that takes {slowest:.0f} m/s or more",
+                f"at most {most:.0f} m/s, which is what a human gives a {'kick' if self.kicks else 'throw'}",
+                "choose a nearer or lower target",
             )
+
+    def _check_reach(self, own: float) -> None:
+        """InputError for a speed that does not reach the target, or that is too far beyond the examples' `own`."""
+        slowest = self.arcs.slowest
         asked = self.order.speed or 0.0
         if asked and asked < slowest:
             raise InputError("speed", f"{asked:.1f} m/s", f"{slowest:.1f} m/s or more to get there", "ask for more")
@@ -335,8 +347,8 @@ class _Work:
     # Generating, and laying it where it is asked for.
 
     def generated(self, plan: Planned) -> tuple[Motion, float, float]:
-        """The motion where it belongs, at the asked rate and on the asked skeleton; its release in seconds; how far hands
-        and feet are from their wanted ways before any correction, m."""
+        """The motion where it belongs, at the asked rate and on the asked skeleton; its release in seconds; how far
+        hands and feet are from their wanted ways before any correction, m."""
         from .synthesis.phase_network.generate import generate
 
         found = generate(self.model, plan.description)
@@ -388,9 +400,18 @@ class _Work:
             found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
             ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
             found.moved, found.shift, found.turned, found.pace, found.later, self.arcs.slowest,
-            self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw,
+            self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw, self._beyond(found.motion),
             tuple(zip(plan.names, map(float, plan.weights))), tuple(self.warnings),
         )  # fmt: skip
+
+    def _beyond(self, motion: Motion) -> float:
+        """rad that a joint of the throwing or kicking limb is beyond the model's limits at most."""
+        from .synthesis.phase_network.limits import JointLimits
+
+        if self.model.joint_limits is None or self.mirrored or not motion.skeleton.same_bones(self.model.skeleton):
+            return np.nan
+        over = JointLimits(motion.skeleton, self.model.joint_limits).beyond(quaternion.to_matrix(motion.rotations))
+        return float(over[:, list(part_of(motion.skeleton, self.limb, self.ball).chain(motion))].max())
 
     def _tell(self, found: Corrected, impact: np.ndarray) -> None:
         """Lines about what people should know."""
@@ -406,8 +427,9 @@ class _Work:
 
 
 def within(thrown: Thrown, motion: Motion, start: float, release: float, first: int) -> Thrown:
-    """The throw as part of a longer motion that begins at `start` s and shows the throw from its frame `first` on, which
-    the ball leaves at `release` s: as `joined_throw.laid_into` says. The ball is held, or lies, all the time before."""
+    """The throw as part of a longer motion that begins at `start` s and shows the throw from its frame `first` on,
+    which the ball leaves at `release` s: as `joined_throw.laid_into` says. The ball is held, or lies, all the time
+    before."""
     launch = replace(thrown.launch, time=release)
     flight = fly(launch, thrown.ball, thrown.flight.end - thrown.launch.time + motion.duration)
     shift = np.zeros((len(motion), 3))
@@ -435,6 +457,12 @@ def ball_path(motion: Motion, part: InHand | AtFoot, flight: Flight, start: floa
         positions[held] = grip_point(motion, part, held.astype(float))[:, 0]
     rotations = quaternion.identity(len(times)) if not np.any(flight.launch.spin) else flight.rotations(times)
     return BallPath(times, positions, np.zeros(len(times), bool), rotations)
+
+
+def _slowest_without_air(start: np.ndarray, end: np.ndarray, gravity: float) -> float:
+    """m/s below which no ball gets from start (3,) m to end (3,) m."""
+    up, far = float(end[2] - start[2]), float(np.linalg.norm(end - start))
+    return float(np.sqrt(max(gravity * (up + far), 0.0)))
 
 
 def _usual_limb(model: ThrowModel) -> int:

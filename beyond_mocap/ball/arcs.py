@@ -31,11 +31,11 @@ class Arcs:
         return np.array([np.interp(speed, self.speeds, column) for column in self.velocities.T])
 
 
-def arcs(start: np.ndarray, target: np.ndarray, ball: Ball) -> Arcs:
-    """The launches from `start` (3,) m that lead straight to `target` (3,) m, without a bounce or spin."""
+def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | None = None) -> Arcs:
+    """The launches from `start` (3,) m that lead straight to `target` (3,) m, without a bounce; spin (3,) rad/s."""
     far = float(np.linalg.norm(np.asarray(target, float) - start))
     seconds = np.geomspace(far / 60.0, max(far / 3.0, 3.0), _TIMES)
-    found = aim(start, target, ball, seconds)
+    found = aim(start, target, ball, seconds, spin=spin)
     good = np.flatnonzero(found.miss <= CLOSE)
     speeds = length(found.velocity[good])
     flat = good[: int(np.argmin(speeds)) + 1][::-1]

@@ -28,7 +28,7 @@ def add(verbs):
     speed = partial(between, low=0.5, high=80.0, expected="0.5 to 80 m/s")
     verb.add_argument("--speed", type=speed, metavar="M/S", help="of the ball as it leaves; default: what suits")
     moment = partial(between, low=-1e5, high=1e5, expected="seconds")
-    verb.add_argument("--time", type=moment, metavar="SECONDS", help="at which the ball leaves; default: frame 0 is 0 s")
+    verb.add_argument("--time", type=moment, metavar="SECONDS", help="at which it leaves; default: frame 0 is 0 s")
     verb.add_argument("--fps", type=rate, help="default: the model's, 30 with --library")
     place = verb.add_mutually_exclusive_group()
     place.add_argument("--start", type=_place, metavar="X,Y", help="where the hips are in the first frame; default 0,0")
@@ -38,7 +38,7 @@ def add(verbs):
     verb.add_argument("--ball", type=Path, metavar="B.csv", help="the ball's way")
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--seed", type=int, default=0, help="another motion with the same aim; default 0")
-    verb.add_argument("--library", type=Path, metavar="L", help="with --track: run-up and recovery from these recordings")
+    verb.add_argument("--library", type=Path, metavar="L", help="with --track: run-up and recovery from it")
     verb.add_argument("--track", type=Path, metavar="T.csv", help="the player's track; the throw is on it at --time")
     verb.add_argument("--annotations", type=Path, metavar="A.txt", help="what else the player does on the track")
     verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
@@ -88,8 +88,8 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
         told.note(note)
     verb = "struck" if thrown.grip is None else "released"
     print(
-        f"{options.out}: {len(thrown.motion)} frames, {verb} at {thrown.release_time:.3f} s with {thrown.speed:.1f} m/s, "
-        f"{100 * thrown.impact_error:.1f} cm from the target, {100 * thrown.moved:.1f} cm moved"
+        f"{options.out}: {len(thrown.motion)} frames, {verb} at {thrown.release_time:.3f} s with {thrown.speed:.1f} "
+        f"m/s, {100 * thrown.impact_error:.1f} cm from the target, {100 * thrown.moved:.1f} cm moved"
     )
 
 

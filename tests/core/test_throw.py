@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.__main__ import main
 from beyond_mocap.ball.flight import fly
 from beyond_mocap.ball.impact import crossing
-from beyond_mocap.ball.released.correction import InHand, grip_point
+from beyond_mocap.ball.released.letting_go import InHand, grip_point
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.files.network_npz import write_model
@@ -93,7 +93,7 @@ def test_within_a_longer_motion_the_ball_flies_as_it_did(model):
 
 
 @pytest.mark.parametrize("order, says", [
-    (Order((160.0, 0.0, 1.0)), "what a human gives a throw"),
+    (Order((320.0, 0.0, 1.0)), "what a human gives a throw"),
     (Order((60.0, 0.0, 1.0)), "fastest example"),
     (Order((12.0, 0.0, 1.0), speed=60.0), "at most 45 m/s"),
     (Order((12.0, 0.0, 1.0), speed=5.0), "or more to get there"),
@@ -151,7 +151,7 @@ def test_the_command_is_the_function(weights, tmp_path, capsys, model):
 
 @pytest.mark.parametrize("extra, says", [
     (["--target", "12,3"], "X,Y,Z in metres"),
-    (["--target", "160,0,1"], "what a human gives"),
+    (["--target", "320,0,1"], "what a human gives"),
     (["--target", "12,3,1", "--model", "none.npz"], "none.npz"),
     (["--target", "12,3,1", "--out", "x.obj"], "x.obj"),
     (["--target", "12,3,1", "--track", "t.csv"], "--library"),

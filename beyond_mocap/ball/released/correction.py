@@ -11,24 +11,20 @@ costs least is found by Newton's method with Lagrange's multipliers; the release
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import InputError
 from ...motion import quaternion
 from ...motion.between_frames import cubic_at
-from ...motion.humanoid import identify
-from ...motion.motion import Motion, forward_kinematics, place, pose_kinematics
-from ...polish.carry import Body, Resting, arm, leg, limb_carried
+from ...motion.motion import Motion, forward_kinematics, place
 from .. import batch
-from ..contact import striking_surface
 from ..physics import Ball
-from .shift import Shifts, shifts_about
-from .struck import struck
+from .led_limb import LedLimb, at_once
+from .letting_go import AtFoot, InHand, carried, grip_point
+from .shift import shifts_about
 
-BEFORE, AFTER = 0.4, 0.4
-"""Seconds before and after the release within which a wrist is moved."""
 FINE, LITTLE = 0.02, 0.05
 """m of miss and of moved wrist up to which the pace is left as it is."""
 CLOSE = 1e-3
@@ -38,15 +34,13 @@ CLOSE = 1e-3
 _TURN, _PACE, _LATER, _SPEED, _OWN_SPEED, _REST = 8.0, 1.5, 1.5, 30.0, 300.0, 10.0
 _ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41
 _STEP = 1e-3  # of frames, metres, m/s and radians, in differences
-_NUDGE = np.array([0.005, 0.005, 0.005, 0.2, 0.2, 0.2])  # m, m/s, by which a limb is tried
-_ASHORE = 0.8  # m/s, a foot that is slower stands
 _LEAST = 3  # frames that a motion needs before and after the release
 
 
 @dataclass(frozen=True)
 class Freedom:
     """What may be changed beside wrist or ankle: turn rad about the start, pace as a share, release s, each to either
-    side; `rest`: whether the place of a ball that lies may be chosen. `anchored` leaves all but wrist and release."""
+    side."""
 
     turn: float = np.radians(15.0)
     pace: float = 0.15
@@ -89,100 +83,6 @@ class Corrected:
         return self.miss + self.gap
 
 
-@dataclass(frozen=True, eq=False)
-class InHand:
-    """A ball that a hand throws. side: "left" or "right"; grip (3,) m: its centre in the hand joint's own axes;
-    spin (3,) rad/s that it leaves with."""
-
-    side: str
-    grip: np.ndarray
-    spin: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    free: int = 0
-    gaps: int = 0
-
-    def chain(self, motion: Motion) -> tuple[int, int, int]:
-        """Shoulder, elbow, wrist; InputError for a body without them."""
-        joints = arm(getattr(identify(motion.skeleton), self.side))
-        if None in joints:
-            raise InputError("throw", f"a body without a {self.side} arm and hand", "a skeleton with arms and hands")
-        return joints
-
-    def points(self, motion: Motion, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """(N, 1, 3) m: the ball."""
-        hand = self.chain(motion)[2]
-        return (places[:, hand] + quaternion.rotate(turns[:, hand], self.grip))[:, None]
-
-    def leaves(self, points, velocities, rest, ball: Ball):
-        """Position, velocity and spin (N, 3), and gap (N, 0)."""
-        return points[:, 0], velocities[:, 0], np.broadcast_to(self.spin, points[:, 0].shape), points[:, 0, :0]
-
-    def span(self, motion: Motion, frame: float) -> tuple[int, int]:
-        """First and last frame at which the wrist may be moved."""
-        return int(np.ceil(frame - BEFORE * motion.fps)), int(np.floor(frame + AFTER * motion.fps))
-
-    def rest(self, motion: Motion, frame: float, target: np.ndarray, ball: Ball) -> np.ndarray:
-        """A held ball lies nowhere."""
-        return np.zeros(3)
-
-
-@dataclass(frozen=True, eq=False)
-class AtFoot:
-    """A ball that lies and is kicked. side: "left" or "right"; place (3,) m of its centre, None: where it suits."""
-
-    side: str
-    place: np.ndarray | None = None
-
-    @property
-    def free(self) -> int:
-        """Coordinates of the ball's place that may be chosen."""
-        return 2 if self.place is None else 0
-
-    gaps: int = 1
-
-    def chain(self, motion: Motion) -> tuple[int, int, int]:
-        """Hip, knee, ankle."""
-        return leg(getattr(identify(motion.skeleton), self.side))
-
-    def surface(self, motion: Motion):
-        """What strikes."""
-        return striking_surface(motion.skeleton, "foot", self.side)
-
-    def points(self, motion: Motion, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """(N, 2, 3) m: both ends of the foot's line."""
-        return np.stack(self.surface(motion).line(places, turns), axis=1)
-
-    def leaves(self, points, velocities, rest, ball: Ball):
-        """Position, velocity and spin (N, 3), and gap (N, 1) m."""
-        found = struck(points, velocities, self.radius, rest, ball)
-        return rest, found.velocity, found.spin, found.gap[:, None]
-
-    radius: float = 0.05
-
-    def span(self, motion: Motion, frame: float) -> tuple[int, int]:
-        """First and last frame of the foot's swing, at most BEFORE and AFTER."""
-        first, last = InHand.span(self, motion, frame)
-        first, last = max(first, 0), min(last, len(motion) - 1)
-        near = replace(motion, root_positions=motion.root_positions[first : last + 1],
-                       rotations=motion.rotations[first : last + 1])  # fmt: skip
-        middle = self.points(near, *forward_kinematics(near)).mean(axis=1)
-        slow = np.linalg.norm(np.gradient(middle, 1.0 / motion.fps, axis=0), axis=-1) < _ASHORE
-        before, after = np.flatnonzero(slow[: int(frame) - first]), np.flatnonzero(slow[int(frame) + 2 - first :])
-        return (first + int(before[-1]) + 1 if len(before) else first,
-                int(frame) + 1 + int(after[0]) if len(after) else last)  # fmt: skip
-
-    def rest(self, motion: Motion, frame: float, target: np.ndarray, ball: Ball) -> np.ndarray:
-        """(3,) m: where the ball lies, to begin with."""
-        if self.place is not None:
-            return np.asarray(self.place, float)
-        points, velocities = _carried(self, motion, np.array([frame]))
-        middle = points[0].mean(axis=0)
-        ahead = (target - middle) * [1.0, 1.0, 0.0]
-        ahead /= max(np.linalg.norm(ahead), 1e-9)
-        apart, up = self.radius + ball.radius, ball.radius - middle[2]
-        level = middle + np.sqrt(max(apart**2 - up**2, 0.25 * apart**2)) * ahead
-        return np.array([level[0], level[1], ball.radius])
-
-
 def corrected(
     motion: Motion, part: InHand | AtFoot, frame: float, target: np.ndarray, ball: Ball,
     freedom: Freedom | None = None, speed: float | None = None,
@@ -198,29 +98,6 @@ def corrected(
     if not _LEAST <= frame <= len(motion) - 1 - _LEAST:
         raise InputError("release", f"frame {frame:.1f} of {len(motion)}", f"at least {_LEAST} frames before and after")
     return _Search(motion, part, float(frame), target, ball, freedom, speed).whole()
-
-
-def leaving(
-    motion: Motion, part: InHand | AtFoot, frame: float, target: np.ndarray, ball: Ball
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position (3,) m, velocity (3,) m/s and spin (3,) rad/s with which the ball leaves the motion as it is, at the
-    fractional `frame`; target (3,) m: on which side of the foot a ball lies whose place is free."""
-    points, velocities = _carried(part, motion, np.array([frame]))
-    rest = part.rest(motion, frame, np.asarray(target, float), ball)
-    return tuple(value[0] for value in part.leaves(points, velocities, rest[None], ball)[:3])
-
-
-def grip_point(motion: Motion, part: InHand | AtFoot, frames: np.ndarray) -> np.ndarray:
-    """(N, K, 3) m: the ball in the hand, or the ends of the foot's line, at fractional frames (N,)."""
-    root, local = cubic_at(motion, frames)
-    return part.points(motion, *pose_kinematics(motion.skeleton, root, local))
-
-
-def _carried(part, motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, K, 3) m of the part and their velocities (N, K, 3) m/s at fractional frames (N,)."""
-    count = len(frames)
-    found = grip_point(motion, part, np.concatenate([frames, frames - _STEP, frames + _STEP]))
-    return found[:count], (found[2 * count :] - found[count : 2 * count]) * (0.5 * motion.fps / _STEP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,48 +119,6 @@ class _Change:
     pace = property(lambda self: float(self.row[7]))
     rest = property(lambda self: np.append(self.row[8:-1], np.zeros(3 - (len(self.row) - 9))))
     seconds = property(lambda self: float(self.row[-1]))
-
-
-@dataclass(frozen=True, eq=False)
-class _Led:
-    """A motion whose limb is led along shifted paths: `window`, the body at the frames of the shifts, and its limb as
-    it rests."""
-
-    motion: Motion
-    part: InHand | AtFoot
-    shifts: Shifts
-    window: Body
-    limb: Resting
-
-    @classmethod
-    def of(cls, motion: Motion, part: InHand | AtFoot, shifts: Shifts) -> _Led:
-        first, last = shifts.frames[0], shifts.frames[-1] + 1
-        body = Body.posed(motion.skeleton, motion.root_positions[first:last], motion.rotations[first:last])
-        return cls(motion, part, shifts, body, Resting.of(body, part.chain(motion)))
-
-    def shifted(self, change: np.ndarray) -> Motion:
-        """The motion with another place and velocity (6,) of the part at the release."""
-        if not np.any(change):
-            return self.motion
-        rotations = self.motion.rotations.copy()
-        moves = self.shifts.of(change[:3], change[3:])
-        rotations[self.shifts.frames] = limb_carried(self.window, self.limb, moves)
-        return replace(self.motion, rotations=rotations)
-
-    def follows(self, change: np.ndarray, frame: float, points, velocities) -> tuple[np.ndarray, np.ndarray]:
-        """(6, K, 3) each: by how much the part's points and their velocities really move for each m and m/s that is
-        asked of them, beside a change (6,) that brings them to `points` and `velocities` (1, K, 3)."""
-        found = []
-        for number, nudge in enumerate(np.diag(_NUDGE)):
-            near = _carried(self.part, self.shifted(change + nudge), np.array([frame]))
-            found.append([(new - old)[0] / _NUDGE[number] for new, old in zip(near, (points, velocities))])
-        return tuple(np.swapaxes(np.array(found), 0, 1))
-
-
-def _at_once(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """`_Led.follows` of K points that do just what is asked."""
-    both = np.repeat(np.eye(6)[:, None, :], count, axis=1)
-    return both[..., :3], both[..., 3:]
 
 
 class _Search:
@@ -314,12 +149,13 @@ class _Search:
 
     def _seconds(self, motion: Motion, frame: float, rest) -> float:
         """s until a ball that is not slowed is as far as the target."""
-        points, velocities = _carried(self.part, motion, np.array([frame]))
+        points, velocities = carried(self.part, motion, np.array([frame]))
         position, velocity, _, _ = self.part.leaves(points, velocities, rest[None], self.ball)
         way = (self.target - position[0]) * [1.0, 1.0, 0.0]
         far = float(np.linalg.norm(self.target - position[0]))
         if far < 4.0 * self.ball.radius:
-            raise InputError("target", f"{far:.2f} m from where the ball leaves", "a target some way off", "move it away")
+            found = f"{far:.2f} m from where the ball leaves"
+            raise InputError("target", found, "a target some way off", "move it away")
         along = max(float(velocity[0] @ way) / max(np.linalg.norm(way), 1e-9), 0.3 * np.linalg.norm(velocity[0]), 1.0)
         return float(np.clip(1.05 * far / along, 0.05, 4.0))
 
@@ -341,10 +177,10 @@ class _Search:
         motion = self._moved(change)
         within = self.freedom.release * self.given.fps
         sources = np.clip(self.asked + np.linspace(-within, within, _GRID), _LEAST, len(self.given) - 1 - _LEAST)
-        points, velocities = _carried(self.part, motion, sources / (1.0 + change.pace))
+        points, velocities = carried(self.part, motion, sources / (1.0 + change.pace))
         now = _Change(np.concatenate([np.zeros(6), change.row[6:]]))
         cost = self._cost(motion, source / (1.0 + change.pace))
-        rows, cost = self._best(points, velocities, now, start, cost, _at_once(points.shape[1]))
+        rows, cost = self._best(points, velocities, now, start, cost, at_once(points.shape[1]))
         cost = cost + ((sources - self.asked) / self.given.fps * _LATER) ** 2
         best = int(np.argmin(cost))
         return _Change(rows[best]), float(sources[best])
@@ -353,12 +189,12 @@ class _Search:
         """Newton's steps with the arm or leg as it follows; the best of them."""
         motion = self._moved(change)
         frame = source / (1.0 + change.pace)
-        limb = _Led.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps))
+        limb = LedLimb.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps))
         best, base, step = None, change, 1.0
-        follows, known = _at_once(grip_point(motion, self.part, np.array([frame])).shape[1]), False
+        follows, known = at_once(grip_point(motion, self.part, np.array([frame])).shape[1]), False
         for number in range(_ROUNDS):
             now = limb.shifted(change.row[:6])
-            points, velocities = _carried(self.part, now, np.array([frame]))
+            points, velocities = carried(self.part, now, np.array([frame]))
             found = self._judged(motion, now, frame, source, change, start, points, velocities)
             better = best is None or found.missed < best.missed
             slow = best is not None and found.missed > 0.1 * best.missed
@@ -389,7 +225,8 @@ class _Search:
         points = quaternion.rotate(about, points - self.pivot) + self.pivot
         velocities = quaternion.rotate(about, velocities) * (1.0 + pace)[:, None, None]
         position, velocity, spin, gap = self.part.leaves(points, velocities, rest, self.ball)
-        balls = batch.launched(position, velocity, spin, self.ball)
+        count = np.zeros(len(position), int)  # in the air, even below the ground: slopes go on there
+        balls = batch.Balls(position.copy(), velocity, np.array(spin), count, count)
         there = batch.after(balls, self.ball, np.maximum(seconds, 1e-3), most_bounces=0).position
         return there, gap, np.linalg.norm(velocity, axis=-1)
 
@@ -397,8 +234,8 @@ class _Search:
         self, points, velocities, now: _Change, start, cost, follows, fixed=(), near=False
     ) -> tuple[np.ndarray, np.ndarray]:
         """Changes (N, 9 + F) in all, and what they cost (N,), of parts at N releases, of which `now` is changed
-        already: the least with which the ball would hit if all went on along its slopes. near: the least away from `now`
-        instead, which comes to the target where the slopes do not hold for long."""
+        already: the least with which the ball would hit if all went on along its slopes. near: the least away from
+        `now` instead, which comes to the target where the slopes do not hold for long."""
         short, slopes, speed, faster = self._slopes(points, velocities, now, start, follows)
         count, size = len(points), len(now.row)
         weight = np.zeros((size, size))
@@ -444,7 +281,8 @@ class _Search:
 
     def _slopes(self, points, velocities, now: _Change, start, follows):
         """What is missing (N, 3 + G) to target and contact, how it changes (N, 3 + G, S) with the change, the ball's
-        speed (N,) and how that changes (N, S). `points`, `velocities`: as `now` has made them; follows: see `_Led`."""
+        speed (N,) and how that changes (N, S). `points`, `velocities`: as `now` has made them; follows: see
+        `LedLimb`."""
         count, size = len(points), len(now.row)
         each = size + 1
         nudge = _STEP * np.vstack([np.zeros(size), np.eye(size)])
@@ -452,8 +290,8 @@ class _Search:
         spread = [np.repeat(value, each, axis=0) for value in (points, velocities)]
         rest = start + now.rest + np.column_stack([nudge[:, 8:-1], np.zeros((len(nudge), 3 - (size - 9)))])
         there, gap, speed = self._arrives(
-            spread[0] + np.tensordot(nudge[:, :6], follows[0], 1), spread[1] + np.tensordot(nudge[:, :6], follows[1], 1),
-            nudge[:, 6],
+            *(value + np.tensordot(nudge[:, :6], part, 1) for value, part in zip(spread, follows)), nudge[:, 6],
+           
             nudge[:, 7] / (1.0 + now.pace), rest, now.seconds + nudge[:, -1],
         )  # fmt: skip
         missing = np.concatenate([there - self.target, gap], axis=1).reshape(count, each, -1)

@@ -72,7 +72,9 @@ def planned(examples: Sequence[Example], launches: np.ndarray, wish: Wish, seed:
     return _blended(taken, weights, pace, wish)
 
 
-def alike(examples: Sequence[Example], launches: np.ndarray, wish: Wish, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def alike(
+    examples: Sequence[Example], launches: np.ndarray, wish: Wish, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
     """Indices (N,) of the examples that are blended, nearest first, and their weights (N,), which sum to one."""
     usable = np.array([n for n, example in enumerate(examples) if example.limb == wish.limb], int)
     if not len(usable):

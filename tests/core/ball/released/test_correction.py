@@ -6,7 +6,8 @@ import pytest
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.impact import crossing
 from beyond_mocap.ball.physics import BASEBALL
-from beyond_mocap.ball.released.correction import Freedom, InHand, corrected, grip_point
+from beyond_mocap.ball.released.correction import Freedom, corrected
+from beyond_mocap.ball.released.letting_go import InHand, grip_point
 from beyond_mocap.ball.released.shift import shifts_about
 from beyond_mocap.errors import InputError
 from beyond_mocap.motion.humanoid import identify
