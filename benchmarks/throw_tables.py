@@ -1,0 +1,129 @@
+"""What the experiments with throws found, as tables: his 8.1 to 8.8 with ours, and all variants side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from beyond_mocap.evaluation.throws import fredriksson
+from beyond_mocap.evaluation.throws.subjects import EFFECTOR_NAMES, Subjects, gathered
+from beyond_mocap.evaluation.throws.tables import figure_table, test_table, verdicts
+
+from benchmarks import markdown
+from benchmarks.throw_runs import Scale, variants
+
+WORDS = {"planted": "Planted throws", "lmd": "Recorded kicks"}
+"""Data -> heading."""
+PAIRS = (
+    ("Tables 8.1 to 8.4: one network or six, nothing corrected", "hierarchy-raw", "single-raw", "first"),
+    ("Tables 8.5 to 8.8: phase-functioned or feed-forward, all corrected", "hierarchy", "feed-forward", "second"),
+    ("As many parameters: one network or six", "hierarchy-raw", "single-equal", ""),
+    ("As many parameters: phase-functioned or feed-forward", "hierarchy", "feed-forward-equal", ""),
+    ("His question of §9.2: one network with the end-effector loss against the same without", "single-effectors",
+     "single-raw", ""),
+    ("One network with the end-effector loss, or six", "hierarchy-raw", "single-effectors", ""),
+    ("Trained in order and fed back (§9.4) or each alone", "ours", "hierarchy", ""),
+    ("Inverse kinematics inside the loss or after the fact", "ours-ik", "ours", ""),
+    ("Phases warped in time (§9.3) or by travelled distance", "ours-warped", "ours", ""),
+)
+"""Heading, the new way, the old way, and which of his experiments it repeats."""
+_HIS = {"first": (fredriksson.HIERARCHY_RAW, fredriksson.SINGLE, fredriksson.FIRST),
+        "second": (fredriksson.HIERARCHY, fredriksson.FEED_FORWARD, fredriksson.SECOND), "": (None, None, None)}
+
+Found = Mapping[tuple[str, str, str], Mapping]
+"""(data, variant, subject) -> what its run found."""
+
+
+def document(found: Found, scale: Scale) -> list[str]:
+    """All tables of what is done."""
+    lines = [f"Scale {scale.name}: {scale.units} units a layer in the six networks, {2 * scale.units} in the one; "
+             f"{scale.epochs} epochs, {scale.epochs * 3 // 2} for the one; tested on "
+             f"{'all' if scale.motions is None else scale.motions} motions of each other subject."]
+    lines += ["", "### How all of them did", ""]
+    for data, heading in WORDS.items():
+        if any(key[0] == data for key in found):
+            lines += [f"**{heading}**", "", *overview(found, data, scale), ""]
+    for title, new, old, his in PAIRS:
+        part = [line for data in WORDS for line in pair(found, data, new, old, _HIS[his])]
+        if part:
+            lines += [f"### {title}", "", *part]
+    return lines + everyone(found)
+
+
+def of_variant(found: Found, data: str, variant: str) -> dict[str, Mapping]:
+    """Subject -> what was found, of one variant."""
+    return {subject: one for (kind, name, subject), one in sorted(found.items()) if (kind, name) == (data, variant)}
+
+
+def subjects(found: Found, data: str, variant: str) -> Subjects | None:
+    """The figures of one variant; None where nothing is done."""
+    rows = [(subject, np.array([each["deviation"] for each in one["each"]]).reshape(-1, 4),
+             np.array([np.nan if each["impact"] is None else each["impact"] for each in one["each"]]))
+            for subject, one in of_variant(found, data, variant).items() if one["each"]]
+    return gathered(variant, rows) if rows else None
+
+
+def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
+    """One experiment with one kind of data; nothing where one of the two is missing."""
+    ours, against = subjects(found, data, new), subjects(found, data, old)
+    if ours is None or against is None:
+        return []
+    his_new, his_old, printed = his if data == "planted" else (None, None, None)
+    lines = [f"**{WORDS[data]}**", ""]
+    if his[0] is not None:
+        lines += [f"`{old}`:", "", *figure_table(against, his_old), "", f"`{new}`:", "", *figure_table(ours, his_new), ""]
+    return [*lines, f"`{new}` - `{old}`:", "", *test_table(ours, against, printed), "",
+            *(f"{line}." for line in verdicts(ours, against)), ""]
+
+
+def overview(found: Found, data: str, scale: Scale) -> list[str]:
+    """One row per variant: means over its models."""
+    lines = markdown.head([
+        "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "impact, m", "head, °", "head turns",
+        "jerk", "beyond limits", "s for one", "parameters", "minutes to train", "models",
+    ])  # fmt: skip
+    for variant in variants(scale):
+        done = list(of_variant(found, data, variant.name).values())
+        if done:
+            lines.append(markdown.row([f"`{variant.name}`: {variant.words}", *_figures(done)]))
+    return lines
+
+
+def _figures(done: Sequence[Mapping]) -> list[str]:
+    def mean(values, form: str) -> str:
+        known = [value for value in values if value is not None]
+        return format(float(np.mean(known)), form) if known else "-"
+
+    limbs = [mean([_centimetres(one["deviation_m"][name]) for one in done], ".1f") for name in done[0]["deviation_m"]]
+    alone = [_centimetres(value) for one in done for value in one["network_deviation_m"].values()]
+    return [
+        *limbs, mean(alone, ".1f"), mean([one["impact_m"] for one in done], ".2f"),
+        mean([one["head"] for one in done], ".1f"), mean([one["head_share"] for one in done], ".2f"),
+        mean([one["jerk"] for one in done], ".2f"), mean([one["beyond"] for one in done], ".3f"),
+        mean([one["seconds"] for one in done], ".2f"), f"{int(np.mean([one['parameters'] for one in done])):,}",
+        mean([one["training"].get("minutes") for one in done], ".1f"), str(len(done)),
+    ]  # fmt: skip
+
+
+def _centimetres(value: float | None) -> float | None:
+    return None if value is None else 100.0 * value
+
+
+def everyone(found: Found) -> list[str]:
+    """Networks of one subject against networks of all others retargeted (§10.2), by the subject that is tested."""
+    lines = []
+    for data, heading in WORDS.items():
+        mine = subjects(found, data, "ours-everyone")
+        if mine is None or not of_variant(found, data, "ours"):
+            continue
+        rows = []
+        for tested in mine.subjects:
+            each = [e for one in of_variant(found, data, "ours").values() for e in one["each"] if e["subject"] == tested]
+            if each:
+                rows.append((tested, np.array([e["deviation"] for e in each]),
+                             np.array([np.nan if e["impact"] is None else e["impact"] for e in each])))
+        one = gathered("ours", rows)
+        lines += [f"**{heading}**, by the subject that is tested", "", *test_table(mine, one), "",
+                  *(f"{line}." for line in verdicts(mine, one)), ""]
+    return ["### One network from all others (§10.2) or from one of them", "", *lines] if lines else []
