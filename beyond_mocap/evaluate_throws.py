@@ -18,7 +18,7 @@ from .errors import Cancelled, InputError
 from .evaluation.jerk import jerk
 from .evaluation.throws.compare import kept
 from .evaluation.throws.deviation import deviations
-from .evaluation.throws.impact import impact, let_go
+from .evaluation.throws.impact import WALL, impact, let_go
 from .files.tables import plain
 from .motion import quaternion
 from .motion.humanoid import identify
@@ -35,7 +35,7 @@ RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
 """As tables 8.1 to 8.4 were measured: what networks say is fed back, nothing corrects it."""
 FULL = Options()
 """As tables 8.5 to 8.8: pose iterations, inverse kinematics, the blend of §7.7.3."""
-_OTHERS = ("own_impact", "head", "head_share", "jerk", "bones", "beyond", "seconds", "duration")
+_OTHERS = ("far_impact", "own_impact", "head", "head_share", "jerk", "bones", "beyond", "seconds", "duration")
 _WITHIN = 1e-3  # radians beyond a limit that are none
 
 
@@ -45,9 +45,9 @@ class ThrowFigures:
 
     name, subject: the example's. deviation (4,) m: mean distance of wrists and toes from where they were wanted, of the
     motion as it comes out. network (4,) m: the same of what the networks said in each frame, before anything corrected
-    it. impact m: from where the ball of the generated motion crosses the target's plane, or meets the ground, to where
-    the ball of the wanted one does; NaN without a hand that throws. own_impact m: from there to the example's target,
-    which tells how well the example knows its own. head: degrees between the head's rotations. head_share: how much the
+    it. impact m: from where the ball of the generated motion crosses a wall 4 m from the thrower (§8.2), or meets the
+    ground before, to where the ball of the wanted one does; NaN without a hand that throws. far_impact m: the same where
+    its target is. own_impact m: there, from the wanted ball to the target, which tells what scaling does to a flight. head: degrees between the head's rotations. head_share: how much the
     head turns against the chest, over how much the example's does. jerk: the 99th percentile of it over the example's.
     bones m: how much the longest-changing bone changes. beyond: share of rotations beyond the joints' limits, NaN
     where the model knows none. seconds: that it took, of `duration` s.
@@ -58,6 +58,7 @@ class ThrowFigures:
     deviation: np.ndarray
     network: np.ndarray
     impact: float
+    far_impact: float
     own_impact: float
     head: float
     head_share: float
@@ -145,31 +146,34 @@ def _measured(model: ThrowModel, example: Example, options: Options, ratio: floa
     description = scaled(describe(example), ratio)
     made = generate(model, description, options=options)
     came = made.predicted if made.floating is not None and not options.ik else made.effectors
-    there, own = _impacts(made.motion, came - made.effectors, example, ratio, description.impact)
+    near, far, own = _impacts(made.motion, came - made.effectors, example, ratio, description.impact)
     head, share = _head(made.motion, example.motion)
     return ThrowFigures(
         name=example.name, subject=example.subject,
         deviation=deviations(came, description.effectors),
         network=deviations(made.predicted, description.effectors),
-        impact=there, own_impact=own, head=head, head_share=share,
+        impact=near, far_impact=far, own_impact=own, head=head, head_share=share,
         jerk=_jerk(made.motion) / max(ratio * _jerk(example.motion), 1e-9), bones=_bones(model, made),
         beyond=_beyond(model, made.motion), seconds=made.seconds, duration=example.motion.duration,
     )  # fmt: skip
 
 
-def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, target) -> tuple[float, float]:
-    """m between the impacts of the generated and the wanted ball, and of the wanted one from the target; NaN for kicks.
+def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, target) -> tuple[float, float, float]:
+    """m between the impacts of the generated and the wanted ball on a wall at his 4 m and at the target, and of the
+    wanted one from the target; NaN for kicks.
 
     The wanted ball is the example's, scaled, in a hand as large as the model's. shift (T, 4, 3) m: how far from the
     motion's the effectors are."""
-    if example.limb > 1:
-        return np.nan, np.nan
+    if example.limb not in (0, 1):
+        return np.nan, np.nan, np.nan
     hand = hand_of(motion, ("left", "right")[example.limb])
     grip = usual_centre(hand.finger, hand.reach)
     mine, its = (chains_of(of.skeleton).effectors[example.limb] for of in (motion, example.motion))
-    came = impact(*let_go(motion, mine, grip, example.release, shift[:, example.limb]), target)
-    wanted = impact(*(ratio * part for part in let_go(example.motion, its, grip / ratio, example.release)), target)
-    return float(np.linalg.norm(came - wanted)), float(np.linalg.norm(wanted - target))
+    came = let_go(motion, mine, grip, example.release, shift[:, example.limb])
+    wanted = tuple(ratio * part for part in let_go(example.motion, its, grip / ratio, example.release))
+    near, far = np.array([WALL, 0.0, target[2]]), np.asarray(target)
+    off = [np.linalg.norm(impact(*came, there) - impact(*wanted, there)) for there in (near, far)]
+    return float(off[0]), float(off[1]), float(np.linalg.norm(impact(*wanted, far) - far))
 
 
 def _head(motion: Motion, truth: Motion) -> tuple[float, float]:

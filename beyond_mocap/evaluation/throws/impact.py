@@ -16,7 +16,7 @@ from ...motion.between_frames import cubic_at
 from ...motion.motion import Motion, pose_kinematics
 
 WALL = 4.0
-"""m from the thrower to the target, a square of 3 m (Fredriksson §8.2)."""
+"""m from the thrower to the target that all of his threw at, a square of 3 m (Fredriksson §8.2)."""
 _HALF = 0.02  # frames before and after the release between which the ball's velocity is read
 _LONGEST = 8.0  # s
 

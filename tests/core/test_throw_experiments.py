@@ -1,0 +1,108 @@
+"""The queue of experiments with throws: resumable after a kill, and its tables say what was planted."""
+
+import numpy as np
+import pytest
+
+from benchmarks.throw_linear import fitted, linear_model
+from benchmarks.throw_runs import PAPER, QUICK, Run, results, runs, variants, work_off
+from benchmarks.throw_tables import document
+from beyond_mocap.evaluation.throws import fredriksson
+from beyond_mocap.motion.throws import throw
+from beyond_mocap.synthesis.phase_network.example import example_of
+from beyond_mocap.synthesis.phase_network.model import ModelSettings
+from beyond_mocap.synthesis.phase_network.training_set import training_set, with_mirrors
+
+BY_NAME = {variant.name: variant for variant in variants(QUICK)}
+
+
+def silent(line):
+    pass
+
+
+def test_a_queue_that_is_killed_goes_on_where_it_was(tmp_path):
+    todo = list(runs([("planted", ("a", "b")), ("lmd", ("c",))], variants(QUICK)[:2]))
+    assert [(run.variant.name, run.data, run.subject) for run in todo[:4]] == [
+        ("hierarchy", "planted", "a"), ("hierarchy", "planted", "b"), ("hierarchy", "lmd", "c"),
+        ("feed-forward", "planted", "a"),
+    ]  # fmt: skip
+    did = []
+
+    def killed(run, out):
+        if len(did) == 3:
+            raise KeyboardInterrupt
+        did.append(run)
+        return {"model": out.name}
+
+    with pytest.raises(KeyboardInterrupt):
+        work_off(todo, tmp_path, killed, told=silent)
+    (tmp_path / "lmd" / "hierarchy" / "c.json").write_text("{")  # half a file, as nobody writes it here
+    again = []
+    assert work_off(todo, tmp_path, lambda run, out: again.append(run) or {}, told=silent) == 0
+    assert again == [todo[2], *todo[3:]] and set(results(tmp_path)) == {
+        (run.data, run.variant.name, run.subject) for run in todo}
+    assert results(tmp_path)["planted", "hierarchy", "a"]["model"] == "a.npz"
+    assert work_off(todo, tmp_path, killed, told=silent) == 0
+
+
+def test_no_run_is_begun_after_the_time_is_up(tmp_path):
+    todo = [Run("planted", BY_NAME["hierarchy"], name) for name in "ab"]
+    assert work_off(todo, tmp_path, lambda run, out: {}, until=0.0, told=silent) == 2
+    assert results(tmp_path) == {}
+
+
+def test_his_models_are_his():
+    his = {variant.name: variant.config for variant in variants(PAPER)}
+    assert (his["single-raw"]["layers"], his["single-raw"]["units"], his["single-raw"]["epochs"]) == (4, 512, 600)
+    assert (his["hierarchy"]["layers"], his["hierarchy"]["units"], his["hierarchy"]["epochs"]) == (3, 256, 400)
+    assert (his["feed-forward"]["layers"], his["feed-forward"]["points"]) == (8, 1)
+    assert {v.name for v in variants(PAPER) if not v.corrected} == {
+        "single-raw", "hierarchy-raw", "single-effectors", "single-equal"}
+    assert all(his[name]["wrist"] == "inferred" for name in ("single-raw", "hierarchy-raw"))
+    assert his["hierarchy"]["wrist"] == "given" and not his["hierarchy"]["conditioned"]
+
+
+def planted_run(deviation, impact):
+    """A run's JSON with these figures (4,) m and m in each of ten motions."""
+    each = [{"subject": f"s{i % 2}", "deviation": list(deviation), "impact": impact} for i in range(10)]
+    names = ("left_hand", "right_hand", "left_foot", "right_foot")
+    means = dict(zip(names, deviation, strict=True))
+    return {
+        "deviation_m": means, "network_deviation_m": means, "impact_m": impact, "head": 3.0, "head_share": 0.9,
+        "jerk": 1.1, "beyond": None, "seconds": 0.1, "parameters": 1000, "training": {"minutes": 1.0}, "each": each,
+    }  # fmt: skip
+
+
+def test_his_figures_put_in_come_out_with_his_p_values(tmp_path):
+    todo = [Run("planted", BY_NAME[name], subject) for name in ("hierarchy", "feed-forward") for subject in "1234"]
+    his = {"hierarchy": fredriksson.HIERARCHY, "feed-forward": fredriksson.FEED_FORWARD}
+
+    def do(run, out):
+        row = his[run.variant.name].figures[int(run.subject) - 1]
+        return planted_run(row[:4], row[4])
+
+    work_off(todo, tmp_path, do, told=silent)
+    text = "\n".join(document(results(tmp_path), QUICK))
+    assert "| p | **0.0065** | 0.0622 | **0.0063** | **0.0038** | **0.0136** |" in text
+    assert "| his p | 0.0064 | 0.0625 | 0.0064 | 0.0038 | 0.0136 |" in text
+    assert "### Tables 8.5 to 8.8" in text and "Tables 8.1" not in text
+    assert "better at 0.025 in left arm (p 0.0065), left leg (p 0.0063), right leg (p 0.0038), impact (p 0.0136)" in text
+
+
+def test_kicks_without_a_ball_have_no_impact(tmp_path):
+    todo = [Run("lmd", BY_NAME[name], s) for name in ("ours", "hierarchy", "ours-everyone") for s in ("s0", "s1")]
+    work_off(todo, tmp_path, lambda run, out: planted_run([0.02] * 4, None), told=silent)
+    lines = document(results(tmp_path), QUICK)
+    assert "| s0 | +0.0000 | +0.0000 | +0.0000 | +0.0000 | - |" in lines
+    assert "### One network from all others (§10.2) or from one of them" in lines
+
+
+def test_a_linear_map_is_a_network():
+    made = throw((10.0, 1.0, 1.0), 20.0, fps=120.0)
+    example = example_of("one", "ann", made.motion, "right_hand", made.release, (10.0, 1.0, 1.0))
+    settings = ModelSettings()
+    model = linear_model([example], settings)
+    inputs, answers, _ = training_set(with_mirrors([example]), settings)["left_leg"]
+    said = model.networks["left_leg"].predict(inputs, np.zeros(len(inputs)))
+    map_, mean_x, scale_x, mean_y, scale_y = fitted(inputs, answers)
+    assert said == pytest.approx(((inputs - mean_x) / scale_x) @ map_.T * scale_y + mean_y, abs=1e-4)
+    assert np.abs(said - answers).max() < 0.1
