@@ -18,7 +18,8 @@ from beyond_mocap.synthesis.phase_network.training_set import leg_reach, shared_
 
 LIFT = 256.0
 """Above any standardised answer, which ends some tens of deviations out."""
-RIDGE = 1.0
+RIDGE = 30.0
+"""Of standardised features: with 1 the maps follow one body so closely that they lose their way on another."""
 
 
 def linear_model(examples: Sequence[Example], settings: ModelSettings) -> ThrowModel:

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from beyond_mocap.files.whole import atomic_write
 
-HIS = {"conditioned": False, "ik_layer": False, "rollout": 1, "frame": "static", "phase": "distance", "noise": 0.0}
+HIS = {"conditioned": False, "ik_layer": False, "rollout": 1, "frame": "static", "phase": "distance", "noise": 0.0,
+       "linear_start": False}
 """What all of his models have in common (§7)."""
 
 

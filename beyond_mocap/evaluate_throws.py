@@ -45,7 +45,8 @@ class ThrowFigures:
 
     name, subject: the example's. deviation (4,) m: mean distance of wrists and toes from where they were wanted, of the
     motion as it comes out. network (4,) m: the same of what the networks said in each frame, before anything corrected
-    it. impact m: from where the ball of the generated motion crosses a wall 4 m from the thrower (§8.2), or meets the
+    it. body (4,) m: as deviation, but of a body with bones of constant length also where the joints of a single network
+    float, which `deviation` follows as his tables do. impact m: from where the ball of the generated motion crosses a wall 4 m from the thrower (§8.2), or meets the
     ground before, to where the ball of the wanted one does; NaN without a hand that throws. far_impact m: the same where
     its target is. own_impact m: there, from the wanted ball to the target, which tells what scaling does to a flight. head: degrees between the head's rotations. head_share: how much the
     head turns against the chest, over how much the example's does. jerk: the 99th percentile of it over the example's.
@@ -57,6 +58,7 @@ class ThrowFigures:
     subject: str
     deviation: np.ndarray
     network: np.ndarray
+    body: np.ndarray
     impact: float
     far_impact: float
     own_impact: float
@@ -88,6 +90,11 @@ class Evaluated:
         return np.array([one.network for one in self.motions]).reshape(-1, 4)
 
     @property
+    def body(self) -> np.ndarray:
+        """(N, 4) m, with bones of constant length."""
+        return np.array([one.body for one in self.motions]).reshape(-1, 4)
+
+    @property
     def impact(self) -> np.ndarray:
         """(N,) m."""
         return np.array([one.impact for one in self.motions])
@@ -100,6 +107,7 @@ class Evaluated:
             "subjects": sorted({one.subject for one in self.motions}),
             "deviation_m": dict(zip(EFFECTORS, _means(self.deviation), strict=True)),
             "network_deviation_m": dict(zip(EFFECTORS, _means(self.network), strict=True)),
+            "body_deviation_m": dict(zip(EFFECTORS, _means(self.body), strict=True)),
             "impact_m": _mean(self.impact[inside]),
             "impacts_culled": int(np.isfinite(self.impact).sum() - inside.sum()),
             **{name: _mean([getattr(one, name) for one in self.motions]) for name in _OTHERS},
@@ -152,6 +160,7 @@ def _measured(model: ThrowModel, example: Example, options: Options, ratio: floa
         name=example.name, subject=example.subject,
         deviation=deviations(came, description.effectors),
         network=deviations(made.predicted, description.effectors),
+        body=deviations(made.effectors, description.effectors),
         impact=near, far_impact=far, own_impact=own, head=head, head_share=share,
         jerk=_jerk(made.motion) / max(ratio * _jerk(example.motion), 1e-9), bones=_bones(model, made),
         beyond=_beyond(model, made.motion), seconds=made.seconds, duration=example.motion.duration,
