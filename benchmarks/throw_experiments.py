@@ -19,6 +19,8 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+
 from benchmarks import throw_folders
 from benchmarks.places import DATA, ROOT
 from benchmarks.throw_runs import PAPER, QUICK, Run, Scale, Variant, results, runs, variants, work_off
@@ -28,6 +30,8 @@ PAGE = ROOT / "docs" / "throw-experiments.md"
 BEGIN, END = "<!-- tables -->", "<!-- end of tables -->"
 PLANTED_SUBJECTS, PLANTED_THROWS, PLANTED_SEED = 4, 40, 1
 FPS = 30.0
+AROUND = {"planted": (1.6, 1.2), "lmd": (1.2, 0.8)}
+"""Data -> seconds before and after the release: what comes before and after is standing."""
 ACTIONS = {"planted": "throw", "lmd": "kick"}
 """Data -> what is done there."""
 
@@ -54,7 +58,24 @@ def examples_of(data: str, skeleton_of: str | None = None) -> tuple:
     skeleton = None
     if skeleton_of is not None:
         skeleton = next(e.motion.skeleton for e in examples_of(data) if e.subject == skeleton_of)
-    return tuple(examples_in(folder_of(data), ACTIONS[data], FPS, skeleton))
+    return tuple(cut(example, *AROUND[data]) for example in examples_in(folder_of(data), ACTIONS[data], FPS, skeleton))
+
+
+def cut(example, before: float, after: float):
+    """The example from so many seconds before its release to so many after; what windows see beyond stays known."""
+    from beyond_mocap.synthesis.phase_network.example import effectors_of
+
+    first = max(int(example.release - before * FPS), 0)
+    last = min(int(example.release + after * FPS) + 1, len(example.motion))
+    ways = effectors_of(example.motion)
+
+    def known(own, other, order):
+        return np.concatenate([part for part in ((other, own) if order else (own, other)) if part is not None])
+
+    return replace(
+        example, motion=example.motion.frames(first, last), release=example.release - first,
+        before=known(ways[:first], example.before, True), after=known(ways[last:], example.after, False),
+    )  # fmt: skip
 
 
 def subjects_of(data: str) -> tuple[str, ...]:
@@ -81,14 +102,19 @@ def _train(run: Run, out: Path, scale: Scale) -> dict:
 
     from beyond_mocap.files.network_npz import write_model
 
+    from benchmarks.throw_linear import linear_model
+
     given = _given(run)
     wished = {**run.variant.config, "action": ACTIONS[run.data], "fps": FPS}
     if run.variant.everyone:
         wished["epochs"] = max(1, wished["epochs"] // (len(subjects_of(run.data)) - 1))
     if wished["units"] == "equal":
         wished["units"] = equal_units(run, scale, given[0].motion.skeleton)
-    config = config_of(wished, run.variant.name)
+    config = config_of({**wished, "mirrored": False}, run.variant.name)  # all throw and kick with the same side
     begun = time.perf_counter()
+    if run.variant.linear:
+        write_model(linear_model(given, config.settings), out)
+        return {"config": config.flat(), "examples": len(given), "minutes": (time.perf_counter() - begun) / 60.0}
     model = train(given, config, checkpoint=out.with_suffix(".checkpoint.npz"),
                   resume=out.with_suffix(".checkpoint.npz").is_file())
     write_model(model, out)

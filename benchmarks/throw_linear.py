@@ -1,4 +1,5 @@
-"""What plain linear regression makes of the features, as a yardstick for the networks: it is learnt in a second.
+"""What plain linear regression makes of the features, with and without phases, as a yardstick for the networks: it is
+learnt in a second, and has nothing to do with how long anything was trained.
 
 A linear map is written as a network of one hidden layer whose units are lifted so far above zero that the ELU passes
 them on unchanged.
@@ -7,48 +8,46 @@ them on unchanged.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from beyond_mocap.synthesis.phase_network import phase_function
 from beyond_mocap.synthesis.phase_network.example import Example
 from beyond_mocap.synthesis.phase_network.limits import learn
 from beyond_mocap.synthesis.phase_network.model import ModelSettings, ThrowModel
 from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
-from beyond_mocap.synthesis.phase_network.training_set import leg_reach, shared_chains, training_set, with_mirrors
+from beyond_mocap.synthesis.phase_network.training_set import TrainingSet, leg_reach, shared_chains, training_set
 
 LIFT = 256.0
 """Above any standardised answer, which ends some tens of deviations out."""
-RIDGE = 30.0
-"""Of standardised features: with 1 the maps follow one body so closely that they lose their way on another."""
 
 
 def linear_model(examples: Sequence[Example], settings: ModelSettings) -> ThrowModel:
-    """The hierarchy of `settings` with linear maps in place of its networks, by ridge regression."""
-    seen = with_mirrors(examples)
-    chains = shared_chains(seen)
-    found = {name: fitted(one.inputs, one.answers) for name, one in training_set(seen, settings).items()}
-    units = max(len(map_) for map_, *_ in found.values())
-    own = ModelSettings(**{**vars(settings), "points": 1, "layers": 1, "units": units})
-    limits = learn(np.concatenate([one.motion.rotations for one in seen]), (0, *chains.above, chains.hips))
+    """The model of `settings` with linear maps in place of its networks, by the ridge regression that trainings start
+    from."""
+    chains = shared_chains(examples)
+    learnt = training_set(examples, settings)
+    units = max(one.answers.shape[1] for one in learnt.values())
+    networks = {name: _network(one, settings.points, units) for name, one in learnt.items()}
     return ThrowModel(
-        own, chains.skeleton, {name: _network(*one, units) for name, one in found.items()}, leg_reach(seen),
-        tuple(examples), float(np.mean([one.stature for one in examples])), limits, None,
-        f"{len(examples)} examples, linear regression",
+        settings=replace(settings, layers=1, units=units), skeleton=chains.skeleton, networks=networks,
+        leg_reach=leg_reach(examples), examples=tuple(examples),
+        stature=float(np.mean([one.stature for one in examples])),
+        joint_limits=learn(np.concatenate([one.motion.rotations for one in examples]), (0, *chains.above, chains.hips)),
+        trained_on=f"{len(examples)} examples, linear regression",
     )  # fmt: skip
 
 
-def fitted(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The map (out, in) between standardised columns, with their means and scales: map, mean x, scale x, mean y,
-    scale y."""
-    mean_x, scale_x, mean_y, scale_y = x.mean(0), x.std(0) + 1e-3, y.mean(0), y.std(0) + 1e-3
-    x, y = (x - mean_x) / scale_x, (y - mean_y) / scale_y
-    return np.linalg.solve(x.T @ x + RIDGE * np.eye(x.shape[1]), x.T @ y).T, mean_x, scale_x, mean_y, scale_y
+def _network(learnt: TrainingSet, points: int, units: int) -> PhaseNetwork:
+    """The map that answers best, its control points weighted by the phase."""
+    from training.networks import linear_start, scales_of
 
-
-def _network(map_, mean_x, scale_x, mean_y, scale_y, units: int) -> PhaseNetwork:
-    out = len(map_)
-    first = np.zeros((units, map_.shape[1]))
-    first[:out] = map_
-    second = np.eye(out, units)
-    return PhaseNetwork((first[None], second[None]), (np.full((1, units), LIFT), np.full((1, out), -LIFT)),
-                        mean_x, scale_x, mean_y, scale_y)  # fmt: skip
+    (mean_x, scale_x), (mean_y, scale_y) = scales_of(learnt.inputs), scales_of(learnt.answers)
+    theta = phase_function.weights(learnt.phases, points)
+    found = linear_start((learnt.inputs - mean_x) / scale_x, (learnt.answers - mean_y) / scale_y, theta)
+    out, width = found.weights.shape[1:]
+    first, bias = np.zeros((points, units, width)), np.full((points, units), LIFT)
+    first[:, :out], bias[:, :out] = found.weights, found.biases + LIFT
+    second = np.tile(np.eye(out, units), (points, 1, 1))
+    return PhaseNetwork((first, second), (bias, np.full((points, out), -LIFT)), mean_x, scale_x, mean_y, scale_y)

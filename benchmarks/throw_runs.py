@@ -24,41 +24,49 @@ HIS = {"conditioned": False, "ik_layer": False, "rollout": 1, "frame": "static",
 class Variant:
     """name: in file names and tables. words: what it is, for people. config: names of `training.config`. corrected:
     whether it is tested with pose iterations and inverse kinematics (tables 8.5 to 8.8) or without (8.1 to 8.4).
-    everyone: trained on all subjects but the one that it is tested on."""
+    everyone: trained on all subjects but the one that it is tested on. linear: linear maps in place of networks."""
 
     name: str
     words: str
     config: dict
     corrected: bool
     everyone: bool = False
+    linear: bool = False
 
 
 @dataclass(frozen=True)
 class Scale:
-    """How large: units of the hierarchy's layers (the single network has twice as many, as his), epochs, motions of each
-    subject that are tested, None for all."""
+    """How large: units of the hierarchy's layers (the single network has twice as many, as his), epochs, frames in a
+    batch, motions of each subject that are tested, None for all."""
 
     name: str
     units: int
     epochs: int
+    batch: int
     motions: int | None
 
 
-PAPER = Scale("paper", 256, 400, None)
-"""His sizes and macro-epochs (§7.6; 600 epochs for the single network)."""
-QUICK = Scale("quick", 64, 40, 6)
+PAPER = Scale("paper", 256, 400, 32, None)
+"""His sizes, macro-epochs and batches (§7.6; 600 epochs for the single network)."""
+QUICK = Scale("quick", 64, 40, 128, 6)
 
 
 def variants(scale: Scale) -> tuple[Variant, ...]:
     """All variants, in the order in which they are worked off."""
-    few, many = {"units": scale.units, "epochs": scale.epochs}, {"units": 2 * scale.units, "layers": 4,
-                                                                 "epochs": scale.epochs * 3 // 2}
+    few = {"units": scale.units, "epochs": scale.epochs, "batch": scale.batch}
+    many = {"units": 2 * scale.units, "layers": 4, "epochs": scale.epochs * 3 // 2, "batch": scale.batch}
     dropped = {"keep": 0.7}
     first = {**HIS, **dropped, "wrist": "inferred"}
     second = {**HIS, **dropped, "wrist": "given"}
     single = {**first, **many, "kind": "single"}
     ours = {"conditioned": True, "rollout": 8, "frame": "hip", "keep": 1.0, "noise": 0.02, "wrist": "given", **few}
+    plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1}
     return (
+        *(Variant(name, words, {**plain, **changes}, not name.endswith("raw"), linear=True) for name, words, changes in (
+            ("linear", "six linear maps", {"points": 1}), ("linear-phased", "six linear maps, by phase", {}),
+            ("linear-raw", "six linear maps", {"points": 1}), ("linear-phased-raw", "six linear maps, by phase", {}),
+            ("linear-single-raw", "one linear map, by phase", {"kind": "single"}),
+        )),
         Variant("hierarchy", "six phase-functioned networks, wrists given", {**second, **few, "layers": 3}, True),
         Variant("feed-forward", "six feed-forward networks, wrists given",
                 {**second, **few, "layers": 8, "points": 1}, True),

@@ -18,6 +18,9 @@ WORDS = {"planted": "Planted throws", "lmd": "Recorded kicks"}
 PAIRS = (
     ("Tables 8.1 to 8.4: one network or six, nothing corrected", "hierarchy-raw", "single-raw", "first"),
     ("Tables 8.5 to 8.8: phase-functioned or feed-forward, all corrected", "hierarchy", "feed-forward", "second"),
+    ("Linear maps with phases or without", "linear-phased", "linear", ""),
+    ("The same, nothing corrected", "linear-phased-raw", "linear-raw", ""),
+    ("Six linear maps or one, nothing corrected", "linear-phased-raw", "linear-single-raw", ""),
     ("As many parameters: one network or six", "hierarchy-raw", "single-equal", ""),
     ("As many parameters: phase-functioned or feed-forward", "hierarchy", "feed-forward-equal", ""),
     ("His question of §9.2: one network with the end-effector loss against the same without", "single-effectors",
@@ -38,7 +41,7 @@ Found = Mapping[tuple[str, str, str], Mapping]
 def document(found: Found, scale: Scale) -> list[str]:
     """All tables of what is done."""
     lines = [f"Scale {scale.name}: {scale.units} units a layer in the six networks, {2 * scale.units} in the one; "
-             f"{scale.epochs} epochs, {scale.epochs * 3 // 2} for the one; tested on "
+             f"{scale.epochs} epochs, {scale.epochs * 3 // 2} for the one, batches of {scale.batch} frames; tested on "
              f"{'all' if scale.motions is None else scale.motions} motions of each other subject."]
     lines += ["", "### How all of them did", ""]
     for data, heading in WORDS.items():
@@ -80,7 +83,7 @@ def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
 def overview(found: Found, data: str, scale: Scale) -> list[str]:
     """One row per variant: means over its models."""
     lines = markdown.head([
-        "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "impact, m", "head, °", "head turns",
+        "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "as a body, cm", "impact, m", "head, °", "head turns",
         "jerk", "beyond limits", "s for one", "parameters", "minutes to train", "models",
     ])  # fmt: skip
     for variant in variants(scale):
@@ -96,9 +99,10 @@ def _figures(done: Sequence[Mapping]) -> list[str]:
         return format(float(np.mean(known)), form) if known else "-"
 
     limbs = [mean([_centimetres(one["deviation_m"][name]) for one in done], ".1f") for name in done[0]["deviation_m"]]
-    alone = [_centimetres(value) for one in done for value in one["network_deviation_m"].values()]
+    alone, body = ([_centimetres(value) for one in done for value in one[key].values()]
+                   for key in ("network_deviation_m", "body_deviation_m"))
     return [
-        *limbs, mean(alone, ".1f"), mean([one["impact_m"] for one in done], ".2f"),
+        *limbs, mean(alone, ".1f"), mean(body, ".1f"), mean([one["impact_m"] for one in done], ".2f"),
         mean([one["head"] for one in done], ".1f"), mean([one["head_share"] for one in done], ".2f"),
         mean([one["jerk"] for one in done], ".2f"), mean([one["beyond"] for one in done], ".3f"),
         mean([one["seconds"] for one in done], ".2f"), f"{int(np.mean([one['parameters'] for one in done])):,}",
