@@ -205,7 +205,7 @@ def _header_text(arrays: dict[str, np.ndarray]) -> str:
 
 def _settings(row) -> ModelSettings:
     names = [field.name for field in fields(ModelSettings)]
-    check_names(row, "settings", names, names)
+    check_names(row, "settings", names, [name for name in names if name != "guided"])
     return ModelSettings(**row)
 
 

@@ -23,18 +23,24 @@ Where the text leaves something open, this is what was decided:
   and the body's joints except the reference itself, a_k¹ those of hips and body.
 - **Leg**: p_i¹ are the head and both shoulders (upper arms), a_k¹ six joints of the body: lowest, chest, both joints
   that carry the arms, neck, head.
+- **Guided** (`guided`, ours; §9.3 wished for networks that know inverse kinematics): limbs are also told the rotations
+  r by which the limb of frame n, as it hangs on its reference in n + 1, would reach the wanted place (`reached`). The
+  network says what it wants with them; nothing is corrected afterwards.
 - **Wrist inferred**: no r¹, and the hand's relative rotation joins those of the arm, in input and output.
 - **Phase**: of a leg, that of d in n + 1, which stands in the input; of all others the motion phase of frame n.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from .answers import network_output, origin, predicted
 from .chains import LIMB_OF, Chains
 from .description import Windows
-from .kinematics import Pose, flat, picked, pose_of, six, transposed
+from .kinematics import Pose, flat, picked, pose_of, six, spread, transposed
+from .limb_reach import bent_limb, hinge_axes
 from .model import SINGLE, ModelSettings
 from .phases import distance_phase
 
@@ -49,8 +55,12 @@ def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose
         return body_input(chains, pose, after, window, xp)
     number = LIMB_OF.index(name)
     if number < 2:
-        return arm_input(number, chains, settings, pose, after, window, xp)
-    return leg_input(number, chains, pose, after, window, xp)
+        x = arm_input(number, chains, settings, pose, after, window, xp)
+    else:
+        x = leg_input(number, chains, pose, after, window, xp)
+    if not settings.guided:
+        return x
+    return xp.concatenate([x, reached(number, chains, settings, pose, after, window, xp)], axis=-1)
 
 
 def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
@@ -124,6 +134,22 @@ def leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Wind
         flat(frame.places(picked(after.positions, others, -2, xp)), 2),
         flat(six(frame.turns(picked(after.turns, chains.leg_sees, -3, xp)), xp), 2),
     ], axis=-1)  # fmt: skip
+
+
+def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
+    """Relative rotations (..., 6 each) that two-bone inverse kinematics gives the limb of frame n for the place where its
+    end is wanted in n + 1: of the joints that its network speaks of."""
+    name = LIMB_OF[number]
+    local = {joint: pose.local[..., joint, :, :] for joint in chains.members[name]}
+    limb = spread(chains.skeleton, after, chains.known[name], after.root, local, {}, xp)
+    bent = bent_limb(number, chains, limb, window.next[..., number, :], 1.0, _hinges(chains), True, xp)
+    return flat(six(picked(bent.local, predicted(name, chains, settings), -3, xp), xp), 2)
+
+
+@lru_cache(maxsize=16)
+def _hinges(chains: Chains) -> np.ndarray:
+    """Axes (4, 3) of elbows and knees; they count where a limb is straight."""
+    return hinge_axes(chains, None)
 
 
 def widths(chains: Chains, settings: ModelSettings) -> dict[str, tuple[int, int]]:

@@ -74,15 +74,24 @@ class LimbReach:
         target = toward(tip, wanted, share[:, None]) - (tip - end)
         given = self._give(places[self._upper], end, target)
         places, end, root = places + given, end + given, pose.root + given
+        return posed(self.chains, root, self._bent(pose.local, places, turns, end, target))
+
+    def all_the_way(self, pose: Pose, wanted: np.ndarray) -> np.ndarray:
+        """Local rotations (J, 3, 3) of the pose with its effectors brought to wanted (4, 3) m, as near as limbs reach."""
+        tip, end = pose.positions[self._tip], pose.positions[self._end]
+        return self._bent(pose.local, pose.positions, pose.turns, end, wanted - (tip - end))
+
+    def _bent(self, local, places, turns, end, target) -> np.ndarray:
+        """Local rotations that bring the limbs' ends from `end` (4, 3) m to `target` (4, 3) m."""
         hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
         first, second, _ = bend_to(places[self._upper], places[self._middle], end, target, hinge, np)
-        local = pose.local.copy()
+        local = local.copy()
         local[self._upper] = transposed(turns[self._above_upper]) @ first @ turns[self._upper]
         bent = transposed(first @ turns[self._above_middle])
         local[self._middle] = bent @ second @ turns[self._middle]
         carried = transposed(second @ turns[self._above_end])
         local[[self._end[n] for n in self._kept]] = (carried @ turns[self._end])[self._kept]
-        return posed(self.chains, root, local)
+        return local
 
     def _way_down(self, high: list[int], low: list[int]) -> np.ndarray:
         """Lengths (4,) m of bones from joints down to others, joints between them at rest."""

@@ -9,6 +9,7 @@ from .answers import predicted
 from .chains import HIERARCHY, LIMB_OF, Chains
 from .description import Windows
 from .kinematics import Pose
+from .limb_reach import LimbReach
 from .model import ThrowModel
 from .phase_function import weights_at
 
@@ -36,6 +37,7 @@ class OneFrame:
         self.sockets, self.trunk = list(chains.sockets), list(chains.trunk)
         self.others = [[self.trunk.index(joint) for joint in seen] for seen in chains.arm_sees]
         self.leg_sees = list(chains.leg_sees)
+        self.guide = LimbReach(chains, None, True) if settings.guided else None
 
     def __call__(self, pose: Pose, window: Windows) -> Pose:
         """Frame n + 1 from the state and the window of n, both of one frame. `moved` stays that of n."""
@@ -98,14 +100,24 @@ class OneFrame:
         others = *(trunk[arm, self.others[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
         turns = *_six(back[:2, None] @ after.turns[self.trunk]), *_six(back[2:, None] @ after.turns[self.leg_sees])
         hands = _six(back[:2] @ window.hands_next) if self.given else ()
-        answers = []
+        answers, guides = [], self._guides(after, window)
         for number, network in enumerate(self.networks[2:]):
             arm = number < 2
             x = _row(*([window.sides] if arm else []), ways[number], turned[number],
                      *([hands[number]] if arm and self.given else []), stretch[number : number + 1],
-                     relative[self.said[2 + number]], others[number], turns[number])  # fmt: skip
+                     relative[self.said[2 + number]], others[number], turns[number], *guides[number])  # fmt: skip
             answers.append(network(x, theta if arm else self._leg_theta(number, stretch[number])))
         return np.concatenate(answers)
+
+    def _guides(self, after: Pose, window: Windows) -> list[list[np.ndarray]]:
+        """Of each limb what `features.reached` says, nothing where the model is not guided. The limbs in `after` are
+        left as they hang on the body of the next frame with the rotations of this one."""
+        if self.guide is None:
+            return [[]] * 4
+        for name in LIMB_OF:
+            _spread(self.plans[name], after, {})
+        sixes = _six(self.guide.all_the_way(after, window.next))
+        return [[sixes[said]] for said in self.said[2:]]
 
     def _leg_theta(self, number: int, stretch: float) -> np.ndarray:
         """Control point weights of a leg that reaches `stretch` metres (eq. 7.3)."""

@@ -251,6 +251,22 @@ def test_examples_that_make_no_sense_are_refused(made):
     assert isinstance(example_of("t", "s", made.motion, 1, 0.0, TARGET), Example)
 
 
+@pytest.mark.parametrize("wrist", WRISTS)
+def test_a_guided_limb_is_told_how_to_reach(example, wrist):
+    """The rotations it is told bring hand and foot to where they are wanted, from the body of the next frame."""
+    chains, settings = chains_of(example.motion.skeleton), ModelSettings(wrist=wrist, guided=True)
+    pose, truth, window = steps(example)
+    for number, name in enumerate(LIMB_OF):
+        x = network_input(name, chains, settings, pose, truth, window)
+        plain = network_input(name, chains, ModelSettings(wrist=wrist), pose, truth, window)
+        assert np.array_equal(x[:, : plain.shape[1]], plain)
+        after = answered(name, chains, settings, x[:, plain.shape[1] :], pose, truth, window)
+        off = np.linalg.norm(after.positions[:, chains.effectors[number]] - window.next[:, number], axis=-1)
+        assert off.max() < 0.02 and np.median(off) < 1e-3
+        moved = np.linalg.norm(pose.positions - truth.positions, axis=-1)[:, chains.effectors[number]]
+        assert moved.max() > 0.05
+
+
 def test_a_neck_without_a_head_is_of_the_body(made):
     skeleton = made.motion.skeleton
     without, _ = skeleton.part([i for i, name in enumerate(skeleton.names) if name != "Head"])

@@ -92,6 +92,7 @@ def test_one_pose_at_once_is_the_same_kinematics(plain_and_dressed, which):
 @pytest.mark.parametrize("which", [0, 1])
 @pytest.mark.parametrize("settings", [
     {}, {"wrist": "inferred"}, {"frame": "static"}, {"points": 1}, {"wrist": "inferred", "frame": "static", "points": 5},
+    {"guided": True}, {"guided": True, "wrist": "inferred"},
 ])
 def test_it_says_what_the_plain_functions_say(plain_and_dressed, which, settings):
     example = plain_and_dressed[which]
