@@ -52,13 +52,12 @@ class Stepper:
         after, floating = self.predicted(pose, window)
         said = after.positions[self.effectors] if floating is None else self._said(floating)
         over = np.zeros(len(self.model.skeleton))
-        if limited:
+        if limited and share is None:
             after, over = self._limited(after)
-        if share is not None:
+        elif limited:
+            after, over = self._within_reach(after, wanted, share)
+        elif share is not None:
             after = self.reach(after, wanted, share)
-            if limited:
-                after, more = self._limited(after)
-                over = np.maximum(over, more)
         state = after if floating is None or share is not None else self._afloat(after, floating)
         return Step(after, state._replace(moved=state.positions - pose.positions), said, over, floating)
 
@@ -79,6 +78,15 @@ class Stepper:
         places = pose.positions.copy()
         places[list(self.chains.joints)] = floating
         return pose._replace(positions=places)
+
+    def _within_reach(self, after: Pose, wanted: np.ndarray, share: np.ndarray) -> tuple[Pose, np.ndarray]:
+        """The pose with limbs that reach and joints within their limits; where a limit has a say, limbs reach again with
+        what is left to them."""
+        after, over = self._limited(self.reach(after, wanted, share))
+        if over.max() > 0.0:
+            after, more = self._limited(self.reach(after, wanted, share))
+            over = np.maximum(over, more)
+        return after, over
 
     def _limited(self, pose: Pose) -> tuple[Pose, np.ndarray]:
         local, over = self.limits.within(pose.local)
