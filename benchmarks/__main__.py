@@ -3,7 +3,7 @@
 Everything of one run is measured in one process on one core; seconds are the best of three. Written to
 benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
 `--compare` measures instead what is decided once, `--paths` recordings on other paths, `--ball` the ball and who
-touches it, `--markers` optical recordings, and writes that section anew. A Blender measures with the numpy that it has:
+touches it, `--markers` optical recordings, `--throws` thrown and kicked balls, and writes that section anew. A Blender measures with the numpy that it has:
 `blender -b --python benchmarks/__main__.py -- --out FILE`.
 """
 
@@ -28,7 +28,7 @@ from beyond_mocap.library.library import Library, build  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesize import synthesize  # noqa: E402
 
-from benchmarks import ball, compare, effort, markdown, markers, misses, paper, path_editing  # noqa: E402
+from benchmarks import ball, compare, effort, markdown, markers, misses, paper, path_editing, throws  # noqa: E402
 from benchmarks.edit_time import edit_times  # noqa: E402
 from benchmarks.places import DATA, LIBRARIES, ROOT, library_folder, scenario  # noqa: E402
 
@@ -38,7 +38,9 @@ METHODS = {
     "distance": {"method": "distance"},
     "path": {"method": "path"},
 }
-COMPARED, PATHS, BALL, MARKERS = "## Compared once", "## Path editing", "## The ball", "## Markers"
+COMPARED, PATHS, BALL, MARKERS, THROWS = (
+    "## Compared once", "## Path editing", "## The ball", "## Markers", "## Throws and kicks",
+)  # fmt: skip
 KEY_COLUMNS = (
     "time_s", "labels", "clip", "time_error_s", "position_error_m", "contact_gap_m", "ball_shift_m", "used_instead",
 )
@@ -145,7 +147,7 @@ def sections(path: Path) -> dict[str, list[str]]:
     """The lines of results written before by the heading of their section; "" is all before the first of these."""
     found: dict[str, list[str]] = {"": []}
     for line in path.read_text().splitlines() if path.is_file() else []:
-        if line in (PATHS, BALL, MARKERS, COMPARED):
+        if line in (PATHS, BALL, MARKERS, THROWS, COMPARED):
             found[line] = []
         list(found.values())[-1].append(line)
     return found
@@ -160,6 +162,7 @@ def main() -> int:
     options.add_argument("--paths", action="store_true", help="recordings on other paths, instead of the scenarios")
     options.add_argument("--ball", action="store_true", help="the ball and who touches it, instead of the scenarios")
     options.add_argument("--markers", action="store_true", help="optical markers, instead of the scenarios")
+    options.add_argument("--throws", action="store_true", help="throws and kicks, instead of the scenarios")
     options.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
     chosen = options.parse_args(arguments)
@@ -176,12 +179,14 @@ def main() -> int:
         made = {BALL: [BALL, *begin, *ball.section(), ""]}
     elif chosen.markers:
         made = {MARKERS: [MARKERS, *begin, *markers.section(), ""]}
+    elif chosen.throws:
+        made = {THROWS: [THROWS, *begin, *throws.section(), ""]}
     else:
         made = {PATHS: [PATHS, *begin, *path_editing.section(), ""]}
         if not chosen.paths:
             made = {"": bench(chosen.scenarios, chosen.library, command), **made}
     parts |= made
-    whole = [line for name in ("", PATHS, BALL, MARKERS, COMPARED) for line in parts.get(name, [])]
+    whole = [line for name in ("", PATHS, BALL, MARKERS, THROWS, COMPARED) for line in parts.get(name, [])]
     chosen.out.write_text("\n".join(whole).rstrip() + "\n")
     print("\n".join(line for lines in made.values() for line in lines))
     return 0

@@ -131,8 +131,8 @@ def _given(run: Run) -> list:
 
 
 def parameters_of(model) -> int:
-    """Numbers in all networks."""
-    return sum(part.size for network in model.networks.values() for part in (*network.weights, *network.biases))
+    """Numbers in all networks that are not nothing."""
+    return sum(int(np.count_nonzero(part)) for network in model.networks.values() for part in (*network.weights, *network.biases))
 
 
 def equal_units(run: Run, scale: Scale, skeleton) -> int:
