@@ -44,6 +44,7 @@ NEAREST = 1.5
 """Metres over the ground from body to target, at least."""
 _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be asked for
 _MORE = 1.04  # times the slowest launch that reaches the target, at least
+_TOLD_BEYOND = np.radians(2.0)
 _ROUNDS = 6  # of finding where the body begins
 _GOES_ON = 1.0  # s that the ball is followed behind its target
 
@@ -325,10 +326,9 @@ class _Work:
         if asked and asked < slowest:
             raise InputError("speed", f"{asked:.1f} m/s", f"{slowest:.1f} m/s or more to get there", "ask for more")
         if max(slowest, asked) > _BEYOND_EXAMPLES * own:
-            raise InputError(
-                "target", f"that takes {max(slowest, asked):.0f} m/s", f"at most {_BEYOND_EXAMPLES * own:.0f} m/s: the "
-                f"model's fastest example has {own:.0f}", "choose a nearer target, or train on faster ones",
-            )  # fmt: skip
+            what, found = ("speed", f"{asked:.0f} m/s") if asked else ("target", f"that takes {slowest:.0f} m/s")
+            most = f"at most {_BEYOND_EXAMPLES * own:.0f} m/s: the model's fastest example has {own:.0f}"
+            raise InputError(what, found, most, "ask for less, or train on faster ones")
 
     def _wish(self, own: list[int], ahead: float) -> Wish:
         """The launch asked for, or of those that reach the target the one most like an example."""
@@ -395,12 +395,13 @@ class _Work:
         launch = Launch(start + left, found.position, found.velocity, found.spin)
         flight = fly(launch, self.ball, found.seconds + _GOES_ON + found.motion.duration)
         impact = crossing(flight, self.target)
-        self._tell(found, impact)
+        beyond = self._beyond(found.motion)
+        self._tell(found, impact, beyond)
         return Thrown(
             found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
             ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
             found.moved, found.shift, found.turned, found.pace, found.later, self.arcs.slowest,
-            self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw, self._beyond(found.motion),
+            self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw, beyond,
             tuple(zip(plan.names, map(float, plan.weights))), tuple(self.warnings),
         )  # fmt: skip
 
@@ -413,7 +414,7 @@ class _Work:
         over = JointLimits(motion.skeleton, self.model.joint_limits).beyond(quaternion.to_matrix(motion.rotations))
         return float(over[:, list(part_of(motion.skeleton, self.limb, self.ball).chain(motion))].max())
 
-    def _tell(self, found: Corrected, impact: np.ndarray) -> None:
+    def _tell(self, found: Corrected, impact: np.ndarray, beyond: float) -> None:
         """Lines about what people should know."""
         error = float(np.linalg.norm(impact - self.target))
         what, speed = ("ankle" if self.kicks else "wrist"), float(np.linalg.norm(found.velocity))
@@ -422,6 +423,8 @@ class _Work:
             self.warnings.append(f"the ball misses the target {missed}: the body does not reach what that takes")
         if found.moved > 0.05:
             self.warnings.append(f"the {what} was moved by {100 * found.moved:.0f} cm so that the ball hits")
+        if beyond > _TOLD_BEYOND:
+            self.warnings.append(f"a joint bends {np.degrees(beyond):.0f} degrees further than in any of the examples")
         if self.order.speed and abs(speed - self.order.speed) > 0.1 * self.order.speed:
             self.warnings.append(f"the ball leaves at {speed:.1f} m/s, {self.order.speed:.1f} were asked for")
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from beyond_mocap.ball.made_kicks import kick
 from beyond_mocap.errors import InputError
 from beyond_mocap.motion.throws import throw
 from beyond_mocap.synthesis.phase_network.example import example_of
@@ -25,6 +26,21 @@ def planted_examples(count=12, seed=0, fps=30.0):
         span = (made.release - 1.2, made.release + 0.8)
         found.append(example_of(f"throw{len(found)}", "one", made.motion, "right_hand", made.release,
                                 (far, 0.0, high), made.velocity, fps, span))  # fmt: skip
+    return tuple(found)
+
+
+def planted_kicks(count=5, seed=0, fps=30.0):
+    """Made kicks of one body at known targets, in the normalised frame."""
+    random, found = np.random.default_rng(seed), []
+    while len(found) < count:
+        target = (random.uniform(9, 16), 0.0, random.uniform(0.3, 1.2))
+        try:
+            made = kick(target, random.uniform(18, 24), fps=120.0)
+        except InputError:
+            continue
+        span = (made.contact - 1.0, made.contact + 0.7)
+        found.append(example_of(f"kick{len(found)}", "one", made.motion, "right_foot", made.contact, target,
+                                made.velocity, fps, span))  # fmt: skip
     return tuple(found)
 
 

@@ -17,7 +17,7 @@ from beyond_mocap.joined_throw import laid_into, standing
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.throw import Order, throw_at, within
-from tests.core.linear_throws import linear_model, planted_examples
+from tests.core.linear_throws import linear_model, planted_examples, planted_kicks
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +65,30 @@ def test_the_ball_is_held_and_then_flies(model):
     steps = np.linalg.norm(np.diff(thrown.path.positions, axis=0), axis=1) * thrown.motion.fps
     assert abs(steps[frames[-1]] - thrown.speed) < 0.15 * thrown.speed
     assert np.all(np.diff(thrown.path.times) > 0.0) and thrown.path.times[-1] > thrown.release_time + 0.5
+
+
+@pytest.fixture(scope="module")
+def kicking():
+    return linear_model(planted_kicks(), "kick", 30.0)
+
+
+@pytest.mark.parametrize("order", [
+    Order((11.0, 2.0, 0.9), ball_place=(1.0, 1.0)), Order((-4.0, 10.0, 0.3), limb="left_foot", ball_place=(0.0, 0.0)),
+    Order((12.0, 0.0, 0.8)),
+], ids=["ball", "left", "free"])  # fmt: skip
+def test_a_kick_hits_and_the_ball_lies_where_it_is_told(kicking, order):
+    thrown = throw_at(kicking, order)
+    assert thrown.impact_error < 0.02 and thrown.moved < 0.06 and thrown.grip is None
+    lies = thrown.path.positions[thrown.path.times <= thrown.release_time]
+    assert np.ptp(lies, axis=0).max() == 0.0 and np.isclose(lies[0, 2], thrown.ball.radius)
+    if order.ball_place is not None:
+        assert np.allclose(lies[0, :2], order.ball_place)
+    assert np.abs(thrown.launch.spin).max() > 5.0
+
+
+def test_a_model_of_kicks_does_not_throw(kicking):
+    with pytest.raises(InputError, match="trained for kicks"):
+        throw_at(kicking, Order((12.0, 0.0, 1.0), limb="right_hand"))
 
 
 def test_the_same_order_gives_the_same_bits_and_a_seed_another_motion(model):
