@@ -16,7 +16,7 @@ from pathlib import Path
 from beyond_mocap.files.whole import atomic_write
 
 HIS = {"conditioned": False, "ik_layer": False, "rollout": 1, "frame": "static", "phase": "distance", "noise": 0.0,
-       "linear_start": False}
+       "linear_start": False, "guided": False}
 """What all of his models have in common (§7)."""
 
 
@@ -59,13 +59,16 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
     first = {**HIS, **dropped, "wrist": "inferred"}
     second = {**HIS, **dropped, "wrist": "given"}
     single = {**first, **many, "kind": "single"}
-    ours = {"conditioned": True, "rollout": 8, "frame": "hip", "keep": 1.0, "noise": 0.02, "wrist": "given", **few}
-    plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1}
+    ours = {"conditioned": True, "guided": True, "linear_start": True, "rollout": 8, "learning_rate": 1e-4,
+            "frame": "hip", "keep": 1.0, "noise": 0.02, "wrist": "given", **few}
+    plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1, "guided": False}
     return (
         *(Variant(name, words, {**plain, **changes}, not name.endswith("raw"), linear=True) for name, words, changes in (
             ("linear", "six linear maps", {"points": 1}), ("linear-phased", "six linear maps, by phase", {}),
             ("linear-raw", "six linear maps", {"points": 1}), ("linear-phased-raw", "six linear maps, by phase", {}),
             ("linear-single-raw", "one linear map, by phase", {"kind": "single"}),
+            ("linear-guided", "six linear maps, by phase, limbs told how they would reach", {"guided": True}),
+            ("linear-guided-raw", "six linear maps, by phase, limbs told how they would reach", {"guided": True}),
         )),
         Variant("hierarchy", "six phase-functioned networks, wrists given", {**second, **few, "layers": 3}, True),
         Variant("feed-forward", "six feed-forward networks, wrists given",

@@ -21,6 +21,8 @@ PAIRS = (
     ("Linear maps with phases or without", "linear-phased", "linear", ""),
     ("The same, nothing corrected", "linear-phased-raw", "linear-raw", ""),
     ("Six linear maps or one, nothing corrected", "linear-phased-raw", "linear-single-raw", ""),
+    ("Limbs told how inverse kinematics would reach, or not", "linear-guided", "linear-phased", ""),
+    ("The same, nothing corrected", "linear-guided-raw", "linear-phased-raw", ""),
     ("As many parameters: one network or six", "hierarchy-raw", "single-equal", ""),
     ("As many parameters: phase-functioned or feed-forward", "hierarchy", "feed-forward-equal", ""),
     ("His question of §9.2: one network with the end-effector loss against the same without", "single-effectors",

@@ -37,12 +37,11 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.network_npz import read_model
     from ..files.tables import write_report
     from ..files.whole import atomic_write
-    from ..throw_examples import examples_in
 
     begun = time.perf_counter()
     check_outputs(options.report, options.html, never=(options.model,))
     model = read_model(options.model)
-    every = examples_in(options.examples, model.settings.action, model.settings.fps, told=told.note)
+    every = _examples(options.examples, model, told)
     chosen = some_of_each(_of_subjects(every, options.subject, options.examples), options.motions)
     loaded = time.perf_counter()
     found = evaluate_throws(
@@ -60,6 +59,19 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     if options.html:
         atomic_write(options.html, throws_page(report))
     told.end()
+
+
+def _examples(folder: Path, model, told: Told) -> list:
+    """The folder's examples: those on bones of the model's names as they are, else all brought to its skeleton, because
+    hands that rest otherwise turn otherwise."""
+    from ..throw_examples import examples_in
+
+    settings = model.settings
+    found = examples_in(folder, settings.action, settings.fps, told=told.note, cancelled=told.cancelled)
+    if all(example.motion.skeleton.names == model.skeleton.names for example in found):
+        return found
+    told.note(f"{folder}: other skeletons than the model's; brought to its own")
+    return examples_in(folder, settings.action, settings.fps, model.skeleton, cancelled=told.cancelled)
 
 
 def _of_subjects(examples, wanted: list[str], folder: Path):
