@@ -43,12 +43,14 @@ IK_FOLLOWERS = (
 @dataclass(frozen=True)
 class Wishes:
     """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are
-    alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again."""
+    alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again. exact: the motion is
+    on the driven skeleton already and is played as it is."""
 
     root: str = "KEEP"
     keeps_travel: bool | None = None
     bakes_ik: bool = False
     plants: bool = True
+    exact: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,6 +276,9 @@ class _Fit:
         from ..beyond_mocap.motion.retarget import Retargeter
         from ..beyond_mocap.polish.foot_plant import plant
 
+        if wishes.exact:
+            self.scale, self.slides, self.motion, self.told = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
+            return
         motion, skeleton = source.motion, _looking_ahead(driven.skeleton, source.motion.skeleton)
         points = contacts.points(motion)
         if source.standing is not None:

@@ -3,5 +3,6 @@
 - `settings`   what the panel shows and what an armature keeps of its throw
 - `order`      the settings as plain values: who, from where, at what, when; worked off in any thread
 - `shown`      the throw laid on the armature, and taken away again
+- `rigged`     the same on the controls of a rig
 - `flown`      the ball: in the hand or lying, then its flight and its trajectory
 """

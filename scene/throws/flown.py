@@ -60,7 +60,8 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> bp
     named = {path: ("Object Transforms", values) for path, values in curves.items()}
     channels.animate(ball, f"{ball.name} path", frames, named)[MARK] = True
     if held is not None:
-        bone = result.order.skeleton.names[_hand(result)]
+        side = result.order.limb.partition("_")[0]
+        bone = result.order.table.get(f"{side} hand") or result.order.skeleton.names[_hand(result)]
         possession.take(scene, ball, body, bone, *held, how="KEEP")
     wish.curve = trajectory(scene, wish.curve, ball, result.flight)
     return ball
@@ -111,7 +112,7 @@ def keys(
     first = int(round(joined.start * fps))
     if result.order.act == "kick":
         before = np.array([min(first, last - 1), last], float)
-        still = np.repeat(np.asarray(result.thrown.launch.position)[None], 2, axis=0)
+        still = np.repeat(flight.at(np.zeros(1)), 2, axis=0)
         return _all(before, still, np.repeat(turns[:1], 2, axis=0), frames, places, turns, None)
     held = np.arange(first, last + 1)
     spots, spun = in_hand(result, held - first)

@@ -15,8 +15,8 @@ from ...beyond_mocap.errors import InputError
 from .. import action, armature, channels, linked, preferences, session
 from ..measure import frames_per_second, units_per_metre
 from ..passes import possession
-from ..ride.rigs import is_plain
 from ..settings import absolute
+from . import rigged
 from .settings import LIMBS, USUAL
 
 FOLLOWED, LONGEST = 3.0, 10.0
@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 class Order:
     """One throw or kick.
 
-    body: the armature's name. act: "throw" or "kick". skeleton: the armature's. own: what it plays, in the scene's
+    body: the armature's name. act: "throw" or "kick". skeleton: the armature's; of a control rig, that of the bones that
+    `table` (part -> bone) names, and lift: m that its soles are thicker than that skeleton's. own: what it plays, in the scene's
     metres, None where it only stands; first: the scene frame with which that begins. place (2,) m and facing rad: where
     an armature without a motion stands. target (3,) m. at: s of the release. speed: m/s, 0 as usual. ball_place: (3,) m
     where a ball that is kicked lies, None where it suits. model: a file, "" for what comes with the extension. folder:
@@ -46,6 +47,8 @@ class Order:
     act: str
     limb: str
     skeleton: "Skeleton"
+    table: dict[str, str]
+    lift: float
     fps: float
     own: "Motion | None"
     first: int
@@ -83,15 +86,17 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> Order:
     """What an armature's settings ask for; InputError where that makes no sense, or where it cannot be animated."""
     wish, common = body.beyond_mocap_throw, scene.beyond_mocap
     check(scene, body)
-    skeleton, fps = armature.skeleton_of(body, scene), frames_per_second(scene)
-    own, first = _own(scene, body)
-    place, facing = _stands(scene, body, skeleton)
+    fps, rig = frames_per_second(scene), rigged.rig_of(scene, body)
+    skeleton = armature.skeleton_of(body, scene) if rig is None else rig.skeleton
+    own, first = _own(scene, body) if rig is None else rigged.own(scene, body)
+    place, facing = _stands(scene, body, skeleton) if rig is None else rigged.stands(rig)
     limb = f"{wish.side}_{LIMBS[act]}"
     model = wish.throw_model if act == "throw" else wish.kick_model
     folder = absolute(common.library_folder) if wish.library and common.library_folder else ""
     unit = common.library_unit or None
     return Order(
-        body=body.name, act=act, limb=limb, skeleton=skeleton, fps=fps, own=own, first=first, place=place,
+        body=body.name, act=act, limb=limb, skeleton=skeleton, table=rig.table if rig is not None else {},
+        lift=rigged.lift(rig) if rig is not None and act == "throw" else 0.0, fps=fps, own=own, first=first, place=place,
         facing=facing, target=_target(scene, wish), at=(wish.frame or scene.frame_current) / fps, speed=wish.speed,
         kind=USUAL[act] if wish.kind == "usual" else wish.kind, ball_place=_lies(scene, wish) if act == "kick" else None,
         model=absolute(model) if model else "", seed=wish.seed, folder=folder, unit=unit,
@@ -130,14 +135,16 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     from ...beyond_mocap import joined_throw
     from ...beyond_mocap.ball.flight import fly
     from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.motion.retarget import Retargeter
 
     library = order.library
     if order.folder and library is None:
         library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
     own = order.own
-    stands = own is None
-    if stands:
+    if own is None:
         own = joined_throw.standing(order.skeleton, 0.0, order.fps, order.place, order.facing)
+    elif order.table:
+        own = Retargeter(own, order.skeleton, keeps_travel=True).carry(own)
     start = order.first / order.fps
     thrown = _thrown(order, own, start, library is not None, _share(progress, 0.0, 0.3), cancelled)
     motion, release = thrown.motion, thrown.release
@@ -150,8 +157,11 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     joined = joined_throw.laid_into(own, start, motion, release, order.at, goes_on=library is None)
     usual = joined_throw.usual_jerk(library, order.fps) if library is not None else float("nan")
     joined = replace(joined, warnings=(*told, *joined.warnings))
-    launch = replace(thrown.launch, time=0.0)
-    seconds = _seconds(fly(launch, thrown.ball, LONGEST), thrown.impact)
+    up = np.array([0.0, 0.0, order.lift])
+    raised = replace(joined.motion, root_positions=joined.motion.root_positions + up)
+    joined = replace(joined, motion=raised)
+    launch = replace(thrown.launch, time=0.0, position=thrown.launch.position + up)
+    seconds = _seconds(fly(launch, thrown.ball, LONGEST), thrown.impact + up)
     flight = fly(launch, thrown.ball, seconds + FOLLOWED)
     return Result(order, thrown, joined, flight, seconds, library, float(joined_throw.seam_jerk(joined).max()), usual)
 
@@ -187,7 +197,7 @@ def _thrown_from(order: Order, model, where: dict, progress, cancelled) -> "Thro
     from ...beyond_mocap import throw
 
     asked = throw.Order(
-        target=tuple(order.target), limb=order.limb, speed=order.speed or None, ball=order.kind, fps=order.fps,
+        target=tuple(order.target - [0.0, 0.0, order.lift]), limb=order.limb, speed=order.speed or None, ball=order.kind, fps=order.fps,
         seed=order.seed, **where,
     )
     return throw.throw_at(model, asked, order.skeleton, progress, cancelled)
@@ -214,12 +224,6 @@ def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None
         slot = next((one for one in found.slots if one.identifier == before.slot), None) if found else None
     else:
         found, slot = channels.playing(body)
-        if not is_plain(body) if found is not None else posed_otherwise(body):
-            raise InputError(
-                f"armature {body.name}", "constraints, drivers or several layers pose it",
-                "an armature whose bones are keyed themselves",
-                "throw with another armature, then press Bake to Rig",
-            )
     curves = channels.curves(found, slot) if slot is not None else {}
     ends = channels.keyed_range({key: curve for key, curve in curves.items() if key[0].startswith("pose.bones")})
     if ends is None:
@@ -228,16 +232,6 @@ def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None
     if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
         raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
     return motion, ends[0]
-
-
-def posed_otherwise(body: bpy.types.Object) -> bool:
-    """Whether constraints, drivers or NLA strips have a say in an armature's pose."""
-    data = body.animation_data
-    drivers = data.drivers if data is not None else ()
-    strips = data is not None and data.use_nla and any(len(one.strips) and not one.mute for one in data.nla_tracks)
-    return strips or any(driver.data_path.startswith("pose.") for driver in drivers) or any(
-        not one.mute and one.influence > 0.0 for bone in body.pose.bones for one in bone.constraints
-    )
 
 
 def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton") -> tuple[np.ndarray, float]:

@@ -58,6 +58,7 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
     )
     seed: IntProperty(name="Seed", default=0, min=0, description="Another number, another throw at the same target")
     made: StringProperty(name="Made", options={"HIDDEN"}, description="throw or kick; empty: none is shown")
+    rigged: BoolProperty(name="Rigged", options={"HIDDEN"}, description="Whether it is shown on a rig's controls")
     release: FloatProperty(name="Released", options={"HIDDEN"}, description="Scene frame on which the ball leaves")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about what is shown")
     told: StringProperty(name="Told", options={"HIDDEN"}, description="What is to be known about it")

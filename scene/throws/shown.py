@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from .. import action, bake, channels, linked, session
+from .. import action, bake, channels, linked, rig_bake, session
 from ..measure import frames_per_second
 from ..set_aside import bring_back, drop, put_aside
-from . import flown, order
+from . import flown, order, rigged
 from .settings import MARK
 
 if TYPE_CHECKING:
     from .order import Result
 
 MOST_LINES = 12
-RESULTS = ("made", "release", "figures", "told")
+RESULTS = ("made", "rigged", "release", "figures", "told")
 
 
 def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> None:
@@ -26,17 +26,21 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
     order.check(scene, body)
     if result.library is not None:
         session.keep_library(result.library, result.order.unit)
-    if not wish.before.kept:
-        put_aside(wish.before, body)
-    channels.discard(body, MARK)
-    name = f"{body.name} {result.order.act}s"
-    action.write(body, joined.motion, scene, joined.start * fps, name, generated=True)[MARK] = True
+    name, start, more = f"{body.name} {result.order.act}s", joined.start * fps, []
+    if result.order.table:
+        more = rigged.lay(scene, body, result.order.table, joined.motion, int(round(start)), result.order.act)
+        wish.rigged = True
+    else:
+        if not wish.before.kept:
+            put_aside(wish.before, body)
+        channels.discard(body, MARK)
+        action.write(body, joined.motion, scene, start, name, generated=True)[MARK] = True
     flown.show(scene, body, result)
     last = joined.start + (len(joined.motion) - 1) / fps
     bake.lengthen(scene, fps * max(joined.release + result.seconds, last))
     wish.made, wish.release = result.order.act, joined.release * fps
     wish.figures = "\n".join(figures(result))
-    told = [*result.thrown.warnings, *joined.warnings]
+    told = [*result.thrown.warnings, *joined.warnings, *more]
     wish.told = "\n".join(list(dict.fromkeys(str(line) for line in told))[:MOST_LINES])
 
 
@@ -46,7 +50,10 @@ def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     linked.refuse(body, wish.flown)
     channels.check_free(body)
     flown.give_back(scene, wish)
-    if wish.before.kept:
+    played = channels.playing(body)[0]
+    if wish.rigged and played is not None and played.get(MARK):
+        rig_bake.remove(body)
+    elif wish.before.kept:
         bring_back(wish.before, body, MARK)
     _settle(wish)
 

@@ -7,6 +7,8 @@ import pathlib
 import bpy
 import numpy as np
 import pytest
+import ride_rigs
+import rigs
 import worlds
 from conftest import EXTENSION
 from throw_models import model_file
@@ -253,3 +255,27 @@ def test_a_body_without_hands_is_refused(core):
     worlds.choose(armature.create(bpy.context, small, "Legs", bpy.context.scene.collection))
     bpy.context.scene.cursor.location = (12.0, 0.0, 1.0)
     refused("hand|arm")
+
+
+@pytest.mark.parametrize("kind", ["mixamo", "walk_ik"])
+def test_rigs(kind, room):
+    body = rigs.mixamo() if kind == "mixamo" else ride_rigs.walk_ik()
+    worlds.choose(body)
+    wish = body.beyond_mocap_throw
+    wish.target, wish.frame = an_empty(TARGET), 60
+    before = state()
+    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    assert wish.rigged == (kind == "walk_ik")
+    ball, first = wish.flown, int(np.floor(wish.release))
+    assert closest(ball, np.array(TARGET), first + 1, first + 60) < 0.10
+    steps = [np.linalg.norm(ball_at(ball, f + 1) - ball_at(ball, f)) for f in range(first - 2, first + 4)]
+    assert max(steps) < 1.5 * min(steps[-2:])  # no jump from the hand into the flight
+    wish.target.location.y += 1.0
+    bpy.context.view_layer.update()
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert closest(wish.flown, np.array(TARGET) + [0.0, 1.0, 0.0], first - 2, first + 60) < 0.10
+    wish.target.location.y -= 1.0
+    press(bpy.ops.beyond_mocap.leave_throw)
+    bpy.context.scene.frame_set(1)
+    after = state()
+    assert {key for key in before if before[key] != after[key]} <= {"materials", "collections", "frames"}

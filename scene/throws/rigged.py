@@ -1,0 +1,83 @@
+"""Control rigs that throw: what their driven bones play, and the throw on their controls (`rig_bake`)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from .. import armature, bone_maps, channels, rig_bake
+from ..ride.carrier import carrier_of
+from ..ride.rigs import is_plain
+from .settings import MARK
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.motion.motion import Motion
+
+_own: dict[int, tuple["Motion | None", int]] = {}
+
+
+def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> rig_bake.Driven | None:
+    """An armature whose bones do not simply play what they show, by its driven bones; None for plain ones. InputError
+    where it cannot be baked onto."""
+    wish = body.beyond_mocap_throw
+    if not wish.rigged and (wish.before.kept or not _posed_otherwise(body)):
+        return None
+    rig_bake.check(body)
+    return rig_bake.Driven(body, bone_maps.kept(body) or bone_maps.suggest(body), scene)
+
+
+def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
+    """What a rig shows without its throw, on a skeleton of its own, and the scene frame of its first pose; (None, first
+    frame) where it plays nothing."""
+    if body.beyond_mocap_throw.rigged:
+        if body.session_uid not in _own:
+            raise InputError(f"rig {body.name}", "it shows a throw of an earlier session", "its own motion",
+                             "press Leave first, then throw again")
+        return _own[body.session_uid]
+    data = body.animation_data
+    strips = data is not None and data.use_nla and any(len(one.strips) and not one.mute for one in data.nla_tracks)
+    if channels.playing(body)[0] is None and not strips:
+        found = None, scene.frame_start
+    else:
+        read = carrier_of(body).read(scene)
+        found = read.motion, read.first
+    _own[body.session_uid] = found
+    return found
+
+
+def stands(rig: rig_bake.Driven) -> tuple[np.ndarray, float]:
+    """Where a rig that plays nothing stands, (2,) m, and which way it faces, rad."""
+    place = rig.placement.to_world(np.array([rig.rest_place[rig.bone("hips")]]))[0]
+    ahead = quaternion.rotate(quaternion.inverse(rig.upright), np.array([1.0, 0.0, 0.0]))
+    ahead = quaternion.rotate(rig.placement.rotation, ahead)
+    return np.asarray(place[:2]), float(np.arctan2(ahead[1], ahead[0]))
+
+
+def lift(rig: rig_bake.Driven) -> float:
+    """m that the rig's toes stand higher than those of its bare skeleton."""
+    from ...beyond_mocap.motion.contacts import sole_height
+
+    return rig.sole - sole_height(rig.skeleton)
+
+
+def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
+    """Let a rig play a motion of its driven skeleton; `rig_bake.remove` takes it away again. Returns lines about it."""
+    source = rig_bake.Source(motion, start, name)
+    baked = rig_bake.lay(rig_bake.fitted(body, table, source, scene, rig_bake.Wishes(exact=True)))
+    baked.action[MARK] = True
+    return baked.told
+
+
+def _posed_otherwise(body: bpy.types.Object) -> bool:
+    """Whether constraints, drivers or NLA strips have a say in an armature's pose, or its keys move more than bones."""
+    data = body.animation_data
+    if data is not None and (channels.playing(body)[0] is not None or data.use_nla and len(data.nla_tracks)):
+        return not is_plain(body)
+    drivers = data.drivers if data is not None else ()
+    return any(driver.data_path.startswith("pose.") for driver in drivers) or any(
+        not one.mute and one.influence > 0.0 for bone in body.pose.bones for one in bone.constraints
+    )
