@@ -146,6 +146,11 @@ def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, af
     return flat(six(picked(bent.local, predicted(name, chains, settings), -3, xp), xp), 2)
 
 
+def guides(name: str, chains: Chains, settings: ModelSettings) -> int:
+    """How many of a network's last inputs are what `reached` says."""
+    return 6 * len(predicted(name, chains, settings)) if settings.guided and name in LIMB_OF else 0
+
+
 @lru_cache(maxsize=16)
 def _hinges(chains: Chains) -> np.ndarray:
     """Axes (4, 3) of elbows and knees; they count where a limb is straight."""

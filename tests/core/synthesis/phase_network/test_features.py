@@ -13,7 +13,7 @@ from beyond_mocap.synthesis.phase_network.answers import answered, ends, floatin
 from beyond_mocap.synthesis.phase_network.chains import HIERARCHY, LIMB_OF, chains_of
 from beyond_mocap.synthesis.phase_network.description import places_at, scaled, windows
 from beyond_mocap.synthesis.phase_network.example import Example, describe, example_of, mirrored, poses
-from beyond_mocap.synthesis.phase_network.features import network_input, phase_of, widths
+from beyond_mocap.synthesis.phase_network.features import guides, network_input, phase_of, widths
 from beyond_mocap.synthesis.phase_network.model import ModelSettings
 from beyond_mocap.synthesis.phase_network.training_set import leg_reach, steps, training_set, with_mirrors
 
@@ -260,6 +260,7 @@ def test_a_guided_limb_is_told_how_to_reach(example, wrist):
         x = network_input(name, chains, settings, pose, truth, window)
         plain = network_input(name, chains, ModelSettings(wrist=wrist), pose, truth, window)
         assert np.array_equal(x[:, : plain.shape[1]], plain)
+        assert x.shape[1] - plain.shape[1] == guides(name, chains, settings)
         after = answered(name, chains, settings, x[:, plain.shape[1] :], pose, truth, window)
         off = np.linalg.norm(after.positions[:, chains.effectors[number]] - window.next[:, number], axis=-1)
         assert off.max() < 0.02 and np.median(off) < 1e-3
