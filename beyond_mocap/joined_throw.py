@@ -68,7 +68,7 @@ _EDGE = 0.1  # s at either end of the generated clip that serve the seams
 _CATCH_UP = 0.8  # m/s by which the track is left behind or caught up with
 _LEADS = (1.0, 4.0)  # s that leading the track to the throw and back takes, at least and at most
 _SMOOTH = 0.7  # s of the window that takes the sway out of the throw's own path
-_TURNED_TELLS, _MOVED_TELLS = np.radians(60.0), 0.05
+_FACES_TELLS, _TURNED_TELLS, _MOVED_TELLS = np.radians(100.0), np.radians(60.0), 0.05  # a throw begins side on
 _PERCENT = 99.0
 _ENDS = 0.5  # s at either end of a stretch that faces as the motion around it
 REACH = 4.5
@@ -498,7 +498,7 @@ def _between(skeleton: Skeleton, new, old, share: np.ndarray) -> tuple[np.ndarra
 
 def _told(before: float, begin: float, turned: float, moved: np.ndarray, end: float) -> tuple[str, ...]:
     told = []
-    if abs(before) > _TURNED_TELLS:
+    if abs(before) > _FACES_TELLS:
         told.append(TimedLine(
             f"{begin:.1f} s: the body faces {abs(np.degrees(before)):.0f} degrees away from where the throw begins and "
             "is turned there; let it face the target, or give a library", (begin, begin),
