@@ -69,12 +69,13 @@ def cut(example, before: float, after: float):
     last = min(int(example.release + after * FPS) + 1, len(example.motion))
     ways = effectors_of(example.motion)
 
-    def known(own, other, order):
-        return np.concatenate([part for part in ((other, own) if order else (own, other)) if part is not None])
+    def known(*parts):
+        parts = [part for part in parts if part is not None and len(part)]
+        return np.concatenate(parts) if parts else None
 
     return replace(
         example, motion=example.motion.frames(first, last), release=example.release - first,
-        before=known(ways[:first], example.before, True), after=known(ways[last:], example.after, False),
+        before=known(example.before, ways[:first]), after=known(ways[last:], example.after),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from beyond_mocap.evaluation.throws import fredriksson
-from beyond_mocap.evaluation.throws.subjects import EFFECTOR_NAMES, Subjects, gathered
+from beyond_mocap.evaluation.throws.subjects import EFFECTOR_NAMES, Subjects, gathered, lost_ones
 from beyond_mocap.evaluation.throws.tables import figure_table, test_table, verdicts
 
 from benchmarks import markdown
@@ -85,7 +85,7 @@ def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
 def overview(found: Found, data: str, scale: Scale) -> list[str]:
     """One row per variant: means over its models."""
     lines = markdown.head([
-        "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "as a body, cm", "impact, m", "head, °", "head turns",
+        "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "as a body, cm", "bodies lost", "impact, m", "head, °", "head turns",
         "jerk", "beyond limits", "s for one", "parameters", "minutes to train", "models",
     ])  # fmt: skip
     for variant in variants(scale):
@@ -96,24 +96,26 @@ def overview(found: Found, data: str, scale: Scale) -> list[str]:
 
 
 def _figures(done: Sequence[Mapping]) -> list[str]:
-    def mean(values, form: str) -> str:
-        known = [value for value in values if value is not None]
-        return format(float(np.mean(known)), form) if known else "-"
-
-    limbs = [mean([_centimetres(one["deviation_m"][name]) for one in done], ".1f") for name in done[0]["deviation_m"]]
-    alone, body = ([_centimetres(value) for one in done for value in one[key].values()]
-                   for key in ("network_deviation_m", "body_deviation_m"))
+    """Means over all motions of all models, without those that lost their body."""
+    every = [each for one in done for each in one["each"]]
+    lost = lost_ones(np.array([each["deviation"] for each in every]))
+    every = [each for each, gone in zip(every, lost, strict=True) if not gone]
+    deviation, alone, body = (100.0 * np.array([each[key] for each in every]).reshape(-1, 4)
+                              for key in ("deviation", "network", "body"))
+    trained = [one["training"]["minutes"] for one in done if "minutes" in one["training"]]
     return [
-        *limbs, mean(alone, ".1f"), mean(body, ".1f"), mean([one["impact_m"] for one in done], ".2f"),
-        mean([one["head"] for one in done], ".1f"), mean([one["head_share"] for one in done], ".2f"),
-        mean([one["jerk"] for one in done], ".2f"), mean([one["beyond"] for one in done], ".3f"),
-        mean([one["seconds"] for one in done], ".2f"), f"{int(np.mean([one['parameters'] for one in done])):,}",
-        mean([one["training"].get("minutes") for one in done], ".1f"), str(len(done)),
+        *(_mean(column, ".1f") for column in deviation.T), _mean(alone, ".1f"), _mean(body, ".1f"),
+        f"{int(lost.sum())} of {len(lost)}", _mean([one["impact"] for one in every], ".2f"),
+        *(_mean([each[key] for each in every], form) for key, form in (
+            ("head", ".1f"), ("head_share", ".2f"), ("jerk", ".2f"), ("beyond", ".3f"), ("seconds", ".2f"))),
+        f"{int(np.mean([one['parameters'] for one in done])):,}", _mean(trained, ".1f"), str(len(done)),
     ]  # fmt: skip
 
 
-def _centimetres(value: float | None) -> float | None:
-    return None if value is None else 100.0 * value
+def _mean(values, form: str) -> str:
+    known = np.array([np.nan if value is None else value for value in np.ravel(values)], float)
+    known = known[np.isfinite(known)]
+    return format(float(known.mean()), form) if len(known) else "-"
 
 
 def everyone(found: Found) -> list[str]:

@@ -19,6 +19,7 @@ from .evaluation.jerk import jerk
 from .evaluation.throws.compare import kept
 from .evaluation.throws.deviation import deviations
 from .evaluation.throws.impact import WALL, impact, let_go
+from .evaluation.throws.subjects import lost_ones
 from .files.tables import plain
 from .motion import quaternion
 from .motion.humanoid import identify
@@ -100,17 +101,19 @@ class Evaluated:
         return np.array([one.impact for one in self.motions])
 
     def report(self) -> dict:
-        """All of it, as `files.tables` writes it; means are over what are numbers."""
-        inside = kept(self.impact)
+        """All of it, as `files.tables` writes it; means are over what are numbers, of motions that kept their body."""
+        lost = lost_ones(self.deviation)
+        whole = [one for one, gone in zip(self.motions, lost, strict=True) if not gone]
+        inside = kept(self.impact[~lost])
         return {
-            "options": asdict(self.options), "left_out": list(self.left_out), "motions": len(self.motions),
+            "options": asdict(self.options), "left_out": list(self.left_out), "motions": len(self.motions), "lost": int(lost.sum()),
             "subjects": sorted({one.subject for one in self.motions}),
-            "deviation_m": dict(zip(EFFECTORS, _means(self.deviation), strict=True)),
-            "network_deviation_m": dict(zip(EFFECTORS, _means(self.network), strict=True)),
-            "body_deviation_m": dict(zip(EFFECTORS, _means(self.body), strict=True)),
-            "impact_m": _mean(self.impact[inside]),
-            "impacts_culled": int(np.isfinite(self.impact).sum() - inside.sum()),
-            **{name: _mean([getattr(one, name) for one in self.motions]) for name in _OTHERS},
+            "deviation_m": dict(zip(EFFECTORS, _means(self.deviation[~lost]), strict=True)),
+            "network_deviation_m": dict(zip(EFFECTORS, _means(self.network[~lost]), strict=True)),
+            "body_deviation_m": dict(zip(EFFECTORS, _means(self.body[~lost]), strict=True)),
+            "impact_m": _mean(self.impact[~lost][inside]),
+            "impacts_culled": int(np.isfinite(self.impact[~lost]).sum() - inside.sum()),
+            **{name: _mean([getattr(one, name) for one in whole]) for name in _OTHERS},
             "each": [plain(vars(one)) for one in self.motions],
         }  # fmt: skip
 

@@ -57,13 +57,11 @@ def test_his_models_are_his():
 
 def planted_run(deviation, impact):
     """A run's JSON with these figures (4,) m and m in each of ten motions."""
-    each = [{"subject": f"s{i % 2}", "deviation": list(deviation), "impact": impact} for i in range(10)]
-    names = ("left_hand", "right_hand", "left_foot", "right_foot")
-    means = dict(zip(names, deviation, strict=True))
-    return {
-        "deviation_m": means, "network_deviation_m": means, "body_deviation_m": means, "impact_m": impact, "head": 3.0, "head_share": 0.9,
-        "jerk": 1.1, "beyond": None, "seconds": 0.1, "parameters": 1000, "training": {"minutes": 1.0}, "each": each,
-    }  # fmt: skip
+    limbs = dict.fromkeys(("deviation", "network", "body"), list(deviation))
+    one = {**limbs, "impact": impact, "head": 3.0, "head_share": 0.9, "jerk": 1.1, "beyond": None, "seconds": 0.1}
+    gone = {**one, **dict.fromkeys(("deviation", "network", "body"), [900.0] * 4), "impact": 80.0, "subject": "s0"}
+    each = [*({**one, "subject": f"s{i % 2}"} for i in range(10)), gone]
+    return {"parameters": 1000, "training": {"minutes": 1.0}, "each": each}
 
 
 def test_his_figures_put_in_come_out_with_his_p_values(tmp_path):
@@ -78,6 +76,7 @@ def test_his_figures_put_in_come_out_with_his_p_values(tmp_path):
     text = "\n".join(document(results(tmp_path), QUICK))
     assert "| p | **0.0065** | 0.0622 | **0.0063** | **0.0038** | **0.0136** |" in text
     assert "| his p | 0.0064 | 0.0625 | 0.0064 | 0.0038 | 0.0136 |" in text
+    assert "| 1 of 11 |" in text and "4 of 44" in text  # the body that was lost is counted, and in no mean
     assert "### Tables 8.5 to 8.8" in text and "Tables 8.1" not in text
     assert "better at 0.025 in left arm (p 0.0065), left leg (p 0.0063), right leg (p 0.0038), impact (p 0.0136)" in text
 

@@ -27,7 +27,7 @@ class Printed:
 
 def _subjects(name: str, rows) -> Subjects:
     rows = np.array(rows)
-    return Subjects(name, ("1", "2", "3", "4"), rows[:, :4], rows[:, 4], np.zeros(4, int), np.zeros(4, int))
+    return Subjects(name, ("1", "2", "3", "4"), rows[:, :4], rows[:, 4], *np.zeros((3, 4), int))
 
 
 SINGLE = _subjects("single PFNN", [

@@ -30,7 +30,8 @@ def throws_page(report: Mapping) -> str:
     title = escape(str(report.get("model", "Throws")))
     parts = [
         f"<h1>{title}</h1>", f"<p class=quiet>{escape(str(report.get('trained_on', '')))}</p>",
-        f"<p>{report['motions']} motions of {escape(', '.join(map(str, report['subjects'])))}.</p>",
+        f"<p>{report['motions']} motions of {escape(', '.join(map(str, report['subjects'])))}; {report['lost']} lost their "
+        "body and are in no mean.</p>",
         "<h2>Distance from where hands and feet were wanted</h2>", _deviations(report),
         "<h2>All figures</h2>", _figures(report), "<h2>All motions</h2>", _motions(report),
     ]  # fmt: skip

@@ -15,15 +15,15 @@ _COLUMNS = [f"{name} (m)" for name in (*EFFECTOR_NAMES, "impact")]
 
 def figure_table(ours: Subjects, his: Subjects | None = None) -> list[str]:
     """As tables 8.1, 8.2, 8.5, 8.6: a row for each subject a model was trained on, then means; his rows below ours."""
-    lines = _head(["trained on", *_COLUMNS, "left out"])
+    lines = _head(["trained on", *_COLUMNS, "impacts left out", "bodies lost"])
     for row, subject in enumerate(ours.subjects):
         gone = f"{ours.culled[row]} of {ours.motions[row]}" if np.isfinite(ours.impact[row]) else ""
-        lines.append(_row([subject, *_numbers(ours.figures[row]), gone]))
-    lines.append(_row(["**mean**", *_numbers(np.array([_mean(column) for column in ours.figures.T])), ""]))
+        lines.append(_row([subject, *_numbers(ours.figures[row]), gone, f"{ours.lost[row]} of {ours.motions[row]}"]))
+    lines.append(_row(["**mean**", *_numbers(np.array([_mean(column) for column in ours.figures.T])), "", ""]))
     if his is not None:
         for row, subject in enumerate(his.subjects):
-            lines.append(_row([f"his {subject}", *_numbers(his.figures[row]), ""]))
-        lines.append(_row(["**his mean**", *_numbers(his.figures.mean(axis=0)), ""]))
+            lines.append(_row([f"his {subject}", *_numbers(his.figures[row]), "", ""]))
+        lines.append(_row(["**his mean**", *_numbers(his.figures.mean(axis=0)), "", ""]))
     return lines
 
 
