@@ -44,6 +44,7 @@ NEAREST = 1.5
 """Metres over the ground from body to target, at least."""
 _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be asked for
 _MORE = 1.04  # times the slowest launch that reaches the target, at least
+_SUITS, _EASY = 1.6, 0.3  # times the slowest launch that suits, and by which logarithm another pace is an odd one
 _TOLD_BEYOND = np.radians(2.0)
 _ROUNDS = 6  # of finding where the body begins
 _GOES_ON = 1.0  # s that the ball is followed behind its target
@@ -98,11 +99,11 @@ class Thrown:
     leaves. limb: of EFFECTORS. ball: its kind. grip: (3,) m, the ball in the hand joint's axes, None for kicks. path:
     the ball at the motion's rate, carried or lying, then in flight, beyond the motion's end until it is past its
     target. launch, flight. target, impact: (3,) m. moved: m that the wrist or ankle was moved at most, by shift (T,
-    3) m. turned rad, pace, later s: how else the motion was changed (see `Corrected`). slowest: m/s below which no
-    ball gets there. generated: the motion before the correction, where it was; generated_release: s in it;
-    raw_deviation: m that hands and feet were off their wanted ways before any inverse kinematics, on average. beyond:
-    rad that a joint of the corrected limb is beyond the range of the model's examples at most, nan on other bones.
-    examples: names and weights of what it was planned from. warnings: lines for people.
+    3) m. turned rad, pace, later s, elsewhere m: how else the motion was changed (see `Corrected`). slowest: m/s
+    below which no ball gets there. generated: the motion before the correction, where it was; generated_release: s in
+    it; raw_deviation: m that hands and feet were off their wanted ways before any inverse kinematics, on average.
+    beyond: rad that a joint of the corrected limb is beyond the range of the model's examples at most, nan on other
+    bones. examples: names and weights of what it was planned from. warnings: lines for people.
     """
 
     motion: Motion
@@ -121,6 +122,7 @@ class Thrown:
     turned: float
     pace: float
     later: float
+    elsewhere: float
     slowest: float
     asked_speed: float
     generated: Motion
@@ -158,6 +160,7 @@ class Thrown:
             "impact_m": self.impact, "impact_error_m": self.impact_error, "moved_m": self.moved,
             "corrected_frames": [int(frames[0]), int(frames[-1])] if len(frames) else [],
             "turned_deg": np.degrees(self.turned), "pace": self.pace, "release_later_s": self.later,
+            "begins_elsewhere_m": self.elsewhere,
             "raw_deviation_m": self.raw_deviation, "joint_beyond_deg": np.degrees(self.beyond),
             "examples": {name: weight for name, weight in self.examples}, "warnings": list(self.warnings),
         }  # fmt: skip
@@ -331,14 +334,15 @@ class _Work:
             raise InputError(what, found, most, "ask for less, or train on faster ones")
 
     def _wish(self, own: list[int], ahead: float) -> Wish:
-        """The launch asked for, or of those that reach the target the one most like an example."""
-        speeds = [self.order.speed] if self.order.speed else np.maximum(
-            np.linalg.norm(self.launches[own], axis=1), _MORE * self.arcs.slowest
-        )
+        """The launch asked for, or of those that reach the target the one most like the examples, and rather not faster
+        than the way asks."""
+        thrown = np.linalg.norm(self.launches[own], axis=1)
+        speeds = np.array([self.order.speed]) if self.order.speed else np.maximum(thrown, _MORE * self.arcs.slowest)
         wishes = [self._wish_at(float(speed), ahead) for speed in speeds]
         impacts = np.array([self.model.examples[n].impact for n in own])
         away = [float(np.sort(unlike(self.launches[own], impacts, wish))[:3].mean()) for wish in wishes]
-        return wishes[int(np.argmin(away))]
+        suits = np.clip(_SUITS * self.arcs.slowest, thrown.min(), thrown.max())
+        return wishes[int(np.argmin(away + (np.log(speeds / suits) / _EASY) ** 2))]
 
     def _wish_at(self, speed: float, ahead: float) -> Wish:
         launch = self.arcs.at(speed)
@@ -400,7 +404,7 @@ class _Work:
         return Thrown(
             found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
             ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
-            found.moved, found.shift, found.turned, found.pace, found.later, self.arcs.slowest,
+            found.moved, found.shift, found.turned, found.pace, found.later, found.elsewhere, self.arcs.slowest,
             self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw, beyond,
             tuple(zip(plan.names, map(float, plan.weights))), tuple(self.warnings),
         )  # fmt: skip

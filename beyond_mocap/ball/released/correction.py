@@ -40,16 +40,17 @@ _LEAST = 3  # frames that a motion needs before and after the release
 @dataclass(frozen=True)
 class Freedom:
     """What may be changed beside wrist or ankle: turn rad about the start, pace as a share, release s, each to either
-    side."""
+    side. elsewhere: whether the body may begin elsewhere, so that its foot finds a ball whose place is given."""
 
     turn: float = np.radians(15.0)
     pace: float = 0.15
     release: float = 0.02
+    elsewhere: bool = True
 
     @classmethod
     def anchored(cls) -> Freedom:
         """For a motion that is joined to others before and behind: it keeps its place, its facing and its frames."""
-        return cls(0.0, 0.0, 0.02)
+        return cls(0.0, 0.0, 0.02, False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +60,8 @@ class Corrected:
     frame: fractional, at which the ball leaves. position (3,) m, velocity (3,) m/s, spin (3,) rad/s of the ball then.
     seconds: until it is at the target, and miss: m that it passes by. moved: m that the wrist or ankle was moved at
     most, by `shift` (T, 3) m at each frame; turned: rad that the body was turned about its start; pace: the factor on
-    its speed; later: s that the ball leaves after it would have at that pace. gap: m between foot and ball, 0 for
-    throws.
+    its speed; later: s that the ball leaves after it would have at that pace; elsewhere: m that the body begins
+    beside where it began. gap: m between foot and ball, 0 for throws.
     """
 
     motion: Motion
@@ -75,6 +76,7 @@ class Corrected:
     turned: float
     pace: float
     later: float
+    elsewhere: float = 0.0
     gap: float = 0.0
 
     @property
@@ -103,7 +105,8 @@ def corrected(
 @dataclass(frozen=True, eq=False)
 class _Change:
     """What is changed in all: place (3,) m and velocity (3,) m/s of the part at the release, turn rad, pace as a share,
-    rest (F,) m of the ball; seconds: until it arrives. As one row (9 + F,)."""
+    rest (F,) m of the ball against the body, one of which stays where it is; seconds: until it arrives. As one row (9
+    + F,)."""
 
     row: np.ndarray
 
@@ -129,6 +132,8 @@ class _Search:
         self.target, self.ball, self.freedom, self.speed = target, ball, freedom, speed
         self.pivot = motion.root_positions[0] * [1.0, 1.0, 0.0]
         self.bounds = np.zeros(2)
+        self.walks = freedom.elsewhere and not part.free and isinstance(part, AtFoot)
+        self.free = 2 if self.walks else part.free
 
     def whole(self) -> Corrected:
         """First what costs little, then what is left; the pace is changed only where it has to be."""
@@ -136,8 +141,8 @@ class _Search:
         for pace in (0.0, self.freedom.pace):
             self.bounds = np.array([self.freedom.turn, pace])
             start = self._start(self.asked)
-            change, source = _Change.none(self.part.free, self._seconds(self.given, self.asked, start)), self.asked
-            for _ in range(2):
+            change, source = _Change.none(self.free, self._seconds(self.given, self.asked, start)), self.asked
+            for _ in range(3 if self.walks else 2):
                 change, source = self._looked(change, source, start)
             tried.append(self._hit(change, source, start))
             if not self.freedom.pace or (tried[-1].missed < FINE and tried[-1].moved < LITTLE):
@@ -169,7 +174,7 @@ class _Search:
         if change.turn:
             turned = self.pivot - quaternion.rotate(quaternion.about_up(np.array(change.turn)), self.pivot)
             motion = place(motion, change.turn, turned)
-        return motion
+        return place(motion, 0.0, -change.rest) if self.walks else motion
 
     def _looked(self, change: _Change, source: float, start) -> tuple[_Change, float]:
         """Turn, pace and release that leave least to be moved: all releases on a grid, each with the change that is
@@ -191,6 +196,7 @@ class _Search:
         frame = source / (1.0 + change.pace)
         limb = LedLimb.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps))
         best, base, step = None, change, 1.0
+        fixed = (6, 7, 8, 9) if self.walks else (6, 7)
         follows, known = at_once(grip_point(motion, self.part, np.array([frame])).shape[1]), False
         for number in range(_ROUNDS):
             now = limb.shifted(change.row[:6])
@@ -206,7 +212,7 @@ class _Search:
                 follows, known = limb.follows(base.row[:6], frame, *there), True
             if better or slow:
                 costs = limb.shifts.cost, follows
-                rows, _ = self._best(*there, base, start, *costs, fixed=(6, 7), near=number >= _FREE_ROUNDS)
+                rows, _ = self._best(*there, base, start, *costs, fixed=fixed, near=number >= _FREE_ROUNDS)
             step = 1.0 if better else 0.4 * step
             change = _Change(base.row + step * (rows[0] - base.row))
         return best
@@ -288,7 +294,10 @@ class _Search:
         nudge = _STEP * np.vstack([np.zeros(size), np.eye(size)])
         nudge = np.tile(nudge, (count, 1))
         spread = [np.repeat(value, each, axis=0) for value in (points, velocities)]
-        rest = start + now.rest + np.column_stack([nudge[:, 8:-1], np.zeros((len(nudge), 3 - (size - 9)))])
+        away = np.column_stack([nudge[:, 8:-1], np.zeros((len(nudge), 3 - (size - 9)))])
+        rest = start + (0.0 * away if self.walks else now.rest + away)
+        if self.walks:
+            spread[0] = spread[0] - away[:, None]
         there, gap, speed = self._arrives(
             *(value + np.tensordot(nudge[:, :6], part, 1) for value, part in zip(spread, follows)), nudge[:, 6],
            
@@ -301,7 +310,7 @@ class _Search:
 
     def _judged(self, before, now, frame, source, change, start, points, velocities) -> Corrected:
         """What has come of it."""
-        rest = (start + change.rest)[None]
+        rest = (start if self.walks else start + change.rest)[None]
         position, velocity, spin, gap = self.part.leaves(points, velocities, rest, self.ball)
         none = np.zeros(1)
         there, _, _ = self._arrives(points, velocities, none, none, rest, np.array([change.seconds]))
@@ -311,5 +320,6 @@ class _Search:
             now, frame, position[0], velocity[0], spin[0], change.seconds,
             float(np.linalg.norm(there[0] - self.target)), float(np.linalg.norm(shift, axis=-1).max()), shift,
             change.turn, 1.0 + change.pace, (source - self.asked) / self.given.fps / (1.0 + change.pace),
+            float(np.linalg.norm(change.rest)) if self.walks else 0.0,
             float(np.abs(gap).max(initial=0.0)),
         )  # fmt: skip
