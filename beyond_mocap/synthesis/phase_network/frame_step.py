@@ -20,6 +20,9 @@ from .one_frame import OneFrame
 _SETTLES = 0.12
 """Seconds in which tanh brings an offset trajectory back to the wanted one by three quarters (§7.7.3)."""
 
+_FELT = 2e-3
+"""Radians that a limit takes off a joint from where its limb reaches again."""
+
 
 class Step(NamedTuple):
     """The next frame. pose: as it is to be. state: what the frame after is predicted from: the pose, or for a single
@@ -83,7 +86,7 @@ class Stepper:
         """The pose with limbs that reach and joints within their limits; where a limit has a say, limbs reach again with
         what is left to them."""
         after, over = self._limited(self.reach(after, wanted, share))
-        if over.max() > 0.0:
+        if over.max() > _FELT:
             after, more = self._limited(self.reach(after, wanted, share))
             over = np.maximum(over, more)
         return after, over

@@ -22,12 +22,13 @@ from ...motion.skeleton import Skeleton, frozen_array
 
 FREE = 4.0
 """Radians: offsets never get so long, so a joint with this range is free."""
-_MARGIN = np.radians(4.0)
+_MARGIN = np.radians(10.0)
 _SHARE = 0.08  # of the range, on either side
 _ROUNDS = 8
 _CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
 _BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
 _OFF = 1e-9  # radians
+_LONG = 2.0  # radians: longer offsets may as well be meant the other way round
 _ONES = np.ones(3)
 _PARTS = np.zeros((9, 4))  # a matrix's nine numbers -> its skew part as a vector, and its trace
 _PARTS[[7, 2, 3], [0, 1, 2]], _PARTS[[5, 6, 1], [0, 1, 2]], _PARTS[[0, 4, 8], 3] = 1.0, -1.0, 1.0
@@ -36,9 +37,15 @@ _PARTS[[7, 2, 3], [0, 1, 2]], _PARTS[[5, 6, 1], [0, 1, 2]], _PARTS[[0, 4, 8], 3]
 def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
     """Limits (J, 3, 3) of the joints whose local rotations (N, J, 4) are given; joints in `free` get none.
 
-    The ends are what the data show, widened by 4 degrees and 8 % of the range."""
+    The ends are what the data show, widened by 10 degrees and 8 % of the range: a few people do not show all that a
+    joint can do."""
     q = np.asarray(rotations, dtype=float)
     middle = _mean(q)
+    for _ in range(_ROUNDS):
+        offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
+        low, high = offsets.min(axis=0), offsets.max(axis=0)
+        # from the middle of the range vectors stay far from half a turn, where they jump
+        middle = quaternion.multiply(middle, quaternion.from_rotation_vector(0.5 * (low + high)))
     offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
     low, high = offsets.min(axis=0), offsets.max(axis=0)
     margin = _MARGIN + _SHARE * (high - low)
@@ -96,7 +103,15 @@ class JointLimits:
         length = np.sqrt((sine * sine) @ _ONES)
         angle = np.arctan2(length, 0.5 * (parts[..., 3] - 1.0))
         scale = np.where(length > 1e-7, angle / np.maximum(length, 1e-7), 1.0)
-        return scale[..., None] * sine
+        offsets = scale[..., None] * sine
+        return self._other_way_round(offsets, angle) if angle.max() > _LONG else offsets
+
+    def _other_way_round(self, offsets: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """The offsets (..., J, 3), long ones by the long way round where that is nearer to the range: over half a turn
+        the short way jumps to the other side."""
+        long = offsets * (1.0 - 2.0 * np.pi / np.maximum(angle, _LONG))[..., None]
+        over = [np.abs(way - np.clip(way, self.low, self.high)).max(-1) for way in (offsets, long)]
+        return np.where(((angle > _LONG) & (over[1] < over[0]))[..., None], long, offsets)
 
     def beyond(self, local: np.ndarray) -> np.ndarray:
         """How far local rotations (..., J, 3, 3) lie outside, (..., J) rad: out of the box, or bent backwards."""
@@ -111,9 +126,11 @@ class JointLimits:
         offsets = self.offsets(local)
         kept = np.minimum(np.maximum(offsets, self.low), self.high)
         over = np.abs(offsets - kept).max(-1)
-        if over.max() > _OFF:
-            turned = self.middle @ quaternion.to_matrix(quaternion.from_rotation_vector(kept))
-            local = np.where((over > _OFF)[..., None, None], turned, local)
+        outside = over > _OFF
+        if outside.any():
+            local, joints = local.copy(), np.nonzero(outside)
+            turns = quaternion.to_matrix(quaternion.from_rotation_vector(kept[joints]))
+            local[joints] = self.middle[joints[-1]] @ turns
         back = self._backwards(local)
         if back.any():
             local, over = local.copy(), over.copy()
