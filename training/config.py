@@ -13,7 +13,7 @@ from beyond_mocap.synthesis.phase_network.model import ModelSettings
 
 PAGE = "docs/throws-training.md"
 LIMITS = {
-    "epochs": (1, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
+    "epochs": (0, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
     "final_rate": (0.0, 1.0), "keep": (0.05, 1.0), "l1": (0.0, 10.0), "limb_weight": (0.0, 1000.0),
     "body_weight": (0.0, 1000.0), "rollout": (1, 64), "single_frames": (0.0, 1.0), "noise": (0.0, 0.5),
     "seed": (0, 2**31 - 1), "examples": (1, 1000),
@@ -97,7 +97,9 @@ def _object(path: Path) -> dict:
         text = path.read_text("utf-8")
     except UnicodeDecodeError:
         raise InputError(path, "is no text", "JSON in UTF-8", f"see {PAGE}") from None
-    return values.object_of(text, str(path), PAGE)
+    told = values.object_of(text, str(path), PAGE)
+    values.check_object(told, str(path))
+    return told
 
 
 def _value(value, default, where: str):

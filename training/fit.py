@@ -112,7 +112,8 @@ def rate_at(share: float, config: TrainingConfig) -> float:
 
 def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | None) -> float:
     """How much of the training is done, by epochs or by time, whichever is further."""
-    return max(epoch / config.epochs, 0.0 if minutes is None else seconds / (60.0 * minutes))
+    done = epoch / config.epochs if config.epochs else 1.0
+    return max(done, 0.0 if minutes is None else seconds / (60.0 * minutes))
 
 
 def _clipped() -> optax.GradientTransformation:

@@ -60,8 +60,9 @@ def train(
 
 
 def spread_over(examples: Sequence[Example], most: int) -> list[Example]:
-    """At most so many of the examples, of different targets: the first, then always the one whose impact is farthest
-    from those taken."""
+    """At most so many of the examples, all of the first one's subject (movements of one manner are blended better), of
+    different targets: the first, then always the one whose impact is farthest from those taken."""
+    examples = [example for example in examples if example.subject == examples[0].subject]
     places = np.array([(*example.impact, 10.0 * example.limb) for example in examples])
     taken = [0]
     nearest = np.linalg.norm(places - places[0], axis=1)
@@ -84,4 +85,5 @@ def _line(examples: Sequence[Example], trained: Trained) -> str:
     subjects = len({example.subject for example in examples})
     frames = sum(len(example.motion) for example in examples)
     whom = f"{len(examples)} examples of {subjects} subject{'s' if subjects > 1 else ''}, {frames} frames"
-    return f"{whom}; {trained.epochs} epochs, loss {trained.losses[-1]:.4f}"
+    loss = f", loss {trained.losses[-1]:.4f}" if trained.losses else ""
+    return f"{whom}; {trained.epochs} epochs{loss}"

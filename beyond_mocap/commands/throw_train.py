@@ -28,7 +28,7 @@ def add(verbs):
     verb.add_argument("--seed", type=int, help="of first weights, batches and dropout; default: the config's, else 0")
     minutes = partial(between, low=0.01, high=1e5, expected="0.01 to 100000 minutes")
     verb.add_argument("--minutes", type=minutes, metavar="M", help="stop after so many minutes with what stands then")
-    epochs = partial(whole, low=1, high=1_000_000, expected="1 to 1000000")
+    epochs = partial(whole, low=0, high=1_000_000, expected="0 to 1000000")
     verb.add_argument("--epochs", type=epochs, metavar="N", help="times through the examples; default: the config's")
     verb.add_argument("--half", action="store_true", help="store the weights as 16 bits")
     verb.set_defaults(run=run)

@@ -1,0 +1,100 @@
+"""Networks trained on a made throw: what training predicts is what use predicts; losses fall; models come out whole."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.files.network_npz import read_model, write_model
+from beyond_mocap.motion.throws import throw
+from beyond_mocap.synthesis.phase_network.example import describe, example_of, poses
+from beyond_mocap.synthesis.phase_network.frame_step import Stepper
+from beyond_mocap.synthesis.phase_network.limits import JointLimits, learn
+from beyond_mocap.synthesis.phase_network.model import ThrowModel
+from beyond_mocap.synthesis.phase_network.training_set import leg_reach, shared_chains, steps
+from training.config import config_of
+from training.fit import fit
+from training.hierarchy import Networks
+from training.networks import from_use, to_use
+from training.recordings import recordings
+from training.train import train
+
+SMALL = {"units": 12, "layers": 1, "points": 2, "epochs": 8, "batch": 32, "mirrored": False, "noise": 0.0, "fps": 15.0}
+
+
+@pytest.fixture(scope="module")
+def examples():
+    made = []
+    for number, target in enumerate([(12.0, 2.0, 1.0), (9.0, -3.0, 0.4)]):
+        thrown = throw(target, 22.0, fps=60.0)
+        made.append(example_of(f"throw {number}", "someone", thrown.motion, "right_hand", thrown.release, target, fps=15.0))
+    return made
+
+
+def problem(examples, told):
+    chains = shared_chains(examples)
+    limits = learn(np.concatenate([example.motion.rotations for example in examples]))
+    config = config_of({**SMALL, **told})
+    return Networks(recordings(examples), chains, config, leg_reach(examples), JointLimits(chains.skeleton, limits))
+
+
+@pytest.mark.parametrize("kind", ["hierarchy", "single"])
+def test_training_predicts_what_use_predicts(examples, kind):
+    """One frame from the truth with the same random weights: the places of all joints."""
+    trained = problem(examples, {"kind": kind, "linear_start": False})
+    params = jax.tree.map(lambda a: 3.0 * a, trained.first(jax.random.key(5)))
+    model = ThrowModel(
+        trained.settings, examples[0].motion.skeleton,
+        {name: to_use(params[name], trained.scales[name]) for name in params}, leg_reach(examples), tuple(examples),
+    )
+    pose, _, window = steps(examples[0])
+    at = lambda part, frame: type(part)(*(one[frame] for one in part))  # noqa: E731
+    mine, _ = Stepper(model).predicted(at(pose, 7), at(window, 7))
+    recorded, _, _ = trained.data
+    batch = jnp.array([0])
+    (start, told), (truth, _) = recorded.at(batch, batch + 7), recorded.at(batch, batch + 8)
+    theirs, _ = trained._frame(params, start, truth, told, jax.random.key(0))
+    assert np.abs(mine.positions - np.asarray(theirs.positions[0])).max() < 2e-4
+    assert np.linalg.norm(mine.positions - pose.positions[7], axis=-1).max() > 0.01
+
+
+def test_networks_alone_learn_and_a_model_comes_out(examples, tmp_path):
+    config = config_of({**SMALL, "conditioned": False, "rollout": 1, "epochs": 40, "learning_rate": 0.01, "points": 1})
+    losses = []
+    model = train(examples, config, progress=lambda share, text: losses.append(text))
+    write_model(model, tmp_path / "w.npz")
+    again = read_model(tmp_path / "w.npz")
+    assert set(again.networks) == set(config.settings.networks) and "2 examples of 1 subject" in again.trained_on
+    first, last = (float(text.split()[-1]) for text in (losses[1], losses[-1]))
+    assert last < 0.5 * first
+    params, scales = from_use(again.networks["hip"])
+    assert to_use(params, scales).parameters == again.networks["hip"].parameters
+
+
+def test_frames_fed_back_are_learnt(examples):
+    told = problem(examples, {"kind": "single", "rollout": 3, "single_frames": 0.0, "learning_rate": 0.01, "noise": 0.02})
+    trained = fit(told, told.config)
+    assert trained.losses[-1] < 0.7 * trained.losses[0]
+    assert set(trained.parts) == {"loss", "single", "sizes"}
+
+
+def test_alone_and_fed_back_do_not_go_together(examples):
+    with pytest.raises(InputError, match="rollout"):
+        problem(examples, {"conditioned": False, "rollout": 4})
+
+
+def test_examples_of_another_rate_are_refused(examples):
+    with pytest.raises(InputError, match="frames per second"):
+        train(examples, config_of({**SMALL, "fps": 30.0}))
+
+
+def test_recordings_are_held_at_their_end(examples):
+    shorter = replace(examples[1], motion=examples[1].motion.frames(0, 9), release=5.0)
+    told = recordings([examples[0], shorter])
+    assert told.lengths == (len(examples[0].motion), 9)
+    assert np.allclose(told.pose.root[1, -1], poses(shorter).root[-1], atol=1e-6)
+    assert np.allclose(told.window.phase[1, 8:], told.window.phase[1, 8]) and len(describe(shorter)) == 9
+    assert told.digest != recordings([examples[0]]).digest
