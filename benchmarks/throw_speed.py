@@ -4,11 +4,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from beyond_mocap.files.network_npz import read_model
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.throws import throw
 from beyond_mocap.synthesis.phase_network import phase_function
@@ -18,15 +15,14 @@ from beyond_mocap.synthesis.phase_network.features import widths
 from beyond_mocap.synthesis.phase_network.generate import Options, generate
 from beyond_mocap.synthesis.phase_network.model import ModelSettings, ThrowModel
 from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
+from beyond_mocap.throw import shipped_model
 
 from benchmarks.effort import seconds
 from benchmarks.markdown import head, row
-from benchmarks.places import ROOT
 
 FRAMES = 90
 SIZES = (("hierarchy", 4, 3, 96), ("hierarchy", 4, 3, 128), ("hierarchy", 4, 3, 256), ("hierarchy", 1, 8, 256),
          ("single", 4, 4, 512))  # fmt: skip
-SHIPPED = ROOT / "beyond_mocap" / "synthesis" / "phase_network" / "weights"
 _RUNS = 5
 
 
@@ -76,11 +72,8 @@ def section() -> list[str]:
     lines = head(("networks", "control points", "hidden layers", "units", "parameters, million", "MB as float16",
                   f"s for {FRAMES} frames (target 0.12)"))  # fmt: skip
     lines += [networks_row(*size) for size in SIZES]
-    shipped = SHIPPED / "throw.npz"
-    if shipped.exists():
-        lines += ["", *head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
-        lines += throw_rows(read_model(shipped), Path(shipped).name)
-    return lines
+    lines += ["", *head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
+    return lines + throw_rows(shipped_model("throw"), "throw.npz")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from beyond_mocap.planted_examples import planted
 from beyond_mocap.synthesis.phase_network.example import example_of
 from beyond_mocap.throw import Order, shipped_model, throw_at
 
-from benchmarks import effort, markdown
+from benchmarks import effort, markdown, throw_speed
 
 UNSEEN, EACH = (901, 902, 903), 5
 """Seeds of made people whom no shipped weights saw, and movements of each."""
@@ -35,6 +35,7 @@ def section() -> list[str]:
             lines += [f"None: {error}", ""]
             continue
         lines += [f"{model.trained_on}.", "", *unseen_table(model, action), "", *target_table(model, action), ""]
+    lines += ["### What the networks cost", "", *throw_speed.section(), ""]
     return [*lines, "The experiments (Fredriksson §8.3) are in docs/throw-experiments.md.", ""]
 
 
