@@ -24,7 +24,7 @@ from beyond_mocap.synthesis.phase_network.network import forward
 from .arrays import ARRAYS
 from .config import TrainingConfig
 from .losses import effector_error, joint_error, missed_ends, sizes
-from .networks import first_weights, linear_start, scales_of
+from .networks import RIDGES, Linear, first_weights, linear_start, scales_of, sums
 from .recordings import Recordings, single_steps
 
 DROPPED = (SINGLE, "hip", "body")
@@ -40,10 +40,12 @@ class Networks:
     """The problem that `fit` solves: all networks of one model. Recordings are moved to the device once."""
 
     def __init__(
-        self, recorded: Recordings, chains: Chains, config: TrainingConfig, leg_reach: dict, limits: JointLimits
+        self, recorded: Recordings, chains: Chains, config: TrainingConfig, leg_reach: dict, limits: JointLimits,
+        held: np.ndarray | None = None,
     ):
         """leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3. limits: which say the way in which elbows
-        and knees bend. InputError where networks that are trained alone are asked to feed frames back."""
+        and knees bend. held: (N,) examples that `linear` can leave out. InputError where networks that are trained alone
+        are asked to feed frames back."""
         if config.rollout > 1 and not config.settings.conditioned and config.settings.kind == "hierarchy":
             raise InputError("training: rollout", f"{config.rollout} frames without conditioned",
                              "conditioned true, or rollout 1", "networks trained alone have no frame to feed back")  # fmt: skip
@@ -51,7 +53,10 @@ class Networks:
         self.axes = hinge_axes(chains, limits).astype(np.float32)
         self.lengths = recorded.lengths
         self.fits = json.dumps({**config.flat(), "recordings": recorded.digest}, sort_keys=True)
-        self.scales, self._linear, alone = {}, {}, {}
+        self.ridge = config.ridge
+        self.scales, self._sums, alone = {}, {}, {}
+        held = np.zeros(len(self.lengths), bool) if held is None else held
+        held = np.repeat(held, np.array(self.lengths) - 1)
         for name in self.settings.networks:
             x, y, phase = single_steps(name, chains, self.settings, recorded, leg_reach)
             (mean_x, scale_x), (mean_y, scale_y) = scales_of(x), scales_of(y)
@@ -59,7 +64,9 @@ class Networks:
                 "input_mean": mean_x, "input_scale": scale_x, "output_mean": mean_y, "output_scale": scale_y,
             }
             x, theta = (x - mean_x) / scale_x, phase_function.weights(phase, self.settings.points).astype(np.float32)
-            self._linear[name] = linear_start(x, (y - mean_y) / scale_y, theta) if config.linear_start else None
+            if config.linear_start:
+                answer = (y - mean_y) / scale_y
+                self._sums[name] = [sums(x[rows], answer[rows], theta[rows]) for rows in (~held, held)]
             alone[name] = (x, y, theta)
         firsts = np.concatenate([[0], np.cumsum(np.array(self.lengths[:-1], int) - 1)])
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
@@ -70,14 +77,23 @@ class Networks:
         conditioned = self.settings.conditioned or self.settings.kind == SINGLE and self.config.rollout > 1
         return self.config.rollout if conditioned and share >= self.config.single_frames else 0
 
+    def linear(self, ridge: float, whole: bool = True) -> dict[str, Linear]:
+        """The linear answers by name that networks start from, where they do; whole: also of what is `held`."""
+        told = {name: kept.plus(held) if whole else kept for name, (kept, held) in self._sums.items()}
+        return {name: linear_start(one, ridge) for name, one in told.items()}
+
     def first(self, key) -> dict:
         """First weights of all networks, by name."""
+        return self.started(key, self.linear(self.ridge or RIDGES[-1]))
+
+    def started(self, key, linear: dict[str, Linear]) -> dict:
+        """First weights by name, of networks that start from linear answers, where there are any."""
         settings = self.settings
         return {
             name: first_weights(
                 jax.random.fold_in(key, number), len(self.scales[name]["input_mean"]),
                 len(self.scales[name]["output_mean"]), settings.layers, settings.units, settings.points,
-                self._linear[name],
+                linear.get(name),
             )
             for number, name in enumerate(settings.networks)
         }

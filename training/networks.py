@@ -16,9 +16,9 @@ SMALLEST_SCALE = 1e-3
 
 LIFT = 6.0
 """What is added to a value that is to pass an ELU unchanged: so many deviations below its mean hardly any comes."""
-RIDGE = {"plain": 0.01, "phased": 0.001}
-"""Ridge of the linear start for each row of normalised inputs, without and with phases. A tenth of either follows the
-examples more closely and runs away when frames are fed back on another body."""
+RIDGES = (0.001, 0.003, 0.01, 0.03, 0.1)
+"""Ridges of the linear start, for each row of normalised inputs: smaller ones follow the examples more closely and run
+away when frames are fed back on another body, or on recordings with some noise."""
 _ROWS = 2048
 
 
@@ -60,24 +60,44 @@ def _passing(weight, bias, linear: Linear, layer: int, last: int):
     return weight, bias.at[:, :count].set(-LIFT)
 
 
-def linear_start(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> Linear:
-    """The linear answer to normalised inputs x (N, in), whose weights glide with the phase, that comes nearest to y
-    (N, out), by ridge regression. theta: (N, K) control point weights.
+class Sums(NamedTuple):
+    """What regression needs of rows: squares (C, C) of the columns, products (C, out) with the answers, their number."""
 
-    With one control point that is y = W x + b. With several it is y = sum_k theta_k (W + D_k) x + b_k: what is common to
-    all phases and what is not are kept small alike, so that no control point strays where it has few frames.
-    """
-    points, width, total = theta.shape[1], x.shape[1], len(x)
-    count = (width + 1) * (1 if points == 1 else points + 1)
+    squares: np.ndarray
+    products: np.ndarray
+    rows: int
+    points: int
+
+    def plus(self, other: "Sums") -> "Sums":
+        """Of both sets of rows."""
+        squares, products = self.squares + other.squares, self.products + other.products
+        return Sums(squares, products, self.rows + other.rows, self.points)
+
+
+def sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> Sums:
+    """Of normalised inputs x (N, in) and answers y (N, out); theta: (N, K) control point weights."""
+    points = theta.shape[1]
+    count = (x.shape[1] + 1) * (1 if points == 1 else points + 1)
     squares, products = np.zeros((count, count)), np.zeros((count, y.shape[1]))
-    for first in range(0, total, _ROWS):
+    for first in range(0, len(x), _ROWS):
         rows = slice(first, first + _ROWS)
         columns = _columns(x[rows].astype(float), theta[rows].astype(float))
         squares += columns.T @ columns
         products += columns.T @ y[rows].astype(float)
-    ridge = RIDGE["plain" if points == 1 else "phased"] * total
-    found = np.linalg.solve(squares + ridge * np.eye(count), products).reshape(-1, width + 1, y.shape[1])
-    every = found if points == 1 else found[:1] + found[1:]
+    return Sums(squares, products, len(x), points)
+
+
+def linear_start(told: Sums, ridge: float) -> Linear:
+    """The linear answer, whose weights glide with the phase, that comes nearest, by ridge regression.
+
+    With one control point that is y = W x + b. With several it is y = sum_k theta_k ((W + D_k) x + b_k): what is common
+    to all phases and what is not are kept small alike, so that no control point strays where it has few frames.
+    """
+    count, out = told.products.shape
+    shares = 1 if told.points == 1 else told.points + 1
+    found = np.linalg.solve(told.squares + ridge * told.rows * np.eye(count), told.products)
+    found = found.reshape(shares, count // shares, out)
+    every = found if told.points == 1 else found[:1] + found[1:]
     return Linear(every[:, :-1].swapaxes(1, 2).astype(np.float32), every[:, -1].astype(np.float32))
 
 

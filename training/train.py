@@ -18,6 +18,7 @@ from .fit import Trained, fit
 from .hierarchy import Networks
 from .networks import to_use
 from .recordings import recordings
+from .ridge import held_out, least_astray
 
 
 def train(
@@ -42,21 +43,29 @@ def train(
     reference = reference_of(seen) if settings.phase == "warped" else None
     reach = leg_reach(seen)
     limits = learn(np.concatenate([one.motion.rotations for one in seen]), (0, *chains.above, chains.hips))
-    problem = Networks(recordings(seen, reference), chains, config, reach, JointLimits(chains.skeleton, limits))
+    held = held_out(seen)
+    problem = Networks(recordings(seen, reference), chains, config, reach, JointLimits(chains.skeleton, limits), held)
+
+    def model_of(params: dict, line: str) -> ThrowModel:
+        return ThrowModel(
+            settings=settings,
+            skeleton=chains.skeleton,
+            networks={name: to_use(params[name], problem.scales[name]) for name in settings.networks},
+            leg_reach=reach,
+            examples=spread_over(examples, config.examples),
+            stature=float(np.mean([example.stature for example in examples])),
+            joint_limits=limits,
+            reference=reference,
+            trained_on=line,
+        )
+
+    if config.linear_start and not config.ridge:
+        progress(0.0, "the start is chosen")
+        problem.ridge = least_astray(problem, [one for one, out in zip(seen, held) if out], model_of, cancelled)
     trained = fit(
         problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes, progress=progress, cancelled=cancelled,
     )
-    return ThrowModel(
-        settings=settings,
-        skeleton=chains.skeleton,
-        networks={name: to_use(trained.params[name], problem.scales[name]) for name in settings.networks},
-        leg_reach=reach,
-        examples=spread_over(examples, config.examples),
-        stature=float(np.mean([example.stature for example in examples])),
-        joint_limits=limits,
-        reference=reference,
-        trained_on=_line(examples, trained),
-    )
+    return model_of(trained.params, _line(examples, trained))
 
 
 def spread_over(examples: Sequence[Example], most: int) -> list[Example]:
