@@ -16,7 +16,7 @@ SMALLEST_SCALE = 1e-3
 
 LIFT = 6.0
 """What is added to a value that is to pass an ELU unchanged: so many deviations below its mean hardly any comes."""
-RIDGES = (0.001, 0.003, 0.01, 0.03, 0.1)
+RIDGES = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 """Ridges of the linear start, for each row of normalised inputs: smaller ones follow the examples more closely and run
 away when frames are fed back on another body, or on recordings with some noise."""
 _ROWS = 2048
