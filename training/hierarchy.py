@@ -14,7 +14,7 @@ from beyond_mocap.synthesis.phase_network import phase_function
 from beyond_mocap.synthesis.phase_network.answers import answered, network_output
 from beyond_mocap.synthesis.phase_network.chains import LIMB_OF, Chains
 from beyond_mocap.synthesis.phase_network.description import Windows
-from beyond_mocap.synthesis.phase_network.features import network_input, phase_of
+from beyond_mocap.synthesis.phase_network.features import guides, network_input, phase_of
 from beyond_mocap.synthesis.phase_network.kinematics import Pose, places_and_turns
 from beyond_mocap.synthesis.phase_network.limb_reach import bent_limb, hinge_axes
 from beyond_mocap.synthesis.phase_network.limits import JointLimits
@@ -66,7 +66,8 @@ class Networks:
             x, theta = (x - mean_x) / scale_x, phase_function.weights(phase, self.settings.points).astype(np.float32)
             if config.linear_start:
                 answer = (y - mean_y) / scale_y
-                self._sums[name] = [sums(x[rows], answer[rows], theta[rows]) for rows in (~held, held)]
+                told = guides(name, chains, self.settings)
+                self._sums[name] = [sums(x[rows], answer[rows], theta[rows], told) for rows in (~held, held)]
             alone[name] = (x, y, theta)
         firsts = np.concatenate([[0], np.cumsum(np.array(self.lengths[:-1], int) - 1)])
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))

@@ -19,6 +19,9 @@ LIFT = 6.0
 RIDGES = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 """Ridges of the linear start, for each row of normalised inputs: smaller ones follow the examples more closely and run
 away when frames are fed back on another body, or on recordings with some noise."""
+GUIDE = 0.01
+"""What the ridge counts for inputs that say how inverse kinematics would reach (`features.guides`): they hold on any
+body, all others are a little of their own."""
 _ROWS = 2048
 
 
@@ -61,20 +64,22 @@ def _passing(weight, bias, linear: Linear, layer: int, last: int):
 
 
 class Sums(NamedTuple):
-    """What regression needs of rows: squares (C, C) of the columns, products (C, out) with the answers, their number."""
+    """What regression needs of rows: squares (C, C) of the columns, products (C, out) with the answers, how many rows;
+    points: control points; guides: how many of the last inputs are to count `GUIDE` of the ridge."""
 
     squares: np.ndarray
     products: np.ndarray
     rows: int
     points: int
+    guides: int = 0
 
     def plus(self, other: "Sums") -> "Sums":
         """Of both sets of rows."""
         squares, products = self.squares + other.squares, self.products + other.products
-        return Sums(squares, products, self.rows + other.rows, self.points)
+        return Sums(squares, products, self.rows + other.rows, self.points, self.guides)
 
 
-def sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> Sums:
+def sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray, guides: int = 0) -> Sums:
     """Of normalised inputs x (N, in) and answers y (N, out); theta: (N, K) control point weights."""
     points = theta.shape[1]
     count = (x.shape[1] + 1) * (1 if points == 1 else points + 1)
@@ -84,7 +89,7 @@ def sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> Sums:
         columns = _columns(x[rows].astype(float), theta[rows].astype(float))
         squares += columns.T @ columns
         products += columns.T @ y[rows].astype(float)
-    return Sums(squares, products, len(x), points)
+    return Sums(squares, products, len(x), points, guides)
 
 
 def linear_start(told: Sums, ridge: float) -> Linear:
@@ -95,7 +100,9 @@ def linear_start(told: Sums, ridge: float) -> Linear:
     """
     count, out = told.products.shape
     shares = 1 if told.points == 1 else told.points + 1
-    found = np.linalg.solve(told.squares + ridge * told.rows * np.eye(count), told.products)
+    weight = np.ones((shares, count // shares))
+    weight[:, -1 - told.guides : -1] = GUIDE
+    found = np.linalg.solve(told.squares + np.diag(ridge * told.rows * weight.ravel()), told.products)
     found = found.reshape(shares, count // shares, out)
     every = found if told.points == 1 else found[:1] + found[1:]
     return Linear(every[:, :-1].swapaxes(1, 2).astype(np.float32), every[:, -1].astype(np.float32))

@@ -18,7 +18,7 @@ def test_defaults_and_what_a_file_says(tmp_path):
 
 
 @pytest.mark.parametrize("text, said", [
-    ('{"epoch": 3}', "epoch"), ('{"epochs": 2.5}', "epochs"), ('{"epochs": 0}', "epochs"), ('{"kind": "tree"}', "kind"),
+    ('{"epoch": 3}', "epoch"), ('{"epochs": 2.5}', "epochs"), ('{"epochs": -1}', "epochs"), ('{"kind": "tree"}', "kind"),
     ('{"conditioned": 1}', "conditioned"), ('{"keep": NaN}', "NaN"), ('{"units": "many"}', "units"), ("[1]", "object"),
     ('{"seed": 1, "seed": 2}', "twice"), ("{", "JSON"), ('{"learning_rate": -1}', "learning_rate"),
 ])

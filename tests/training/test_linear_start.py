@@ -51,3 +51,11 @@ def test_sums_of_parts_are_those_of_the_whole():
     parts = sums(x[:1000], y[:1000], theta[:1000]).plus(sums(x[1000:], y[1000:], theta[1000:]))
     for one, other in zip(linear_start(parts, 0.01), linear_start(sums(x, y, theta), 0.01)):
         np.testing.assert_allclose(one, other, atol=1e-5)
+
+
+def test_guides_are_hardly_kept_small():
+    """Two inputs that say the same: the guide among them is believed."""
+    x, theta, _, _ = planted(4)
+    x[:, -1] = x[:, 0]
+    found = linear_start(sums(x, x[:, :OUTPUTS], theta, guides=1), 0.1)
+    assert np.abs(found.weights[:, 0, -1] - 1.0).max() < 0.1 and np.abs(found.weights[:, 0, 0]).max() < 0.1
