@@ -14,7 +14,7 @@ from beyond_mocap.synthesis.phase_network.model import ModelSettings
 from beyond_mocap.synthesis.phase_network.training_set import leg_reach, steps
 
 TARGET = (12.0, 3.0, 1.2)
-CASES = [ModelSettings(), ModelSettings("single", wrist="inferred", frame="static")]
+CASES = [ModelSettings(guided=True), ModelSettings("single", wrist="inferred", frame="static")]
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +24,10 @@ def example():
 
 
 def told(settings, chains, reach, pose, truth, window, xp):
-    """Everything that is computed of a step: inputs, phases, truths, ends, and the pose that the truth leads to."""
+    """Everything that is computed of a step: inputs, phases, truths, ends, and the pose that the truth leads to; of arms
+    and legs one each, because jax compiles for seconds."""
     found, after = {}, pose
-    for name in settings.networks:
+    for name in [name for name in settings.networks if name not in ("left_arm", "right_leg")]:
         y = network_output(name, chains, settings, pose, truth, xp)
         x = network_input(name, chains, settings, pose, after, window, xp)
         after = answered(name, chains, settings, y, pose, after, window, xp)
