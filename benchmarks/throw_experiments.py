@@ -108,7 +108,7 @@ def _train(run: Run, out: Path, scale: Scale) -> dict:
     given = _given(run)
     wished = {**run.variant.config, "action": ACTIONS[run.data], "fps": FPS}
     if run.variant.everyone:
-        wished["epochs"] = max(1, wished["epochs"] // (len(subjects_of(run.data)) - 1))
+        wished["epochs"] = -(-wished["epochs"] // (len(subjects_of(run.data)) - 1))
     if wished["units"] == "equal":
         wished["units"] = equal_units(run, scale, given[0].motion.skeleton)
     config = config_of({**wished, "mirrored": False}, run.variant.name)  # all throw and kick with the same side

@@ -59,8 +59,9 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
     first = {**HIS, **dropped, "wrist": "inferred"}
     second = {**HIS, **dropped, "wrist": "given"}
     single = {**first, **many, "kind": "single"}
-    ours = {"conditioned": True, "guided": True, "linear_start": True, "rollout": 8, "learning_rate": 1e-4,
+    ours = {"conditioned": True, "guided": True, "linear_start": True, "ridge": 0.0, "rollout": 8, "learning_rate": 1e-4,
             "frame": "hip", "keep": 1.0, "noise": 0.02, "wrist": "given", **few}
+    shipped = {**ours, "epochs": 0, "units": 96}
     plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1, "guided": False}
     return (
         *(Variant(name, words, {**plain, **changes}, not name.endswith("raw"), linear=True) for name, words, changes in (
@@ -78,6 +79,9 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
         Variant("single-effectors", "one network with the end-effector loss (§9.2)",
                 {**single, "single_effector": True}, False),
         Variant("ours", "six networks trained in order, fed back (§9.4)", ours, True),
+        Variant("start", "as the shipped weights: limbs guided, linear by phase, the ridge chosen", shipped, True),
+        Variant("start-raw", "as the shipped weights", shipped, False),
+        Variant("start-everyone", "as the shipped weights, from all others retargeted (§10.2)", shipped, True, True),
         Variant("single-equal", "one network with as many parameters as the six", {**single, "units": "equal"}, False),
         Variant("feed-forward-equal", "six feed-forward networks with as many parameters as the six",
                 {**second, **few, "layers": 8, "points": 1, "units": "equal"}, True),

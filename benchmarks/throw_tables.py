@@ -23,6 +23,8 @@ PAIRS = (
     ("Six linear maps or one, nothing corrected", "linear-phased-raw", "linear-single-raw", ""),
     ("Limbs told how inverse kinematics would reach, or not", "linear-guided", "linear-phased", ""),
     ("The same, nothing corrected", "linear-guided-raw", "linear-phased-raw", ""),
+    ("Started as the shipped weights are, or trained from chance as he did", "start", "hierarchy", ""),
+    ("The same, nothing corrected", "start-raw", "hierarchy-raw", ""),
     ("As many parameters: one network or six", "hierarchy-raw", "single-equal", ""),
     ("As many parameters: phase-functioned or feed-forward", "hierarchy", "feed-forward-equal", ""),
     ("His question of §9.2: one network with the end-effector loss against the same without", "single-effectors",
@@ -122,16 +124,22 @@ def everyone(found: Found) -> list[str]:
     """Networks of one subject against networks of all others retargeted (§10.2), by the subject that is tested."""
     lines = []
     for data, heading in WORDS.items():
-        mine = subjects(found, data, "ours-everyone")
-        if mine is None or not of_variant(found, data, "ours"):
-            continue
-        rows = []
-        for tested in mine.subjects:
-            each = [e for one in of_variant(found, data, "ours").values() for e in one["each"] if e["subject"] == tested]
-            if each:
-                rows.append((tested, np.array([e["deviation"] for e in each]),
-                             np.array([np.nan if e["impact"] is None else e["impact"] for e in each])))
-        one = gathered("ours", rows)
-        lines += [f"**{heading}**, by the subject that is tested", "", *test_table(mine, one), "",
-                  *(f"{line}." for line in verdicts(mine, one)), ""]
+        for all_, one in (("start-everyone", "start"), ("ours-everyone", "ours")):
+            mine = subjects(found, data, all_)
+            if mine is None or not of_variant(found, data, one):
+                continue
+            other = by_tested(found, data, one, mine.subjects)
+            lines += [f"**{heading}**, `{all_}` - `{one}`, by the subject that is tested:", "", *test_table(mine, other), "",
+                      *(f"{line}." for line in verdicts(mine, other)), ""]
     return ["### One network from all others (§10.2) or from one of them", "", *lines] if lines else []
+
+
+def by_tested(found: Found, data: str, variant: str, tested: Sequence[str]) -> Subjects:
+    """The figures of a variant's models by the subject that was tested, whoever they were trained on."""
+    rows = []
+    for name in tested:
+        each = [e for one in of_variant(found, data, variant).values() for e in one["each"] if e["subject"] == name]
+        if each:
+            rows.append((name, np.array([e["deviation"] for e in each]),
+                         np.array([np.nan if e["impact"] is None else e["impact"] for e in each])))
+    return gathered(variant, rows)

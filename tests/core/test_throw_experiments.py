@@ -49,8 +49,8 @@ def test_his_models_are_his():
     assert (his["single-raw"]["layers"], his["single-raw"]["units"], his["single-raw"]["epochs"]) == (4, 512, 600)
     assert (his["hierarchy"]["layers"], his["hierarchy"]["units"], his["hierarchy"]["epochs"]) == (3, 256, 400)
     assert (his["feed-forward"]["layers"], his["feed-forward"]["points"]) == (8, 1)
-    assert {v.name for v in variants(PAPER) if not v.corrected and not v.linear} == {
-        "single-raw", "hierarchy-raw", "single-effectors", "single-equal"}
+    assert {v.name for v in variants(PAPER) if not (v.corrected or v.linear)} == {
+        "single-raw", "hierarchy-raw", "single-effectors", "start-raw", "single-equal"}
     assert all(his[name]["wrist"] == "inferred" for name in ("single-raw", "hierarchy-raw"))
     assert his["hierarchy"]["wrist"] == "given" and not his["hierarchy"]["conditioned"]
 
