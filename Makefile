@@ -2,11 +2,13 @@
 # make and Python 3.11 (or 3.13). `make help` lists what there is.
 PLATFORMS ?= linux-x64
 PYTEST = -P -m pytest
+TRAINED = .venv-training/bin/python -m beyond_mocap
+WEIGHTS = beyond_mocap/synthesis/phase_network/weights
 REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training test test-core test-blender test-oldest test-training demo bench extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training test test-core test-blender test-oldest test-training demo bench weights extension extension-all window-test window-bench \
   pictures clean
 
 help:
@@ -15,6 +17,7 @@ help:
 	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
+	@echo 'make weights        the shipped networks anew: made throws and kicks, trained on; some minutes'
 	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
 	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
 	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
@@ -53,6 +56,14 @@ demo: venv
 
 bench: venv
 	.venv/bin/python -m benchmarks
+
+weights: training
+	@rm -rf build/examples
+	@set -ex; for action in throw kick; do \
+	  $(TRAINED) throw examples --out build/examples/$$action --action $$action --seed 0; \
+	  $(TRAINED) throw train build/examples/$$action --action $$action --half --out build/examples/$$action.npz; \
+	  mv build/examples/$$action.npz $(WEIGHTS)/$$action.npz; \
+	done
 
 extension: venv
 	.venv/bin/python packaging/build.py --platforms $(PLATFORMS)

@@ -148,3 +148,22 @@ def test_folders_without_examples(own, tmp_path):
         examples_in(own, "kick")
     with pytest.raises(InputError, match="no such folder"):
         examples_in(tmp_path / "nowhere")
+
+
+def test_kicks_come_back_by_the_table_and_by_the_foot_alone(tmp_path):
+    out = tmp_path / "kicks"
+    write_planted(out, "kick", 1, 1, seed=3)
+    _, truth = planted("kick", 3, 0)
+    told = examples_in(out, "kick")[0]
+    assert told.limb == 3 and abs(told.impact[2] - truth.impact[2]) < 1e-4
+    (out / "throws.csv").unlink()
+    found = examples_in(out, "kick")[0]
+    assert found.limb == 3 and abs(found.release - told.release) <= 0.03 * 30.0 + 0.5
+    assert abs(np.linalg.norm(found.launch) / np.linalg.norm(truth.velocity) - 1.0) < 0.25
+    assert found.impact[2] >= 0.1
+
+
+def test_a_broken_recording_is_left_out(own):
+    clip(own).write_text("HIERARCHY\nROOT")
+    told = []
+    assert len(examples_in(own, told=told.append)) == 1 and "subject03_throw001.bvh" in told[0]

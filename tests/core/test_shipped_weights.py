@@ -1,0 +1,54 @@
+"""The weights that come with the project: small enough, of our own adult, and they hit what they are asked to."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.evaluation.throws.deviation import deviations
+from beyond_mocap.motion.adult import adult_skeleton
+from beyond_mocap.planted_examples import planted
+from beyond_mocap.synthesis.phase_network.description import scaled
+from beyond_mocap.synthesis.phase_network.example import describe, example_of
+from beyond_mocap.synthesis.phase_network.generate import Options, generate
+from beyond_mocap.throw import WEIGHTS, Order, shipped_model, throw_at
+
+ACTIONS = ("throw", "kick")
+TARGETS = {"throw": ((8.0, 0.0, 1.0), (15.0, 4.0, 1.5), (20.0, -3.0, 0.5)), "kick": ((11.0, 0.0, 1.0), (20.0, -3.0, 1.8))}
+LIMBS = {"throw": "left_hand", "kick": "left_foot"}
+_LARGEST = 3_000_000
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_they_are_small_and_of_the_projects_own_adult(action):
+    assert (WEIGHTS / f"{action}.npz").stat().st_size <= _LARGEST
+    model = shipped_model(action)
+    adult, skeleton = adult_skeleton(), model.skeleton
+    assert model.settings.action == action and set(skeleton.names) == set(adult.names)
+    order = [adult.index(name) for name in skeleton.names]
+    assert np.abs(skeleton.offsets - adult.offsets[order]).max() < 1e-3
+    assert {example.subject for example in model.examples} == {"adult"}
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+@pytest.mark.parametrize("seed, number", [(0, 44), (9, 1)])
+def test_networks_alone_follow_what_they_never_saw(action, seed, number):
+    """Of the adult a number above 40, and a person whose seed no training had."""
+    model = shipped_model(action)
+    _, made = planted(action, seed, number)
+    example = example_of("kept back", "", made.motion, made.limb, made.release, made.impact, made.velocity, 30.0)
+    wanted = scaled(describe(example), model.stature / example.stature)
+    networks = Options(pose_iterations=0, ik=False, blend=False, limits=False)
+    assert deviations(generate(model, wanted, options=networks).effectors, wanted.effectors).max() <= 0.03 * _FAR[seed > 0]
+    assert deviations(generate(model, wanted).effectors, wanted.effectors).max() <= 0.01
+
+
+_FAR = (1.0, 1.5)
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_they_hit_what_is_aimed_at(action):
+    model = shipped_model(action)
+    for target in TARGETS[action]:
+        thrown = throw_at(model, Order(np.array(target)))
+        assert thrown.impact_error <= 0.10 and thrown.moved <= 0.05 and not thrown.beyond > 0.01
+    other = throw_at(model, Order(np.array(TARGETS[action][0]), limb=LIMBS[action]))
+    assert other.limb == LIMBS[action] and other.impact_error <= 0.10
