@@ -95,6 +95,17 @@ def bpy_vector(values):
     return Vector(values)
 
 
+@pytest.mark.parametrize("act", ["throw", "kick"])
+def test_the_models_that_come_with_it(act, monkeypatch):
+    monkeypatch.undo()  # the extension's own
+    body = a_body()
+    assert press(getattr(bpy.ops.beyond_mocap, f"{act}_at_target")) == {"FINISHED"}
+    wish, first = body.beyond_mocap_throw, int(np.floor(body.beyond_mocap_throw.release))
+    assert closest(wish.flown, np.array(TARGET), first + 1, first + 60) < 0.10
+    moved = next(line for line in wish.figures.splitlines() if "moved to hit" in line)
+    assert float(moved.split(":")[1].split()[0]) <= 5.0
+
+
 def test_a_library_joins_it(room, clips):
     bpy.context.scene.beyond_mocap.library_folder = str(clips)
     body = a_body("walking_1_2", frame=70)
