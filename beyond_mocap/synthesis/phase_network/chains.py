@@ -90,13 +90,13 @@ def chains_of(skeleton: Skeleton) -> Chains:
     body = identify(skeleton)
     _check(body.left, body.right)
     parents = skeleton.parents
-    arms = [_between(parents, limb.upper_arm, limb.hand) for limb in (body.left, body.right)]
-    legs = [_between(parents, limb.upper_leg, limb.toe_or_foot) for limb in (body.left, body.right)]
+    arms = [_between(skeleton, limb.upper_arm, limb.hand) for limb in (body.left, body.right)]
+    legs = [_between(skeleton, limb.upper_leg, limb.toe_or_foot) for limb in (body.left, body.right)]
     sockets = (body.left.upper_arm, body.right.upper_arm, body.left.upper_leg, body.right.upper_leg)
     top = body.neck if body.head is None else body.head
     trunk: set[int] = set()
     for joint in (*(parents[arm] for arm in sockets[:2]), *([] if top is None else [top])):
-        trunk |= set(_between(parents, body.hips, joint)) - {body.hips}
+        trunk |= set(_between(skeleton, body.hips, joint)) - {body.hips}
     if not trunk:
         raise InputError("skeleton", "no joint between the hips and the arms", "a spine")
     members = dict(zip(HIERARCHY, [(body.hips,), tuple(sorted(trunk)), *arms, *legs]))
@@ -106,7 +106,7 @@ def chains_of(skeleton: Skeleton) -> Chains:
     return Chains(
         skeleton=skeleton,
         hips=body.hips,
-        above=tuple(j for j in _between(parents, 0, body.hips) if j != body.hips),
+        above=tuple(j for j in _between(skeleton, 0, body.hips) if j != body.hips),
         members=members,
         references=references,
         known=_known(skeleton, members),
@@ -133,11 +133,11 @@ def _check(left: Limb, right: Limb) -> None:
         raise InputError("skeleton", found, "a body with arms, hands and feet", "take another rig")
 
 
-def _between(parents, high: int, low: int) -> tuple[int, ...]:
+def _between(skeleton: Skeleton, high: int, low: int) -> tuple[int, ...]:
     """Joints from `high` down to `low`, both included; InputError where `low` does not hang below."""
-    way = sorted(structure.path(parents, low))
+    way = sorted(structure.path(skeleton.parents, low))
     if high not in way:
-        found = f"joint {low} does not hang below joint {high}"
+        found = f"{skeleton.names[low]} does not hang below {skeleton.names[high]}"
         raise InputError("skeleton", found, "limbs whose joints follow each other")
     return tuple(way[way.index(high) :])
 

@@ -277,3 +277,11 @@ def test_a_neck_without_a_head_is_of_the_body(made):
     chains = chains_of(example.motion.skeleton)
     names = [example.motion.skeleton.names[joint] for joint in (*chains.above, chains.hips, *chains.effectors)]
     assert names == ["SimulationBone", "Hips", "LeftHand", "RightHand", "LeftToeBase", "RightToeBase"]
+
+
+def test_limbs_that_do_not_hang_together_are_named(made):
+    skeleton = made.motion.skeleton
+    hips = [0 if name == "LeftHand" else parent for name, parent in zip(skeleton.names, skeleton.parents)]
+    loose = Skeleton(skeleton.names, hips, skeleton.offsets, skeleton.end_parents, skeleton.end_offsets)
+    with pytest.raises(InputError, match="LeftHand does not hang below LeftArm"):
+        chains_of(loose)
