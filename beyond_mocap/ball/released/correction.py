@@ -33,6 +33,7 @@ CLOSE = 1e-3
 # that is asked for and of speed that is not, metres of ball.
 _TURN, _PACE, _LATER, _SPEED, _OWN_SPEED, _REST = 8.0, 1.5, 1.5, 30.0, 300.0, 10.0
 _ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41
+_LOOKS, _TRIED = 4, 2
 _STEP = 1e-3  # of frames, metres, m/s and radians, in differences
 _LEAST = 3  # frames that a motion needs before and after the release
 
@@ -134,6 +135,7 @@ class _Search:
         self.bounds = np.zeros(2)
         self.walks = freedom.elsewhere and not part.free and isinstance(part, AtFoot)
         self.free = 2 if self.walks else part.free
+        self._rigid = (6, 7, 8, 9) if self.walks else (6, 7)
 
     def whole(self) -> Corrected:
         """First what costs little, then what is left; the pace is changed only where it has to be."""
@@ -141,13 +143,32 @@ class _Search:
         for pace in (0.0, self.freedom.pace):
             self.bounds = np.array([self.freedom.turn, pace])
             start = self._start(self.asked)
-            change, source = _Change.none(self.free, self._seconds(self.given, self.asked, start)), self.asked
-            for _ in range(3 if self.walks else 2):
-                change, source = self._looked(change, source, start)
-            tried.append(self._hit(change, source, start))
-            if not self.freedom.pace or (tried[-1].missed < FINE and tried[-1].moved < LITTLE):
+            for change, source in self._promising(start)[:_TRIED]:
+                tried.append(self._hit(change, source, start))
+                if tried[-1].missed < FINE and tried[-1].moved < LITTLE:
+                    return tried[-1]
+            if not self.freedom.pace:
                 break
         return min(tried, key=lambda found: found.missed + 0.2 * found.moved)
+
+    def _promising(self, start) -> list[tuple[_Change, float]]:
+        """Changes of what costs little, and their releases; the one that leaves least to be moved first. Slopes lead
+        astray where a foot meets a ball, so each is judged by where it really leads."""
+        now = _Change.none(self.free, self._seconds(self.given, self.asked, start)), self.asked
+        found = []
+        for _ in range(_LOOKS if isinstance(self.part, AtFoot) else 2):
+            now = self._looked(*now, start)
+            found.append((self._left_over(*now, start), len(found), now))
+        return [each for _, _, each in sorted(found, key=lambda one: one[:2])]
+
+    def _left_over(self, change: _Change, source: float, start) -> float:
+        """What moving the limb would still cost."""
+        motion, frame = self._moved(change), source / (1.0 + change.pace)
+        points, velocities = carried(self.part, motion, np.array([frame]))
+        costs = self._cost(motion, frame), at_once(points.shape[1])
+        rest = _Change(np.concatenate([np.zeros(6), change.row[6:]]))
+        rows, _ = self._best(points, velocities, rest, start, *costs, fixed=self._rigid)
+        return sum(float(pair @ costs[0] @ pair) for pair in rows[0, :6].reshape(2, 3).T)
 
     def _start(self, frame: float) -> np.ndarray:
         return self.part.rest(self.given, frame, self.target, self.ball)
@@ -196,7 +217,6 @@ class _Search:
         frame = source / (1.0 + change.pace)
         limb = LedLimb.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps))
         best, base, step = None, change, 1.0
-        fixed = (6, 7, 8, 9) if self.walks else (6, 7)
         follows, known = at_once(grip_point(motion, self.part, np.array([frame])).shape[1]), False
         for number in range(_ROUNDS):
             now = limb.shifted(change.row[:6])
@@ -212,7 +232,7 @@ class _Search:
                 follows, known = limb.follows(base.row[:6], frame, *there), True
             if better or slow:
                 costs = limb.shifts.cost, follows
-                rows, _ = self._best(*there, base, start, *costs, fixed=fixed, near=number >= _FREE_ROUNDS)
+                rows, _ = self._best(*there, base, start, *costs, fixed=self._rigid, near=number >= _FREE_ROUNDS)
             step = 1.0 if better else 0.4 * step
             change = _Change(base.row + step * (rows[0] - base.row))
         return best
