@@ -33,15 +33,16 @@ class TrainingConfig:
     single_frames: share of the training that goes by single frames before that. noise: radians by which the pose at the
     start of a stretch is off. mirrored: whether each example is also taken mirrored.
     linear_start: whether networks start from what linear regression says, else at random. ridge: of that regression, a
-    row; 0: chosen on examples that are left out for it. examples: most that the model keeps to start from (§7.7.1). seed: of first weights, order, dropout and noise.
+    row; 0: chosen on examples that are left out for it. examples: most that the model keeps to start from (§7.7.1).
+    seed: of first weights, order, dropout and noise.
     """
 
-    settings: ModelSettings = field(default_factory=lambda: ModelSettings(units=96, conditioned=True))
-    epochs: int = 400
-    macro: int = 10
+    settings: ModelSettings = field(default_factory=lambda: ModelSettings(units=96, conditioned=True, guided=True))
+    epochs: int = 0
+    macro: int = 2
     batch: int = 512
-    learning_rate: float = 1e-3
-    final_rate: float = 0.01
+    learning_rate: float = 1e-4
+    final_rate: float = 0.05
     keep: float = 1.0
     l1: float = 0.01
     limb_weight: float = 50.0
@@ -49,7 +50,7 @@ class TrainingConfig:
     effector_loss: bool = True
     single_effector: bool = False
     rollout: int = 8
-    single_frames: float = 0.3
+    single_frames: float = 0.0
     noise: float = 0.02
     mirrored: bool = True
     linear_start: bool = True

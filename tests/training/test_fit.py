@@ -19,7 +19,7 @@ from training.config import config_of
 from training.fit import fit, rate_at
 
 TOP = Path(__file__).resolve().parents[2]
-CONFIG = config_of({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "seed": 3})
+CONFIG = config_of({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "final_rate": 0.01, "seed": 3})
 
 
 class Line:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.synthesis.phase_network import phase_function, phases
+from beyond_mocap.synthesis.phase_network.correct import bend_to
 from beyond_mocap.synthesis.phase_network.network import forward
 
 SIZES = (6, 5, 5, 4)
@@ -68,3 +69,16 @@ def test_the_distance_phase_is_the_same_function():
     distance = np.linspace(0.2, 1.2, 21)
     there = phases.distance_phase(jnp.asarray(distance), (0.4, 1.0), jnp)
     np.testing.assert_allclose(there, phases.distance_phase(distance, (0.4, 1.0)), atol=1e-6)
+
+
+def test_a_straight_limb_has_slopes():
+    """Straight and asked to stay so, in single precision: where the bend's sine is zero its root has no slope."""
+    top, middle, end = (jnp.array([0.0, 0.0, height], jnp.float32) for height in (1.0, 0.6, 0.2))
+    across = jnp.array([0.0, 1.0, 0.0], jnp.float32)
+
+    def bent(middle, target):
+        first, second, place = bend_to(top, middle, end, target, across, jnp)
+        return (first**2).sum() + second[0].sum() + place.sum()
+
+    slopes = jax.grad(bent, (0, 1))(middle, end)
+    assert all(np.isfinite(slope).all() for slope in slopes)

@@ -22,7 +22,7 @@ from training.networks import from_use, to_use
 from training.recordings import recordings
 from training.train import train
 
-SMALL = {"units": 12, "layers": 1, "points": 2, "epochs": 8, "batch": 32, "mirrored": False, "noise": 0.0, "fps": 15.0}
+SMALL = {"units": 12, "layers": 1, "points": 2, "epochs": 8, "batch": 32, "mirrored": False, "noise": 0.0, "fps": 15.0, "macro": 50}
 
 
 @pytest.fixture(scope="module")

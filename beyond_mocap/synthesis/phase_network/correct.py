@@ -45,8 +45,9 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
     # a limb that is already as straight as that stays so
     reach = xp.maximum(_eased(asked, long_upper, long_lower, soft, xp), xp.minimum(asked, _length(end - top, xp)))
     cosine = (reach * reach - long_upper * long_upper - long_lower * long_lower) / (2.0 * long_upper * long_lower)
-    cosine = xp.clip(cosine, -1.0 + 1e-9, 1.0 - 1e-9)
-    bent = cosine * along + xp.sqrt(1.0 - cosine * cosine) * _cross(axis, along)
+    cosine = xp.clip(cosine, -1.0, 1.0)
+    # held off zero after the square: in float32 no number between 1 - 1e-9 and 1 keeps the root's derivative finite
+    bent = cosine * along + xp.sqrt(xp.maximum(1.0 - cosine * cosine, 2e-9)) * _cross(axis, along)
     swing = _shortest(_unit(long_upper * along + long_lower * bent, xp), way / asked)
     return swing, swing @ _shortest(down, bent), top + way * (reach / asked)
 
