@@ -51,8 +51,8 @@ class Stepper:
     def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: np.ndarray | None, limited: bool) -> Step:
         """Frame n + 1 from the pose and window of n. wanted (4, 3) m: where the effectors are to be; share (4,): how
         much of the way from what the networks say to there each is taken, None for none of them. limited: joints are
-        kept within their limits."""
-        after, floating = self.predicted(pose, window)
+        kept within their limits, and networks asked only for what is near what they know."""
+        after, floating = self.predicted(pose, window, limited)
         said = after.positions[self.effectors] if floating is None else self._said(floating)
         over = np.zeros(len(self.model.skeleton))
         if limited and share is None:
@@ -64,13 +64,15 @@ class Stepper:
         state = after if floating is None or share is not None else self._afloat(after, floating)
         return Step(after, state._replace(moved=state.positions - pose.positions), said, over, floating)
 
-    def predicted(self, pose: Pose, window: Windows) -> tuple[Pose, np.ndarray | None]:
-        """What the networks say of the next frame; of a single network also the places of the joints that it moves."""
+    def predicted(self, pose: Pose, window: Windows, bounded: bool) -> tuple[Pose, np.ndarray | None]:
+        """What the networks say of the next frame; of a single network also the places of the joints that it moves.
+        bounded: they are not asked for what lies far from all that they have seen."""
         if self.hierarchy is not None:
-            return self.hierarchy(pose, window), None
+            return self.hierarchy(pose, window, bounded), None
         network, settings = self.model.networks[SINGLE], self.model.settings
         theta = phase_function.weights_at(float(window.phase), network.points)
-        y = network.frame(features.single_input(self.chains, settings, pose, window), theta).astype(float)
+        x = features.single_input(self.chains, settings, pose, window)
+        y = network.frame(np.clip(x, *network.bounds) if bounded else x, theta).astype(float)
         floating = answers.floating(self.chains, settings, y, pose)[0]
         return answers.answered(SINGLE, self.chains, settings, y, pose, pose, window), floating
 
@@ -83,8 +85,8 @@ class Stepper:
         return pose._replace(positions=places)
 
     def _within_reach(self, after: Pose, wanted: np.ndarray, share: np.ndarray) -> tuple[Pose, np.ndarray]:
-        """The pose with limbs that reach and joints within their limits; where a limit has a say, limbs reach again with
-        what is left to them."""
+        """The pose with limbs that reach and joints within their limits; where a limit has a say, limbs reach again
+        with what is left to them."""
         after, over = self._limited(self.reach(after, wanted, share))
         if over.max() > _FELT:
             after, more = self._limited(self.reach(after, wanted, share))

@@ -30,7 +30,7 @@ class Options:
     where they are to be, or so many times (§7.7.1: 75, 0.01). ik: limbs are corrected in each frame, by `share` of
     the way to where they are wanted (feet that are to stand, all of it), before the next is predicted (§7.7.3).
     blend: networks see trajectories that begin where hands and feet are. limits: joints stay within the range of the
-    training data.
+    training data, and what networks are asked stays near it, so that no error feeds itself (§9.4).
     """
 
     pose_iterations: int = 75

@@ -1,7 +1,8 @@
-"""One phase-functioned network: its weights glide along a spline with the phase (Fredriksson §3.6.2 eq. 3.20-3.24); with
-one control point it is the plain feed-forward twin.
+"""One phase-functioned network: its weights glide along a spline with the phase (Fredriksson §3.6.2 eq. 3.20-3.24);
+with one control point it is the plain feed-forward twin.
 
-`forward` is what training and use share; `PhaseNetwork.frame` is the same for one frame at a time, as fast as numpy goes.
+`forward` is what training and use share; `PhaseNetwork.frame` is the same for one frame at a time, as fast as numpy
+goes.
 """
 
 from __future__ import annotations
@@ -15,13 +16,17 @@ from ...errors import InputError
 from ...motion.skeleton import frozen_array
 from . import phase_function
 
+BOUND = 5.0
+"""Standard deviations from the mean of the training data within which a network knows what it says."""
+
 
 def forward(weights, biases, x, theta, xp=np, keep=None):
     """Outputs (..., out) for normalised inputs x (..., in) and control point weights theta (..., K).
 
     weights: one (K, out, in) a layer. biases: one (K, out) a layer. Between layers stands an ELU, as in the PFNN
     (Holden, Komura and Saito 2017); the last layer is linear (eq. 3.21). keep: for training with dropout, one array or
-    None for each layer, which multiplies what the layer is given: 0 or 1 / retention (eq. 3.27). xp: numpy or jax.numpy.
+    None for each layer, which multiplies what the layer is given: 0 or 1 / retention (eq. 3.27). xp: numpy or
+    jax.numpy.
     """
     last = len(weights) - 1
     for layer, (weight, bias) in enumerate(zip(weights, biases)):
@@ -34,8 +39,8 @@ def forward(weights, biases, x, theta, xp=np, keep=None):
 
 
 def _layer(weight, bias, x, theta, xp):
-    """eq. 3.24 and 3.20 the other way round: every control point's answer, then their weighted sum. That is the same and
-    spares blending (out, in) weights for every row of a batch."""
+    """eq. 3.24 and 3.20 the other way round: every control point's answer, then their weighted sum. That is the same
+    and spares blending (out, in) weights for every row of a batch."""
     points, out, width = weight.shape
     if points == 1:
         return x @ weight[0].T + bias[0]
@@ -97,6 +102,13 @@ class PhaseNetwork:
         theta = phase_function.weights(phase, self.points)
         normal = (x - self.input_mean) / self.input_scale
         return forward(self.weights, self.biases, normal, theta) * self.output_scale + self.output_mean
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest input (in,) that is near what the network has seen, float32: `BOUND` scales about the
+        mean."""
+        mean, span = self.input_mean.astype(float), BOUND * np.abs(self.input_scale.astype(float))
+        return (mean - span).astype(np.float32), (mean + span).astype(np.float32)
 
     @cached_property
     def frame(self) -> "FrameNetwork":

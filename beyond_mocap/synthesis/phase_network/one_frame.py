@@ -28,6 +28,7 @@ class OneFrame:
         self.chains, self.points = chains, settings.points
         self.static, self.given = settings.frame == "static", settings.wrist == "given"
         self.networks = [model.networks[name].frame for name in HIERARCHY]
+        self.bounds = [model.networks[name].bounds for name in HIERARCHY]
         self.reach = [model.leg_reach[name[:-4]] for name in LIMB_OF[2:]]
         self.plans = {name: _plan(chains, name) for name in HIERARCHY}
         self.said = [list(predicted(name, chains, settings)) for name in HIERARCHY]
@@ -39,23 +40,29 @@ class OneFrame:
         self.leg_sees = list(chains.leg_sees)
         self.guide = LimbReach(chains, None, True) if settings.guided else None
 
-    def __call__(self, pose: Pose, window: Windows) -> Pose:
-        """Frame n + 1 from the state and the window of n, both of one frame. `moved` stays that of n."""
+    def __call__(self, pose: Pose, window: Windows, bounded: bool = False) -> Pose:
+        """Frame n + 1 from the state and the window of n, both of one frame. `moved` stays that of n. bounded: networks
+        are asked nothing that lies further off than `network.BOUND` (`PhaseNetwork.bounds`)."""
         theta = np.array(weights_at(float(window.phase), self.points), np.float32)
         after = Pose(pose.root, pose.local.copy(), pose.positions.copy(), pose.turns.copy(), pose.moved)
         sixes = pose.turns.swapaxes(1, 2)[:, :2].reshape(-1, 6)
         relative = pose.local.swapaxes(1, 2)[:, :2].reshape(-1, 6)
-        after = self._hips(after, self.networks[0](self._hip_input(pose, window, sixes), theta), pose)
-        turns = _rotations(self.networks[1](self._body_input(pose, after, window, relative), theta))
+        after = self._hips(after, self._ask(0, self._hip_input(pose, window, sixes), theta, bounded), pose)
+        turns = _rotations(self._ask(1, self._body_input(pose, after, window, relative), theta, bounded))
         after.local[self.said[1]] = turns
         _spread(self.plans["body"], after, {})
-        turns = _rotations(self._limbs(pose, after, window, relative, theta))
+        turns = _rotations(self._limbs(pose, after, window, relative, theta, bounded))
         after.local[self.limb_joints] = turns
         for number, name in enumerate(LIMB_OF):
             hand = self.given and number < 2
             given = {self.chains.effectors[number]: window.hands_next[number]} if hand else {}
             _spread(self.plans[name], after, given)
         return after
+
+    def _ask(self, number: int, x: np.ndarray, theta: np.ndarray, bounded: bool) -> np.ndarray:
+        if bounded:
+            x = np.minimum(np.maximum(x, self.bounds[number][0]), self.bounds[number][1])
+        return self.networks[number](x, theta)
 
     def _hip_input(self, pose: Pose, window: Windows, sixes: np.ndarray) -> np.ndarray:
         start = pose.positions[self.chains.hips] * (0.0 if self.static else _GROUND)
@@ -87,7 +94,9 @@ class OneFrame:
         return _row(window.sides, impact, trajectories, toes, turned, relative[self.said[1]], places,
                     _six(axes.T @ pose.turns[self.body_sees]))  # fmt: skip
 
-    def _limbs(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    def _limbs(
+        self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray, bounded: bool
+    ) -> np.ndarray:
         """What the networks of arms and legs say, one after the other: (rotations * 6,)."""
         origins, axes = after.positions[self.references][:, None], after.turns[self.references]
         back = axes.swapaxes(1, 2)
@@ -101,12 +110,13 @@ class OneFrame:
         turns = *_six(back[:2, None] @ after.turns[self.trunk]), *_six(back[2:, None] @ after.turns[self.leg_sees])
         hands = _six(back[:2] @ window.hands_next) if self.given else ()
         answers, guides = [], self._guides(after, window)
-        for number, network in enumerate(self.networks[2:]):
+        for number in range(4):
             arm = number < 2
             x = _row(*([window.sides] if arm else []), ways[number], turned[number],
                      *([hands[number]] if arm and self.given else []), stretch[number : number + 1],
                      relative[self.said[2 + number]], others[number], turns[number], *guides[number])  # fmt: skip
-            answers.append(network(x, theta if arm else self._leg_theta(number, stretch[number])))
+            answers.append(self._ask(
+                2 + number, x, theta if arm else self._leg_theta(number, stretch[number]), bounded))
         return np.concatenate(answers)
 
     def _guides(self, after: Pose, window: Windows) -> list[list[np.ndarray]]:

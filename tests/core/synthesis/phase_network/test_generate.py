@@ -43,7 +43,7 @@ def by_heart(rows, units=2):
     inputs, answers = rows.inputs.shape[1], rows.answers.shape[1]
     network = ByHeart(
         (np.zeros((1, units, inputs)), np.zeros((1, answers, units))), (np.zeros((1, units)), np.zeros((1, answers))),
-        np.zeros(inputs), np.ones(inputs), np.zeros(answers), np.ones(answers),
+        np.zeros(inputs), np.full(inputs, 1e3), np.zeros(answers), np.ones(answers),
     )  # fmt: skip
     for name, value in (("known", rows.inputs), ("said", rows.answers), ("asked", [])):
         object.__setattr__(network, name, value)
@@ -158,6 +158,19 @@ def test_limits_hold_where_networks_go_astray(example, model):
     made = generate(replace(model, networks=wild), describe(example))
     limits = stepper(model).limits
     assert made.over.max() > 0.1 and limits.beyond(matrices(made.motion)).max() < 1e-6
+
+
+def test_networks_are_asked_only_for_what_is_near_what_they_know(example, model):
+    told = describe(example)
+    moved = replace(told, impact=told.impact + np.array([5000.0, 0.0, 0.0]))
+    near = {name: by_heart(rows) for name, rows in training_set([example], model.settings).items()}
+    for network in near.values():
+        object.__setattr__(network, "input_scale", np.full_like(network.input_scale, 20.0))
+    for limits, most in ((True, 100.0), (False, 5000.0)):
+        for network in near.values():
+            network.asked.clear()
+        generate(replace(model, networks=near), moved, options=replace(PLAIN, limits=limits))
+        assert most - 20.0 < max(near["hip"].asked) <= most + 1e-3
 
 
 @pytest.mark.parametrize("answer", [np.nan, 1e30])
