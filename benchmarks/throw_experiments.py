@@ -12,6 +12,7 @@ docs/throw-experiments.md.
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
 import time
@@ -85,12 +86,17 @@ def subjects_of(data: str) -> tuple[str, ...]:
 
 
 def worked(run: Run, model_path: Path, scale: Scale) -> dict:
-    """One run: trains where no model is there yet, tests, and tells both."""
+    """One run: trains where no model is there yet, tests, and tells both. Without its JSON a run is tested anew with the
+    model that is there."""
     from beyond_mocap.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
     from beyond_mocap.files.network_npz import read_model
     from beyond_mocap.files.tables import plain
+    from beyond_mocap.files.whole import atomic_write
 
-    told = {} if model_path.is_file() else _train(run, model_path, scale)
+    beside = model_path.with_suffix(".trained")
+    if not (model_path.is_file() and beside.is_file()):
+        atomic_write(beside, json.dumps(_train(run, model_path, scale), indent=1))
+    told = json.loads(beside.read_text("utf-8"))
     model = read_model(model_path)
     tested = [e for e in examples_of(run.data) if (e.subject == run.subject) == run.variant.everyone]
     found = evaluate_throws(model, some_of_each(tested, scale.motions), FULL if run.variant.corrected else RAW)

@@ -65,10 +65,20 @@ def of_variant(found: Found, data: str, variant: str) -> dict[str, Mapping]:
 
 def subjects(found: Found, data: str, variant: str) -> Subjects | None:
     """The figures of one variant; None where nothing is done."""
-    rows = [(subject, np.array([each["deviation"] for each in one["each"]]).reshape(-1, 4),
-             np.array([np.nan if each["impact"] is None else each["impact"] for each in one["each"]]))
-            for subject, one in of_variant(found, data, variant).items() if one["each"]]
+    rows = [(subject, deviations(one), np.array([np.nan if each["impact"] is None else each["impact"]
+                                                 for each in one["each"]] + [np.nan] * broken(one)))
+            for subject, one in of_variant(found, data, variant).items()]
     return gathered(variant, rows) if rows else None
+
+
+def deviations(one: Mapping) -> np.ndarray:
+    """(N, 4) m of all motions of a run, infinite where networks lost the body so far that no motion came out."""
+    return np.array([each["deviation"] for each in one["each"]] + [[np.inf] * 4] * broken(one)).reshape(-1, 4)
+
+
+def broken(one: Mapping) -> int:
+    """How many motions of a run were given up because networks lost the body."""
+    return sum("lose the body" in line for line in one["left_out"])
 
 
 def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
@@ -99,9 +109,8 @@ def overview(found: Found, data: str, scale: Scale) -> list[str]:
 
 def _figures(done: Sequence[Mapping]) -> list[str]:
     """Means over all motions of all models, without those that lost their body."""
-    every = [each for one in done for each in one["each"]]
-    lost = lost_ones(np.array([each["deviation"] for each in every]))
-    every = [each for each, gone in zip(every, lost, strict=True) if not gone]
+    lost = lost_ones(np.concatenate([deviations(one) for one in done]))
+    every = [each for one in done for each, gone in zip(one["each"], lost_ones(deviations(one))) if not gone]
     deviation, alone, body = (100.0 * np.array([each[key] for each in every]).reshape(-1, 4)
                               for key in ("deviation", "network", "body"))
     trained = [one["training"]["minutes"] for one in done if "minutes" in one["training"]]

@@ -61,7 +61,8 @@ def planted_run(deviation, impact):
     one = {**limbs, "impact": impact, "head": 3.0, "head_share": 0.9, "jerk": 1.1, "beyond": None, "seconds": 0.1}
     gone = {**one, **dict.fromkeys(("deviation", "network", "body"), [900.0] * 4), "impact": 80.0, "subject": "s0"}
     each = [*({**one, "subject": f"s{i % 2}"} for i in range(10)), gone]
-    return {"parameters": 1000, "training": {"minutes": 1.0}, "each": each}
+    lines = ["x: model: networks that lose the body in frame 9"]
+    return {"parameters": 1000, "training": {"minutes": 1.0}, "each": each, "left_out": lines}
 
 
 def test_his_figures_put_in_come_out_with_his_p_values(tmp_path):
@@ -76,7 +77,7 @@ def test_his_figures_put_in_come_out_with_his_p_values(tmp_path):
     text = "\n".join(document(results(tmp_path), QUICK))
     assert "| p | **0.0065** | 0.0622 | **0.0063** | **0.0038** | **0.0136** |" in text
     assert "| his p | 0.0064 | 0.0625 | 0.0064 | 0.0038 | 0.0136 |" in text
-    assert "| 1 of 11 |" in text and "4 of 44" in text  # the body that was lost is counted, and in no mean
+    assert "| 2 of 12 |" in text and "8 of 48" in text  # bodies that are lost are counted, and in no mean
     assert "### Tables 8.5 to 8.8" in text and "Tables 8.1" not in text
     assert "better at 0.025 in left arm (p 0.0065), left leg (p 0.0063), right leg (p 0.0038), impact (p 0.0136)" in text
 
