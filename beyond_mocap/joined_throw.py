@@ -70,6 +70,8 @@ _LEADS = (1.0, 4.0)  # s that leading the track to the throw and back takes, at 
 _SMOOTH = 0.7  # s of the window that takes the sway out of the throw's own path
 _FACES_TELLS, _TURNED_TELLS, _MOVED_TELLS = np.radians(100.0), np.radians(60.0), 0.05  # a throw begins side on
 _PERCENT = 99.0
+_SPEEDS_UP = 2.5  # m/s^2 at which a body stops and sets out
+_TOO_FAST = 1.2  # times what the library, or the body itself, shows
 _ENDS = 0.5  # s at either end of a stretch that faces as the motion around it
 REACH = 4.5
 """Seconds before and behind a throw in which a body may leave its own way."""
@@ -265,6 +267,9 @@ def around(
     first = int(round((at - release - start) * fps))
     own, start, first, end = _long_enough(own, start, first - 1, first + len(resample(throw, fps)) + 1)
     low, high = max(first - int(REACH * fps), 0), min(end + int(REACH * fps), len(own))
+    comes_back = _pace(own.root_positions[high - 1, :2] - throw.root_positions[-1, :2], high - end, fps) <= _hurry(own)
+    if not comes_back:
+        own = _from_there(own, end, throw.root_positions[-1, :2])
     part = own.frames(low, high)
     times = start + np.arange(low, high) / fps
     path = zero_phase_hann(part.root_positions[:, :2], fps, _SMOOTH)
@@ -287,7 +292,63 @@ def around(
     new[0][low : low + count], new[1][low : low + count] = way.motion.root_positions[:count], way.motion.rotations[:count]
     root, rotations = _between(own.skeleton, new, (own.root_positions, own.rotations), share)
     seams = [low + leaves, *(way.seams + low), low + comes]
-    return RunUp(Motion(own.skeleton, root, rotations, fps), start, np.array(seams), way.warnings)
+    told = list(way.warnings)
+    if not comes_back:
+        when = start + end / fps
+        text = f"{when:.1f} s: there is no time to get back to the own way: what follows goes on from where the throw ends"
+        told.append(TimedLine(text, (when, when)))
+    fastest = float(np.linalg.norm(np.diff(root[low:high, :2], axis=0), axis=1).max() * fps)
+    if fastest > _TOO_FAST * max(library.fastest, _hurry(own)):
+        told.append(f"the body would have to go at {fastest:.1f} m/s around the throw: choose another frame or target")
+    return RunUp(Motion(own.skeleton, root, rotations, fps), start, np.array(seams), tuple(told))
+
+
+def comes_in_time(own: Motion, start: float, throw: Motion, release: float, at: float) -> bool:
+    """Whether a body on its own way can be where the throw begins by then, without hurrying much."""
+    first = int(np.clip(round((at - release - start) * own.fps), 0, len(own) - 1))
+    low = max(first - int(REACH * own.fps), 0)
+    away = throw.root_positions[0, :2] - own.root_positions[low, :2]
+    return _pace(away, first - low, own.fps) <= _hurry(own)
+
+
+def stops_at(own: Motion, start: float, seconds: float) -> np.ndarray:
+    """(2,) m where a body on its own way comes to a stop at second `seconds`."""
+    frame = int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1))
+    spot, way, _ = _stop(own, frame, -1)
+    return spot + way
+
+
+def _stop(own: Motion, frame: int, side: int) -> tuple[np.ndarray, np.ndarray, int]:
+    """Where (2,) m the own way is some frames before (side -1) or behind a frame, the way (2,) m on which a body that
+    goes at that speed stops or sets out meanwhile, and how many frames that are."""
+    fps, places = own.fps, own.root_positions[:, :2]
+    second = int(fps)
+    near = places[np.clip([frame, frame + side * second], 0, len(own) - 1)]
+    velocity = (near[1] - near[0]) * side
+    seconds = max(_LEADS[0], float(np.linalg.norm(velocity)) / _SPEEDS_UP)
+    frames = int(round(seconds * fps))
+    other = int(np.clip(frame + side * frames, 0, len(own) - 1))
+    return places[other], 0.5 * velocity * seconds, frames
+
+
+def _from_there(own: Motion, end: int, place: np.ndarray) -> Motion:
+    """The motion, everything from frame `end` on moved so that a body which sets out from `place` (2,) m gets into it."""
+    spot, way, _ = _stop(own, min(end, len(own) - 1), 1)
+    root = own.root_positions.copy()
+    root[end:, :2] += place + way - spot
+    return replace(own, root_positions=root)
+
+
+def _pace(away: np.ndarray, frames: int, fps: float) -> float:
+    """m/s that it takes to go `away` (2,) m within so many frames."""
+    return float(np.linalg.norm(away)) * fps / max(frames, 1)
+
+
+def _hurry(own: Motion) -> float:
+    """m/s that are not asked too much of a body beside what it does anyway: its usual speed and a little."""
+    step = np.linalg.norm(np.diff(own.root_positions[:, :2], axis=0), axis=1) * own.fps
+    usual = float(np.median(step)) if len(step) else 0.0
+    return max(min(1.5 * usual, usual + 0.6), 1.6)
 
 
 def _likest(apart: np.ndarray, low: int, high: int, fade: int) -> int:

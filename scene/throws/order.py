@@ -170,6 +170,8 @@ def _thrown(order: Order, own: "Motion", start: float, joined: bool, progress, c
     """The throw where it has to be: begun where an armature that only stands is; over where its own motion has it at
     the release, if a library joins them; else begun where its own motion leads, since it is eased out of that."""
 
+    from ...beyond_mocap.joined_throw import comes_in_time, stops_at
+
     def spot(seconds: float) -> tuple[float, ...]:
         return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
 
@@ -179,9 +181,12 @@ def _thrown(order: Order, own: "Motion", start: float, joined: bool, progress, c
     if order.own is None:
         return _thrown_from(order, model, {"start": tuple(order.place)}, progress, cancelled)
     thrown = _thrown_from(order, model, {"over": spot(order.at)}, progress, cancelled)
-    if joined:
+    begin = order.at - thrown.release
+    if not joined:
+        return _thrown_from(order, model, {"start": spot(begin)}, progress, cancelled)
+    if comes_in_time(own, start, thrown.motion, thrown.release, order.at):
         return thrown
-    return _thrown_from(order, model, {"start": spot(order.at - thrown.release)}, progress, cancelled)
+    return _thrown_from(order, model, {"start": tuple(stops_at(own, start, begin))}, progress, cancelled)
 
 
 def _model(order: Order):

@@ -173,3 +173,17 @@ def test_out_of_a_walk_and_back_by_the_library(library, made):
     hits = windowed(jerk(forward_kinematics(joined.motion)[0], FPS))
     assert max(hits[int(seam) - 2] for seam in way.seams) <= usual
     assert np.all(joined_throw.seam_jerk(joined) <= usual)
+
+
+def test_who_has_no_time_to_get_back_goes_on_from_there(library, made):
+    run = gait(4.2, 6.0, FPS)
+    over = place(made.motion, 0.0, (*(joined_throw.begins_at(made.motion, made.release, run.root_positions[90, :2])
+                                      - made.motion.root_positions[0, :2]), 0.0))  # fmt: skip
+    assert not joined_throw.comes_in_time(run, 0.0, over, made.release, 3.0)
+    begin = joined_throw.stops_at(run, 0.0, 3.0 - made.release) - made.motion.root_positions[0, :2]
+    motion = place(made.motion, 0.0, (*begin, 0.0))
+    way = joined_throw.around(library, run, 0.0, motion, made.release, 3.0)
+    joined = joined_throw.laid_into(way.motion, way.start, motion, made.release, 3.0)
+    assert same_where_kept(joined, motion) and any("no time to get back" in line for line in way.warnings)
+    speed = np.linalg.norm(np.diff(joined.motion.root_positions[:, :2], axis=0), axis=1) * FPS
+    assert speed.max() < 1.25 * 4.2
