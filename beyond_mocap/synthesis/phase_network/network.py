@@ -16,8 +16,10 @@ from ...errors import InputError
 from ...motion.skeleton import frozen_array
 from . import phase_function
 
-BOUND = 5.0
+BOUND = 8.0
 """Standard deviations from the mean of the training data within which a network knows what it says."""
+LEAST_SPAN = 0.5
+"""Metres, or shares of an axis, from the mean that are always near: some inputs hardly change in the training data."""
 
 
 def forward(weights, biases, x, theta, xp=np, keep=None):
@@ -105,9 +107,10 @@ class PhaseNetwork:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest input (in,) that is near what the network has seen, float32: `BOUND` scales about the
-        mean."""
-        mean, span = self.input_mean.astype(float), BOUND * np.abs(self.input_scale.astype(float))
+        """Least and greatest input (in,) that is near what the network has seen, float32: `BOUND` scales or
+        `LEAST_SPAN` about the mean."""
+        mean = self.input_mean.astype(float)
+        span = np.maximum(BOUND * np.abs(self.input_scale.astype(float)), LEAST_SPAN)
         return (mean - span).astype(np.float32), (mean + span).astype(np.float32)
 
     @cached_property

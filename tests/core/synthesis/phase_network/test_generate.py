@@ -166,7 +166,7 @@ def test_networks_are_asked_only_for_what_is_near_what_they_know(example, model)
     near = {name: by_heart(rows) for name, rows in training_set([example], model.settings).items()}
     for network in near.values():
         object.__setattr__(network, "input_scale", np.full_like(network.input_scale, 20.0))
-    for limits, most in ((True, 100.0), (False, 5000.0)):
+    for limits, most in ((True, 160.0), (False, 5000.0)):
         for network in near.values():
             network.asked.clear()
         generate(replace(model, networks=near), moved, options=replace(PLAIN, limits=limits))
