@@ -8,6 +8,7 @@ What is wrong is told in one line on stderr. See the project's README for exampl
 from __future__ import annotations
 
 import argparse
+import re
 import signal
 import sys
 import threading
@@ -27,6 +28,10 @@ from .plan import HEIGHTS, LIMITS, METHODS, Plan, gait_choices
 
 class OneLineParser(argparse.ArgumentParser):
     """A parser whose errors are one line, with status 2."""
+
+    def __init__(self, *args, **more):
+        super().__init__(*args, **more)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # as from Python 3.14 on: -10,2,1 is no option
 
     def error(self, message: str):
         """Raises the message as an InputError."""

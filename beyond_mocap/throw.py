@@ -25,7 +25,7 @@ from .errors import InputError
 from .motion import quaternion
 from .motion.between_frames import cubic_at
 from .motion.grip import grip_of
-from .motion.humanoid import identify
+from .motion.humanoid import identify, stature
 from .motion.mirror import mirror
 from .motion.motion import Motion, place
 from .motion.retarget import Retargeter
@@ -42,6 +42,8 @@ WEIGHTS = Path(__file__).parent / "synthesis" / "phase_network" / "weights"
 """Where the weights that come with the project lie, one file an action."""
 NEAREST = 1.5
 """Metres over the ground from body to target, at least."""
+STATURES = (0.1, 10.0)
+"""Metres of a body that throws."""
 _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be asked for
 _MORE = 1.04  # times the slowest launch that reaches the target, at least
 _SUITS, _EASY = 1.6, 0.3  # times the slowest launch that suits, and by which logarithm another pace is an odd one
@@ -85,6 +87,8 @@ class Order:
             raise InputError("ball", self.ball[:40], ", ".join(KINDS))
         if self.speed is not None and not 0.0 < self.speed < np.inf:
             raise InputError("speed", f"{self.speed:g} m/s", "more than 0")
+        if self.seed < 0:
+            raise InputError("seed", str(self.seed)[:40], "0 or more")
         if sum(value is not None for value in (self.start, self.over, self.ball_place)) > 1:
             raise InputError("throw", "several places", "one of start, over and ball_place")
         if self.ball_place is not None and self.limb is not None and self.limb.endswith("hand"):
@@ -237,6 +241,8 @@ class _Work:
         self.ball = KINDS[kind] if isinstance(kind, str) else kind
         self.target = np.maximum(np.asarray(order.target, float), [-np.inf, -np.inf, self.ball.radius])
         self.warnings: list[str] = []
+        if order.target[2] < -self.ball.radius:
+            self.warnings.append(f"the target is {-order.target[2]:.2f} m under the ground: aimed at what is above it")
 
     def _check(self) -> None:
         """InputError for limbs, actions and speeds that cannot be."""
@@ -248,6 +254,9 @@ class _Work:
         limb = getattr(body, name.split("_")[0])
         if not self.kicks and None in (limb.upper_arm, limb.lower_arm, limb.hand):
             raise InputError("throw", f"a skeleton without a {name.replace('_', ' ')}", "arms and hands")
+        if not STATURES[0] <= stature(self.skeleton) <= STATURES[1]:
+            raise InputError("skeleton", f"a body of {stature(self.skeleton):.3g} m",
+                             f"{STATURES[0]:g} to {STATURES[1]:g} m", "check the unit")  # fmt: skip
         if not self.model.examples:
             raise InputError("model", "no examples in it", "some, which motions are planned from", "train it anew")
         most = self.fastest

@@ -99,14 +99,14 @@ def examples_in(
         raise InputError("action", action, " or ".join(ACTIONS))
     folder = Path(folder)
     clips = find_clips(folder)
-    words, table = Annotations(folder, clips), _table(folder, ACTIONS[action])
+    names = [path.relative_to(folder).as_posix() for path in clips]
+    words, table = Annotations(folder, clips), _table(folder, ACTIONS[action], set(names))
     bring = _Bring(skeleton)
     found: list[Example] = []
-    for order, path in enumerate(clips):
+    for order, (path, name) in enumerate(zip(clips, names)):
         if cancelled():
             raise Cancelled("cancelled")
         progress(order / len(clips), path.name)
-        name = path.relative_to(folder).as_posix()
         try:
             found += _of_clip(path, name, ACTIONS[action], words, table.get(name), fps, bring, told)
         except InputError as error:
@@ -184,18 +184,19 @@ def _annotated(words: Annotations, path: Path, fps: float, action: Action) -> It
         yield _Known((row.start / fps, row.end / fps), release, action.limbs[sides[0]] if len(sides) == 1 else None)
 
 
-def _table(folder: Path, action: Action) -> dict[str, list[_Known]]:
-    """Rows of `throws.csv` in `folder` by file, those of other limbs than the action's left out; nothing where there is
-    none."""
+def _table(folder: Path, action: Action, names: set[str]) -> dict[str, list[_Known]]:
+    """Rows of `throws.csv` in `folder` by file, one of the recordings' `names`; those of other limbs than the action's
+    left out. Nothing where there is none."""
     path, out = folder / TABLE_NAME, {}
     if not path.is_file():
         return out
     for where, row in read_rows(path, ("file",)):
         known = _row(row, where)
-        if not (row["file"] and (folder / row["file"]).is_file()):
-            raise InputError(where, f"no file {row['file']!r}", "a BVH file below this table")
+        file = Path(row["file"]).as_posix()
+        if file not in names:
+            raise InputError(where, f"no file {row['file'][:80]!r}", "a BVH file below this table, as seen from it")
         if known.limb is None or known.limb in action.limbs:
-            out.setdefault(Path(row["file"]).as_posix(), []).append(known)
+            out.setdefault(file, []).append(known)
     return out
 
 
@@ -232,13 +233,14 @@ def _measured(path: Path, action: Action) -> _Known | None:
         launch = speed * np.asarray(report["direction"], float)
         limb = LIMBS.index(f"{report['hand']}_hand")
         release = float(report["release_time_s"])
-        if not (launch.shape == (3,) and np.isfinite([*launch, release]).all()):
+        impact = report.get("impact_m")
+        impact = np.array(impact, float) if isinstance(impact, list) and len(impact) == 3 else None
+        known = [*launch, release] if impact is None else [*launch, release, *impact]
+        if not (launch.shape == (3,) and np.isfinite(known).all()):
             raise ValueError
-    except (ValueError, KeyError, TypeError, UnicodeDecodeError):
+    except (ValueError, KeyError, TypeError, UnicodeDecodeError, RecursionError):
         raise InputError(path, "no report of a release", "what the command 'release' writes") from None
-    impact = report.get("impact_m")
-    known_impact = isinstance(impact, list) and len(impact) == 3
-    return _Known(None, release, limb, np.array(impact, float) if known_impact else None, launch, speed)
+    return _Known(None, release, limb, impact, launch, speed)
 
 
 class _Bring:

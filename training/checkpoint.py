@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,7 +61,8 @@ def read(path: Path, like: object, fits: str) -> Checkpoint:
             losses = tuple(float(one) for one in file["losses"])
             leaves = [file[name] for name in sorted(name for name in file.files if name.startswith("leaf_"))]
         version, epoch, seconds, trained = (told[name] for name in ("version", "epoch", "seconds", "fits"))
-    except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
+    except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error,
+            NotImplementedError, RuntimeError, AttributeError) as error:
         raise InputError(path, f"is no checkpoint that can be read ({type(error).__name__})", "", NEXT_STEP) from None
     if version != VERSION:
         raise InputError(path, f"version {version}", f"version {VERSION}", NEXT_STEP)

@@ -58,7 +58,8 @@ def _read(options, config: TrainingConfig, told: Told, skeleton) -> list[Example
         options.folder, settings.action, settings.fps, skeleton, told.note, progress=progress, cancelled=told.cancelled,
     )
     chosen = [example for example in found if not options.subject or example.subject in options.subject]
-    if not chosen:
-        subjects = ", ".join(sorted({example.subject for example in found}))
-        raise InputError("--subject", ", ".join(options.subject), f"one of {subjects}")
+    there = sorted({example.subject for example in found})
+    for name in options.subject:
+        if name not in there:
+            raise InputError("--subject", name, f"one of {', '.join(there)}", f"see {options.folder}")
     return chosen

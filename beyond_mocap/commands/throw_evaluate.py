@@ -59,6 +59,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     if options.html:
         atomic_write(options.html, throws_page(report))
     told.end()
+    print(f"{options.report}: {report['motions']} of {len(chosen)} motions")
 
 
 def _examples(folder: Path, model, told: Told) -> list:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError
-from .numbers import between, rate
+from .numbers import between, positive, rate, whole
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
 
@@ -37,12 +37,13 @@ def add(verbs):
     verb.add_argument("--ball-kind", metavar="KIND", help="baseball, tennis, handball, volleyball, football, paper")
     verb.add_argument("--ball", type=Path, metavar="B.csv", help="the ball's way")
     verb.add_argument("--report", type=Path, metavar="R.json")
-    verb.add_argument("--seed", type=int, default=0, help="another motion with the same aim; default 0")
+    seeds = partial(whole, low=0, high=2**31 - 1, expected="0 to 2147483647")
+    verb.add_argument("--seed", type=seeds, default=0, help="another motion with the same aim; default 0")
     verb.add_argument("--library", type=Path, metavar="L", help="with --track: run-up and recovery from it")
     verb.add_argument("--track", type=Path, metavar="T.csv", help="the player's track; the throw is on it at --time")
     verb.add_argument("--annotations", type=Path, metavar="A.txt", help="what else the player does on the track")
     verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
-    verb.add_argument("--unit", metavar="METRES", type=float, help="metres per unit of the BVH files")
+    verb.add_argument("--unit", metavar="METRES", type=positive, help="metres per unit of the BVH files")
     verb.set_defaults(run=run)
     return verb
 

@@ -113,7 +113,7 @@ def identify_posed(motion: Motion) -> Humanoid:
     roles = _named(parts)
     if not _has_legs(roles):
         frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
-        roles = _found(skeleton, motion.root_positions[frames], motion.rotations[frames]) or roles
+        roles = _fitting(_found(skeleton, motion.root_positions[frames], motion.rotations[frames]), roles)
     return assemble(skeleton.names, skeleton.parents, roles)
 
 
@@ -123,7 +123,7 @@ def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, 
     if not _has_legs(roles):
         ends = np.frombuffer(tips[1]).reshape(-1, 3)
         skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3), tips[0], ends)
-        roles = _found(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))) or roles
+        roles = _fitting(_found(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))), roles)
     return assemble(names, parents, roles)
 
 
@@ -134,6 +134,12 @@ def _found(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[
     for joint, offset in zip(skeleton.end_parents, skeleton.end_offsets):
         tips[:, joint] = places[:, joint] + quaternion.rotate(world[:, joint], offset)
     return structure.find(skeleton.parents, places, tips)
+
+
+def _fitting(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, int]:
+    """Roles found by structure, or those that names tell where it found none, or took what is named an arm for a leg."""
+    arms = {joint for role, joint in named.items() if role.endswith(("arm", "hand"))}
+    return named if not found or arms & {found[role] for role in _LEG_ROLES} else found
 
 
 def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:

@@ -1,6 +1,7 @@
 """The recipe for a throw at a target: planned, generated, corrected, flown; and what it refuses."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -132,6 +133,7 @@ def test_refuses_what_cannot_be(model, order, says):
 @pytest.mark.parametrize("wrong", [
     {"target": (1.0, 2.0)}, {"target": (1.0, np.nan, 0.0)}, {"limb": "tail"}, {"ball": "pebble"}, {"speed": -1.0},
     {"start": (0.0, 0.0), "over": (0.0, 0.0)}, {"limb": "left_hand", "ball_place": (0.0, 0.0)},
+    {"seed": -1},
 ])
 def test_refuses_orders_that_say_nothing(wrong):
     with pytest.raises(InputError):
@@ -149,6 +151,22 @@ def test_a_body_without_hands_is_refused(model):
                    offsets=skeleton.offsets[keep], end_parents=(), end_offsets=np.zeros((0, 3)))  # fmt: skip
     with pytest.raises(InputError, match="without a right hand"):
         throw_at(model, ORDERS[0], less)
+
+
+def test_a_body_in_the_wrong_unit_is_refused(model):
+    with pytest.raises(InputError, match="a body of 1.8e.03 m; expected 0.1 to 10 m"):
+        throw_at(model, Order((12.0, 0.0, 1.0)), adult_skeleton(1800.0))
+
+
+def test_a_target_under_the_ground_is_told(model):
+    assert any("4.00 m under the ground" in line for line in throw_at(model, Order((9.0, 0.0, -4.0))).warnings)
+
+
+def test_networks_that_answer_no_numbers_are_told(model):
+    networks = {name: replace(one, weights=tuple(6e30 * each for each in one.weights))
+                for name, one in model.networks.items()}  # fmt: skip
+    with pytest.raises(InputError, match="lose the body"):
+        throw_at(replace(model, networks=networks), Order((9.0, 0.0, 1.0)))
 
 
 @pytest.fixture(scope="module")
@@ -180,6 +198,9 @@ def test_the_command_is_the_function(weights, tmp_path, capsys, model):
     (["--target", "12,3,1", "--out", "x.obj"], "x.obj"),
     (["--target", "12,3,1", "--track", "t.csv"], "--library"),
     (["--target", "12,3,1", "--ball-kind", "pebble"], "pebble"),
+    (["--target", "12,3,1", "--seed", "-1"], "--seed"),
+    (["--target", "12,3,1", "--unit", "nan"], "--unit"),
+    (["--target", "-320,0,1", "--start", "-.5,-1"], "what a human gives"),
 ])
 def test_bad_command_lines_are_told_in_one_line(weights, tmp_path, capsys, extra, says):
     found = main(["throw", "synthesize", "--model", str(weights), "--out", str(tmp_path / "o.bvh"), *extra])

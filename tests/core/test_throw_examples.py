@@ -114,9 +114,11 @@ def test_the_report_of_a_release_beside_it(own):
     beside.write_text(json.dumps(report))
     first = examples_in(own)[0]
     assert abs(first.impact[2] - truth.impact[2]) < 1e-4 and abs(np.linalg.norm(first.launch) - speed) < 1e-6
-    beside.write_text("{}")
-    told = []
-    assert len(examples_in(own, told=told.append)) == 1 and "no report of a release" in told[0]
+    wrong = [json.dumps(report | {"impact_m": impact}) for impact in (["a", 2, None], [np.nan, 2, 3])]
+    for text in ("{}", "[" * 100000, *wrong):
+        beside.write_text(text)
+        told = []
+        assert len(examples_in(own, told=told.append)) == 1 and "no report of a release" in told[0]
 
 
 def test_odd_recordings_are_told_and_left_out(own):
@@ -131,7 +133,8 @@ def test_odd_recordings_are_told_and_left_out(own):
 
 
 @pytest.mark.parametrize(
-    "change", [("limb", "nose"), ("release_s", "soon"), ("target_x_m", ""), ("file", "subject03/none.bvh")]
+    "change", [("limb", "nose"), ("release_s", "soon"), ("target_x_m", ""), ("file", "subject03/none.bvh"),
+     ("file", "subject03/../subject03/subject03_throw001.bvh")],
 )
 def test_a_wrong_table_is_told_with_its_line(own, change):
     path = own / "throws.csv"

@@ -95,12 +95,11 @@ def generate(
     began = time.perf_counter()
     seen = _windows(model, description)
     loop = _Loop(stepper(model), description, options)
-    first, iterations = loop.start(start, seen[0])
-    steps = [first]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        first, iterations = loop.start(start, seen[0])
+        steps = [first]
         for frame in range(len(description) - 1):
             steps.append(loop.step(steps[-1].state, seen[frame + 1], frame, frame + 1))
-    _check_numbers(steps)
     return _generated(model, description, steps, iterations, time.perf_counter() - began)
 
 
@@ -118,7 +117,9 @@ class _Loop:
         if self.options.blend:
             window = blended(window, pose.positions[self.ready.effectors] - self.wanted[now], self.fps)
         share = None if self.shares is None else self.shares[then]
-        return self.ready.step(pose, window, self.wanted[then], share, self.options.limits)
+        made = self.ready.step(pose, window, self.wanted[then], share, self.options.limits)
+        _check_numbers(made, then)
+        return made
 
     def start(self, pose: Pose | None, window: Windows) -> tuple[Step, int]:
         """The first frame (§7.7.1): the best of what the iterations came by, and how many there were."""
@@ -178,12 +179,11 @@ def _check(model: ThrowModel, description: Description) -> None:
         raise InputError("description", "no rotations of the hands", "them, as the model was trained with them")
 
 
-def _check_numbers(steps: list[Step]) -> None:
+def _check_numbers(step: Step, frame: int) -> None:
     """InputError where networks answered what is no number, as they may where all is far from what they know."""
-    for frame, step in enumerate(steps):
-        if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _FARTHEST):
-            raise InputError("model", f"networks that lose the body in frame {frame}", "a body near its description",
-                             "ask for what its examples are like, or train it longer")  # fmt: skip
+    if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _FARTHEST):
+        raise InputError("model", f"networks that lose the body in frame {frame}", "a body near its description",
+                         "ask for what its examples are like, or train it longer")  # fmt: skip
 
 
 def _generated(model, description: Description, steps: list[Step], iterations: int, seconds: float) -> Generated:

@@ -91,6 +91,13 @@ def test_a_body_without_legs_is_refused():
         identify(Skeleton(("Hips", "Spine"), (-1, 0), np.zeros((2, 3))))
 
 
+def test_arms_are_not_taken_for_legs_that_lack():
+    names = ["Hips", *(f"{side}{part}" for side in ("Left", "Right") for part in ("Arm", "ForeArm", "Hand"))]
+    offsets = [[0, 0, 1], *([0.0, side * step, 0.4 * (step < 0.2)] for side in (1, -1) for step in (0.15, 0.3, 0.25))]
+    with pytest.raises(InputError, match="no joint found for left upper_leg"):
+        identify(Skeleton(names, [-1, 0, 1, 2, 0, 4, 5], np.array(offsets, float)))
+
+
 def test_toes_and_arms_may_be_missing():
     full = family_skeleton("LAFAN1")
     keep = [i for i, n in enumerate(full.names) if not any(word in n for word in ("Toe", "Arm", "Hand", "Shoulder"))]
