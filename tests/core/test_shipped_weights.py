@@ -29,19 +29,19 @@ def test_they_are_small_and_of_the_projects_own_adult(action):
 
 
 @pytest.mark.parametrize("action", ACTIONS)
-@pytest.mark.parametrize("seed, number", [(0, 44), (9, 1)])
-def test_networks_alone_follow_what_they_never_saw(action, seed, number):
-    """Of the adult a number above 40, and a person whose seed no training had."""
+def test_networks_alone_follow_what_they_never_saw(action):
+    """Of the adult numbers above 40, and a person whose seed no training had: 3 cm in the mean, 1 cm with correction."""
     model = shipped_model(action)
-    _, made = planted(action, seed, number)
-    example = example_of("kept back", "", made.motion, made.limb, made.release, made.impact, made.velocity, 30.0)
-    wanted = scaled(describe(example), model.stature / example.stature)
-    networks = Options(pose_iterations=0, ik=False, blend=False, limits=False)
-    assert deviations(generate(model, wanted, options=networks).effectors, wanted.effectors).max() <= 0.03 * _FAR[seed > 0]
-    assert deviations(generate(model, wanted).effectors, wanted.effectors).max() <= 0.01
-
-
-_FAR = (1.0, 1.5)
+    alone, whole = [], []
+    for seed, number in ((0, 41), (0, 45), (9, 0), (9, 3)):
+        _, made = planted(action, seed, number)
+        example = example_of("kept back", "", made.motion, made.limb, made.release, made.impact, made.velocity, 30.0)
+        wanted = scaled(describe(example), model.stature / example.stature)
+        networks = Options(pose_iterations=0, ik=False, blend=False, limits=False)
+        alone.append(deviations(generate(model, wanted, options=networks).effectors, wanted.effectors))
+        whole.append(deviations(generate(model, wanted).effectors, wanted.effectors))
+    assert np.mean(alone, axis=0).max() <= 0.03
+    assert np.mean(whole, axis=0).max() <= 0.01
 
 
 @pytest.mark.parametrize("action", ACTIONS)
