@@ -86,7 +86,7 @@ _INSTEP = KickStyle(
         (0.0, -20, 44, 8, 32), (0.14, -40, 42, 0, 24), (0.35, -24, 32, 8, 28), (0.7, -4, 20, 12, 28), (1.3, 2, 10, 12, 18),
     ),
     hips=(
-        (-0.11, -0.26, 0.19, 0.075), (0.0, 0.0, 0.0, 0.075), (0.1, 0.18, -0.05, 0.055), (0.25, 0.42, -0.08, 0.05),
+        (-0.11, -0.19, 0.15, 0.11), (0.0, 0.0, 0.0, 0.09), (0.1, 0.18, -0.05, 0.055), (0.25, 0.42, -0.08, 0.05),
         (0.5, 0.74, -0.12, 0.07), (0.85, 0.98, -0.12, 0.04), (1.3, 1.02, -0.12, 0.02),
     ),
 )  # fmt: skip
@@ -118,13 +118,13 @@ _INSIDE = KickStyle(
         (0.0, -10, 36, 10, 32), (0.14, -22, 34, 6, 28), (0.35, -12, 26, 10, 28), (0.7, 0, 18, 12, 26), (1.3, 2, 10, 12, 18),
     ),
     hips=(
-        (-0.11, -0.21, 0.11, 0.07), (0.0, 0.0, 0.0, 0.08), (0.1, 0.15, -0.04, 0.07), (0.25, 0.34, -0.07, 0.06),
+        (-0.11, -0.17, 0.10, 0.10), (0.0, 0.0, 0.0, 0.09), (0.1, 0.15, -0.04, 0.07), (0.25, 0.34, -0.07, 0.06),
         (0.5, 0.60, -0.10, 0.06), (0.85, 0.80, -0.10, 0.04), (1.3, 0.84, -0.10, 0.02),
     ),
 )  # fmt: skip
 KICKS = {"instep": _INSTEP, "inside": _INSIDE}
 _HIPS_AT_CONTACT = np.array([-0.22, 0.18])  # m from the kicking ankle at the contact
-_PLANTED = np.array([0.03, 0.30])  # m, the standing foot's ankle
+_PLANTED = np.array([-0.05, 0.30])  # m, the standing foot's ankle
 _APART = 0.19  # m between the lines on which left and right foot go
 _STEPS = ((-1.30, -0.90), (-1.02, -0.47), (-0.55, -0.11))  # s, off the ground and down again: left, right, left
 
@@ -230,8 +230,8 @@ def _hips(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple:
     begin = 0.5 * (falls["left0"] + falls["right0"])
     run = (
         (-1.5, *begin, 0.01), (-1.3, *(begin + 0.03 * ahead), 0.03), (-0.9, *beside("left1", 0.25, -0.7), 0.05),
-        (-0.68, *beside("left1", -0.16, -0.7), 0.035), (-0.47, *beside("right1", 0.26 * style.strides[2], 0.7), 0.06),
-        (-0.30, *beside("right1", -0.14 * style.strides[2], 0.7), 0.045),
+        (-0.68, *beside("left1", -0.20, -0.7), 0.05), (-0.47, *beside("right1", 0.17 * style.strides[2], 0.7), 0.08),
+        (-0.30, *beside("right1", -0.22 * style.strides[2], 0.7), 0.07),
     )  # fmt: skip
     return run + tuple((t, *(_HIPS_AT_CONTACT + [x, y]), low) for t, x, y, low in style.hips)
 
@@ -244,7 +244,7 @@ def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple
     left = (
         *_step(one, falls["left0"], falls["left1"], 0.10, yaw, yaw),
         *_step(three, falls["left1"], falls["planted"], 0.13, yaw, -10.0),
-        *_step((0.46, 0.86), falls["planted"], falls["left2"], 0.10, -10.0, 0.0),
+        *_step((0.39, 0.82), falls["planted"], falls["left2"], 0.10, -10.0, 0.0),
     )
     right = (
         *_step(two, falls["right0"], falls["right1"], 0.12, yaw, yaw - 4.0),
@@ -262,8 +262,8 @@ def _step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: fl
         return (begin + share * d, *(off + gone * way), raised, pitch, yaw + gone * (later - yaw))
 
     return (
-        row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), row(0.0, 0.0, 0.0, 38.0), row(0.22, 0.10, high, 48.0), row(0.62, 0.68, 0.6 * high, 4.0),
-        row(0.88, 0.97, 0.12 * high, -12.0), row(1.0, 1.0, 0.0, -8.0), row(1.12, 1.0, 0.0, 0.0),
+        row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), row(0.0, 0.0, 0.0, 38.0), row(0.24, 0.08, high, 48.0), row(0.62, 0.58, 0.6 * high, 4.0),
+        row(0.88, 0.92, 0.12 * high, -12.0), row(1.0, 1.0, 0.0, -8.0), row(1.12, 1.0, 0.0, 0.0),
     )  # fmt: skip
 
 
