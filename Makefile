@@ -59,8 +59,8 @@ bench: venv
 
 weights: training
 	@rm -rf build/examples
-	@set -ex; for made in throw:4 kick:2; do action=$${made%:*}; \
-	  $(TRAINED) throw examples --out build/examples/$$action --action $$action --seed 0 --subjects $${made#*:}; \
+	@set -ex; for action in throw kick; do \
+	  $(TRAINED) throw examples --out build/examples/$$action --action $$action --seed 0; \
 	  $(TRAINED) throw train build/examples/$$action --action $$action --half --out build/examples/$$action.npz; \
 	  mv build/examples/$$action.npz $(WEIGHTS)/$$action.npz; \
 	done
