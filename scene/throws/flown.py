@@ -40,15 +40,16 @@ def own_place(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapT
 def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> bpy.types.Object:
     """Let the ball go the way of a throw; it is made where there is none. Returns it."""
     wish = body.beyond_mocap_throw
-    if wish.flown is not None and wish.flown != wish.ball and not (wish.ball is None and wish.flown.get(KEPT)):
+    if wish.flown is not None and wish.flown != wish.ball and not (wish.ball is None and _is_made(wish)):
         give_back(scene, wish)
     kind = result.thrown.ball
     ball = wish.ball or wish.flown
     if ball is None or ball.name not in scene.objects:
         ball = balls.create(bpy.context, NAMES[result.order.act], bake.collection(scene))
-        ball[KEPT] = True
+        ball[KEPT], wish.flown = True, ball
+        drop(wish.ball_before, MARK)
     _let_go(scene, ball)
-    if ball.get(KEPT):
+    if ball == wish.flown and _is_made(wish):
         ball.scale = 3 * (kind.radius / balls.RADIUS,)
     elif not wish.ball_before.kept:
         put_aside(wish.ball_before, ball)
@@ -77,7 +78,7 @@ def give_back(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> None:
             bpy.data.curves.remove(data)
     if ball is not None:
         _let_go(scene, ball)
-        if ball.get(KEPT) and not wish.ball_before.kept:
+        if _is_made(wish):
             channels.discard(ball, MARK)
             remove(ball)
         elif wish.ball_before.kept:
@@ -85,6 +86,11 @@ def give_back(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> None:
     drop(wish.ball_before, MARK)
     for name in ("flown", "curve"):
         wish.property_unset(name)
+
+
+def _is_made(wish: BeyondMocapThrow) -> bool:
+    """Whether the ball that flies was made for this throw; one of somebody else's has been put aside."""
+    return bool(wish.flown.get(KEPT)) and not wish.ball_before.kept
 
 
 def _let_go(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:

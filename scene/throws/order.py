@@ -256,11 +256,12 @@ def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton"
 def _target(scene: bpy.types.Scene, wish) -> np.ndarray:
     """(3,) m."""
     metres = 1.0 / units_per_metre(scene)
-    if wish.target is None:
-        return np.array(scene.cursor.location) * metres
-    if wish.target.name not in scene.objects:
+    if wish.target is not None and wish.target.name not in scene.objects:
         raise InputError("target", f"{wish.target.name} is not in this scene", "an object of this scene", "pick another")
-    return np.array(wish.target.matrix_world.translation) * metres
+    place = np.array(scene.cursor.location if wish.target is None else wish.target.matrix_world.translation) * metres
+    if place[2] < 0.0:
+        raise InputError("target", f"{-place[2]:.2f} m below the ground", "one on or above it, where balls get", "raise it")
+    return place
 
 
 def _lies(scene: bpy.types.Scene, wish) -> np.ndarray | None:

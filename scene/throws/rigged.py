@@ -65,11 +65,24 @@ def lift(rig: rig_bake.Driven) -> float:
 
 
 def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
-    """Let a rig play a motion of its driven skeleton; `rig_bake.remove` takes it away again. Returns lines about it."""
+    """Let a rig play a motion of its driven skeleton; `take_away` takes it away again.
+    Returns lines about it."""
     source = rig_bake.Source(motion, start, name)
-    baked = rig_bake.lay(rig_bake.fitted(body, table, source, scene, rig_bake.Wishes(exact=True)))
+    fitted = rig_bake.fitted(body, table, source, scene, rig_bake.Wishes(exact=True))
+    played = channels.playing(body)[0]
+    if played is not None and not played.get(MARK):
+        played.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
+    baked = rig_bake.lay(fitted)
     baked.action[MARK] = True
     return baked.told
+
+
+def take_away(body: bpy.types.Object) -> None:
+    """Let a rig play what it did before its throw; a bake below it can be taken away as before."""
+    rig_bake.remove(body)
+    played = channels.playing(body)[0]
+    if played is not None and rig_bake.BEFORE in played:
+        played[rig_bake.MARK] = True
 
 
 def _posed_otherwise(body: bpy.types.Object) -> bool:

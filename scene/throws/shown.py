@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import action, bake, channels, linked, rig_bake, session
 from ..measure import frames_per_second
+from ..passes.settings import KEPT
 from ..set_aside import bring_back, drop, put_aside
 from . import flown, order, rigged
 from .settings import MARK
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from .order import Result
 
 MOST_LINES = 12
+BAKED = (rig_bake.MARK, rig_bake.BEFORE, rig_bake.KEYS)
+"""What tells a bake that is taken away again."""
 RESULTS = ("made", "rigged", "release", "figures", "told")
 
 
@@ -52,7 +55,7 @@ def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     flown.give_back(scene, wish)
     played = channels.playing(body)[0]
     if wish.rigged and played is not None and played.get(MARK):
-        rig_bake.remove(body)
+        rigged.take_away(body)
     elif wish.before.kept:
         bring_back(wish.before, body, MARK)
     _settle(wish)
@@ -65,7 +68,10 @@ def keep(body: bpy.types.Object) -> None:
     for thing in (body, wish.flown):
         played = channels.playing(thing)[0] if thing is not None else None
         if played is not None and played.get(MARK):
-            del played[MARK]
+            for name in (MARK, *(BAKED if thing == body else ())):
+                played.pop(name, None)
+    if wish.flown is not None:
+        wish.flown.pop(KEPT, None)
     for before in (wish.before, wish.ball_before):
         drop(before, MARK)
     for name in ("flown", "curve"):

@@ -247,6 +247,9 @@ def test_what_is_refused(tmp_path):
     wish.target.location = (400.0, 0.0, 0.0)
     bpy.context.view_layer.update()
     refused("m/s")
+    wish.target.location = (18.0, 0.0, -1.0)
+    bpy.context.view_layer.update()
+    refused("1.00 m below the ground")
     wish.target.location = TARGET
     wish.ball = body.beyond_mocap_throw.target
     bpy.ops.object.select_all(action="DESELECT")
@@ -290,3 +293,34 @@ def test_rigs(kind, room):
     bpy.context.scene.frame_set(1)
     after = state()
     assert {key for key in before if before[key] != after[key]} <= {"materials", "collections", "frames"}
+
+
+def test_a_kicked_ball_that_was_kept_is_not_lost_by_the_next_kick():
+    body = a_body()
+    wish = body.beyond_mocap_throw
+    press(bpy.ops.beyond_mocap.kick_at_target)
+    ball = wish.flown
+    name, action, scale = ball.name, ball.animation_data.action.name, tuple(ball.scale)
+    press(bpy.ops.beyond_mocap.keep_throw)
+    wish.ball, wish.frame, wish.kind = ball, 150, "handball"
+    press(bpy.ops.beyond_mocap.kick_at_target)
+    assert wish.flown.name == name and tuple(ball.scale) == scale
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert bpy.data.objects[name].animation_data.action.name == action
+
+
+def test_a_kept_throw_of_a_rig_and_a_bake_are_not_lost_by_the_next_throw():
+    body = ride_rigs.walk_ik()
+    worlds.choose(body)
+    wish = body.beyond_mocap_throw
+    wish.target, wish.frame = an_empty(TARGET), 60
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    press(bpy.ops.beyond_mocap.keep_throw)
+    kept = body.animation_data.action
+    kept["beyond_mocap_rig"], kept["beyond_mocap_before"], name = True, "{}", kept.name  # as one that was baked
+    wish.frame = 100
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert body.animation_data.action.name != name
+    press(bpy.ops.beyond_mocap.leave_throw)
+    kept = body.animation_data.action
+    assert kept.name == name and kept["beyond_mocap_rig"]
