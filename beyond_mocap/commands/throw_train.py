@@ -38,6 +38,8 @@ def add(verbs):
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`throw train`: trains and writes the model."""
     check_outputs(options.out, never=(options.config, options.skeleton))
+    if options.out.suffix.lower() != ".npz":
+        raise InputError(options.out, "no file of weights", "a name ending in .npz", "choose another ending")
     _require_training()
     from training.command import train_folder
 

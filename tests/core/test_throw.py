@@ -207,3 +207,8 @@ def test_bad_command_lines_are_told_in_one_line(weights, tmp_path, capsys, extra
     told = capsys.readouterr().err
     assert found == 2 and says in told and told.count("\n") == 1
     assert not (tmp_path / "o.bvh").exists()
+
+
+def test_weights_have_their_ending(tmp_path, capsys):
+    assert main(["throw", "train", str(tmp_path), "--out", str(tmp_path / "w.txt")]) == 2
+    assert "ending in .npz" in capsys.readouterr().err
