@@ -48,6 +48,8 @@ _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be
 _MORE = 1.04  # times the slowest launch that reaches the target, at least
 _SUITS, _EASY = 1.6, 0.3  # times the slowest launch that suits, and by which logarithm another pace is an odd one
 _TOLD_BEYOND = np.radians(2.0)
+_MOST_MOVED, _MOST_BEYOND, _MOST_MISSED = 0.15, np.radians(15.0), 1.0
+"""m of moved wrist or ankle, rad of a joint beyond the examples and m past the target with which nothing is made."""
 _ROUNDS = 6  # of finding where the body begins
 _GOES_ON = 1.0  # s that the ball is followed behind its target
 
@@ -107,7 +109,7 @@ class Thrown:
     below which no ball gets there. generated: the motion before the correction, where it was; generated_release: s in
     it; raw_deviation: m that hands and feet were off their wanted ways before any inverse kinematics, on average.
     beyond: rad that a joint of the corrected limb is beyond the range of the model's examples at most, nan on other
-    bones. examples: names and weights of what it was planned from. warnings: lines for people.
+    bones than the model's. examples: names and weights of what it was planned from. warnings: lines for people.
     """
 
     motion: Motion
@@ -403,12 +405,13 @@ class _Work:
         found = corrected(
             motion, part, release * motion.fps, self.target, self.ball, self.order.freedom, self.order.speed
         )
+        beyond = self._beyond(found.motion)
+        self._check_body(found, beyond)
         left = found.frame / motion.fps
         start = 0.0 if self.order.release_time is None else self.order.release_time - left
         launch = Launch(start + left, found.position, found.velocity, found.spin)
         flight = fly(launch, self.ball, found.seconds + _GOES_ON + found.motion.duration)
         impact = crossing(flight, self.target)
-        beyond = self._beyond(found.motion)
         self._tell(found, impact, beyond)
         return Thrown(
             found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
@@ -422,10 +425,26 @@ class _Work:
         """rad that a joint of the throwing or kicking limb is beyond the model's limits at most."""
         from .synthesis.phase_network.limits import JointLimits
 
-        if self.model.joint_limits is None or self.mirrored or not motion.skeleton.same_bones(self.model.skeleton):
+        if self.model.joint_limits is None or not motion.skeleton.same_bones(self.model.skeleton):
             return np.nan
+        if self.mirrored:
+            motion = mirror(motion)
         over = JointLimits(motion.skeleton, self.model.joint_limits).beyond(quaternion.to_matrix(motion.rotations))
-        return float(over[:, list(part_of(motion.skeleton, self.limb, self.ball).chain(motion))].max())
+        return float(over[:, list(part_of(motion.skeleton, self.own_limb, self.ball).chain(motion))].max())
+
+    def _check_body(self, found: Corrected, beyond: float) -> None:
+        """InputError for a target that the ball reaches only if the body is bent out of shape, or never."""
+        action = "kick" if self.kicks else "throw"
+        if found.seconds <= 0.0 or found.missed > _MOST_MISSED:
+            what = "the ball does not get there"
+        elif found.moved > _MOST_MOVED:
+            what = f"it takes {'an ankle' if self.kicks else 'a wrist'} moved by {100 * found.moved:.0f} cm"
+        elif beyond > _MOST_BEYOND:
+            what = f"it takes a joint bent {np.degrees(beyond):.0f} degrees further than in any of the examples"
+        else:
+            return
+        raise InputError("target", what, f"one that a {action} like the examples reaches",
+                         "move it further off where it is near, nearer or lower where it is far")  # fmt: skip
 
     def _tell(self, found: Corrected, impact: np.ndarray, beyond: float) -> None:
         """Lines about what people should know."""

@@ -10,6 +10,7 @@ from .aim import CLOSE, aim
 from .physics import Ball, length
 
 _TIMES = 28
+_LONGEST = 2.0  # times the flight of the slowest launch where there is no air: sqrt(2 far / gravity)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,9 @@ class Arcs:
 def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | None = None) -> Arcs:
     """The launches from `start` (3,) m that lead straight to `target` (3,) m, without a bounce; spin (3,) rad/s."""
     far = float(np.linalg.norm(np.asarray(target, float) - start))
-    seconds = np.geomspace(far / 60.0, max(far / 3.0, 3.0), _TIMES)
+    least = far / 60.0
+    longest = max(_LONGEST * np.sqrt(2.0 * far / ball.gravity), 2.0 * least)
+    seconds = np.geomspace(least, longest, _TIMES)
     found = aim(start, target, ball, seconds, spin=spin)
     good = np.flatnonzero(found.miss <= CLOSE)
     speeds = length(found.velocity[good])

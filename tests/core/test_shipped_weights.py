@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation.throws.deviation import deviations
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.planted_examples import planted
@@ -52,3 +53,16 @@ def test_they_hit_what_is_aimed_at(action):
         assert thrown.impact_error <= 0.10 and thrown.moved <= 0.05 and not thrown.beyond > 0.01
     other = throw_at(model, Order(np.array(TARGETS[action][0]), limb=LIMBS[action]))
     assert other.limb == LIMBS[action] and other.impact_error <= 0.10
+
+
+@pytest.mark.parametrize("action, order, says", [
+    ("throw", Order((1.6, 0.0, 0.2)), "wrist moved"), ("throw", Order((1.6, 0.0, 0.2), limb="left_hand"), "wrist moved"),
+    ("kick", Order((2.0, 0.0, 2.4)), "does not get there"),
+])
+def test_no_body_is_bent_out_of_shape_for_a_target(action, order, says):
+    with pytest.raises(InputError, match=says):
+        throw_at(shipped_model(action), order)
+
+
+def test_joints_of_the_other_hand_are_judged_as_well():
+    assert throw_at(shipped_model("throw"), Order((15.0, 4.0, 1.5), limb="left_hand")).beyond < np.radians(2.0)

@@ -1,0 +1,17 @@
+"""Launches that reach one target, from the slowest on."""
+
+import numpy as np
+
+from beyond_mocap.ball.arcs import arcs
+from beyond_mocap.ball.physics import THROWN, Ball
+
+
+def test_without_air_the_slowest_launch_is_the_known_one():
+    ball = Ball("stone", 0.04, 0.1)
+    found = arcs(np.array([0.0, 0.0, 1.5]), np.array([50.0, 0.0, 1.5]), ball)
+    assert abs(found.slowest - np.sqrt(50.0 * ball.gravity)) < 0.02 * found.slowest
+
+
+def test_far_targets_are_not_looked_for_up_in_the_sky():
+    found = arcs(np.array([0.0, 0.0, 1.5]), np.array([160.0, 0.0, 1.0]), THROWN["baseball"])
+    assert len(found.speeds) >= 10 and np.all(np.diff(found.speeds) > 0.0)
