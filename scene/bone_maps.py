@@ -51,7 +51,7 @@ def suggest(rig: bpy.types.Object) -> dict[str, str]:
         body = identify(skeleton)
     except InputError as error:
         found = str(error).partition(": ")[2].partition(";")[0]
-        raise InputError(f"armature {rig.name}", found, "a humanoid with two legs",
+        raise InputError(f"armature {rig.name}", f"no legs: {found}", "a humanoid with two legs",
                          "choose its bones in the bone map") from None
     parts = _parts(skeleton, body)
     armed = [bones[parts[leg]] for leg in LEGS if _ARM.search(side_and_part(skeleton.names[parts[leg]])[1])]
