@@ -386,12 +386,6 @@ def standing(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0), fa
     return place(motion, facing, (spot[0], spot[1], 0.0))
 
 
-def begins_at(throw: Motion, release: float, spot: np.ndarray) -> np.ndarray:
-    """(2,) m: where the throw has to begin for its root to be over `spot` (2,) m at the release."""
-    root, _ = at_frames(throw, np.array([0.0, release * throw.fps]))
-    return np.asarray(spot, float) + root[0, :2] - root[1, :2]
-
-
 def seam_jerk(joined: Joined) -> np.ndarray:
     """(2,) m/s^3: the largest third difference of any joint within 8 frames of where the throw is gone over into and
     out of."""

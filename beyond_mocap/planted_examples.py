@@ -21,10 +21,11 @@ from .files import bvh
 from .files.whole import atomic_write
 from .ball.made_kicks import kick
 from .motion import quaternion
-from .motion.kick_subjects import Kicker, kick_style, kicker
+from .motion.kick_subjects import kick_style, kicker
 from .motion.kicks import KICKS
+from .motion.made_people import Person
 from .motion.motion import Motion, place
-from .motion.throw_subjects import Subject, subject, subject_throws
+from .motion.throw_subjects import subject, subject_throws
 from .motion.throws import GRAVITY
 from .throw_examples import LAUNCH, TABLE_NAME, TARGET
 
@@ -48,7 +49,7 @@ class Planted:
     words: str
 
 
-def planted_throw(thrower: Subject, chance: np.random.Generator, fps: float = RATE) -> Planted:
+def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
     """A throw of this subject at some target 5 to 26 m away and up to 2.4 m high."""
     target, speed = _throw_order(thrower.fastest, chance)
     made = subject_throws(thrower, target, speed, chance, fps)
@@ -57,7 +58,7 @@ def planted_throw(thrower: Subject, chance: np.random.Generator, fps: float = RA
     return Planted(made.motion, limb, made.release, made.position, made.velocity, impact, words)
 
 
-def planted_kick(who: Kicker, chance: np.random.Generator, fps: float = RATE) -> Planted:
+def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
     """A kick of this subject at some place of a goal 8 to 22 m away; of the slower ones many with the inside of the foot."""
     for _ in range(_TRIES):
         target = chance.uniform((8.0, -3.4, 0.3), (22.0, 3.4, 2.2))
@@ -65,7 +66,7 @@ def planted_kick(who: Kicker, chance: np.random.Generator, fps: float = RATE) ->
         inside = speed < _INSIDE[0] and target[2] < _INSIDE[1] and chance.uniform() < _INSIDE[2]
         style = kick_style(who, KICKS["inside" if inside else "instep"], speed, chance)
         try:
-            made = kick(tuple(target), speed, who.foot, style, who.skeleton, fps)
+            made = kick(tuple(target), speed, who.side, style, who.skeleton, fps)
         except InputError:
             continue  # too far for this speed, or lower or higher than this foot sends it
         words = f"kick {made.foot} low {'inside' if inside else 'top'} running"

@@ -18,8 +18,8 @@ def meets_wall(
     """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground where
     that comes first, and where it is after 6 s or four times what it would take without air where neither does.
 
-    position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground, ahead (2,): from where
-    it is thrown towards it, the wall's normal.
+    position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground, ahead
+    (2,): from where it is thrown towards it, the wall's normal.
     """
     unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
     flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST, 0.5 + 4.0 * unhindered))

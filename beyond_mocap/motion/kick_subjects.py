@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .adult import STATURE, adult_skeleton
 from .kicks import KickStyle
-from .skeleton import Skeleton
-from .throw_subjects import body_of, by_factors, scattered
+from .made_people import Person, adult, by_factors, person, scattered
 
 _SCATTER = {"approach": 2.0, "stride": 0.04, "back": 0.04, "follow": 0.05, "lean": 1.5, "off_arm": 0.06}
 """Standard deviation of the chance from kick to kick."""
@@ -31,39 +29,21 @@ class KickManner:
     off_arm: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class Kicker:
-    """A made person: skeleton, the foot that kicks ("left" or "right"; made people use the right one), the fastest kick in
-    m/s of the ball, the manner."""
-
-    name: str
-    stature: float
-    skeleton: Skeleton
-    foot: str
-    fastest: float
-    manner: KickManner
+_RANGES = {
+    "approach": (-9.0, 8.0), "stride": (0.86, 1.08), "back": (0.86, 1.04), "follow": (0.75, 1.15), "lean": (-5.0, 5.0),
+    "off_arm": (0.75, 1.08),
+}  # fmt: skip
+"""Between which people differ."""
 
 
-def kicker(seed: int) -> Kicker:
-    """Somebody of 1.6 to 2.0 m; the same seed gives the same person. Seed 0 is the project's own adult, in the manner of
-    the tables."""
+def kicker(seed: int) -> Person:
+    """Somebody who kicks; the same seed gives the same person. Seed 0 is the project's own adult."""
     if seed == 0:
-        return Kicker("adult", STATURE, adult_skeleton(), "right", 28.0, KickManner())
-    chance = np.random.default_rng([seed, 1863])
-    stature = float(chance.uniform(1.60, 2.00))
-    manner = KickManner(
-        approach=float(chance.uniform(-9.0, 8.0)),
-        stride=float(chance.uniform(0.86, 1.08)),
-        back=float(chance.uniform(0.86, 1.04)),
-        follow=float(chance.uniform(0.75, 1.15)),
-        lean=float(chance.uniform(-5.0, 5.0)),
-        off_arm=float(chance.uniform(0.75, 1.08)),
-    )
-    fastest = float(chance.uniform(22.0, 28.0))
-    return Kicker(f"kicker{seed:02d}", stature, body_of(stature, chance), "right", fastest, manner)
+        return adult(28.0, KickManner())
+    return person(f"kicker{seed:02d}", KickManner, _RANGES, (22.0, 28.0), np.random.default_rng([seed, 1863]))
 
 
-def kick_style(who: Kicker, base: KickStyle, speed: float, chance: np.random.Generator) -> KickStyle:
+def kick_style(who: Person, base: KickStyle, speed: float, chance: np.random.Generator) -> KickStyle:
     """How this person kicks a ball of `speed` m/s in the style `base`; `chance` makes it differ from the one before."""
     effort = float(np.clip((speed - _LEAST) / (who.fastest - _LEAST), 0.0, 1.0))
     return styled(base, scattered(who.manner, _SCATTER, chance), effort)

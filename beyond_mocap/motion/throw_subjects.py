@@ -11,8 +11,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from .adult import STATURE, adult_skeleton
-from .skeleton import Skeleton
+from .made_people import Person, adult, by_factors, person, scattered
 from .throws import STYLES, Throw, ThrowStyle, throw
 
 _SCATTER = {"slot": 2.0, "stride": 0.04, "lift": 0.08, "wind_up": 0.04, "lean": 0.06, "off_arm": 0.06, "follow": 0.05}
@@ -35,60 +34,22 @@ class Manner:
     follow: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class Subject:
-    """A made person: skeleton, the hand that throws ("left" or "right"; made people use the right one), the fastest throw in m/s, the manner."""
-
-    name: str
-    stature: float
-    skeleton: Skeleton
-    hand: str
-    fastest: float
-    manner: Manner
+_RANGES = {
+    "slot": (-7.0, 7.0), "stride": (0.85, 1.10), "lift": (0.45, 1.15), "wind_up": (0.80, 1.15), "lean": (0.75, 1.15),
+    "off_arm": (0.80, 1.10), "follow": (0.90, 1.15),
+}  # fmt: skip
+"""Between which people differ."""
 
 
-def subject(seed: int) -> Subject:
-    """Somebody of 1.6 to 2.0 m; the same seed gives the same person. Seed 0 is the project's own adult, in the manner of
-    the tables."""
+def subject(seed: int) -> Person:
+    """Somebody who throws; the same seed gives the same person. Seed 0 is the project's own adult."""
     if seed == 0:
-        return Subject("adult", STATURE, adult_skeleton(), "right", 34.0, Manner())
-    chance = np.random.default_rng([seed, 1907])
-    stature = float(chance.uniform(1.60, 2.00))
-    manner = Manner(
-        slot=float(chance.uniform(-7.0, 7.0)),
-        stride=float(chance.uniform(0.85, 1.10)),
-        lift=float(chance.uniform(0.45, 1.15)),
-        wind_up=float(chance.uniform(0.80, 1.15)),
-        lean=float(chance.uniform(0.75, 1.15)),
-        off_arm=float(chance.uniform(0.80, 1.10)),
-        follow=float(chance.uniform(0.90, 1.15)),
-    )
-    fastest = float(chance.uniform(24.0, 34.0))
-    return Subject(f"subject{seed:02d}", stature, body_of(stature, chance), "right", fastest, manner)
-
-
-def body_of(stature: float, chance: np.random.Generator) -> Skeleton:
-    """An adult of `stature` metres whose limbs and trunk are some percent longer or shorter than usual, both sides
-    alike."""
-    usual = adult_skeleton(stature)
-    legs, arms, wide = chance.uniform([0.965, 0.95, 0.94], [1.035, 1.05, 1.06])
-    trunk = 1.0 - 0.9 * (legs - 1.0)  # long legs make a short trunk
-    offsets = np.array(usual.offsets)
-    for joint, name in enumerate(usual.names):
-        part = name.removeprefix("Left").removeprefix("Right")
-        if part in ("Leg", "Foot"):
-            offsets[joint] *= legs
-        elif part in ("ForeArm", "Hand"):
-            offsets[joint] *= arms
-        elif part in ("Shoulder", "Arm", "UpLeg"):
-            offsets[joint, 1] *= wide
-        elif part.startswith("Spine") or part == "Neck":
-            offsets[joint] *= trunk
-    return replace(usual, offsets=offsets)
+        return adult(34.0, Manner())
+    return person(f"subject{seed:02d}", Manner, _RANGES, (24.0, 34.0), np.random.default_rng([seed, 1907]))
 
 
 def subject_throws(
-    thrower: Subject, target: tuple[float, float, float], speed: float, chance: np.random.Generator, fps: float = 120.0
+    thrower: Person, target: tuple[float, float, float], speed: float, chance: np.random.Generator, fps: float = 120.0
 ) -> Throw:
     """A throw of this subject at `target` (3,) m with `speed` m/s; `chance` makes it differ from the one before.
 
@@ -97,13 +58,7 @@ def subject_throws(
     manner = scattered(thrower.manner, _SCATTER, chance)
     effort = float(np.clip((speed - _LEAST) / (thrower.fastest - _LEAST), 0.0, 1.0))
     style = styled(STYLES["overarm"], manner, effort)
-    return throw(target, speed, thrower.hand, style, thrower.skeleton, fps)
-
-
-def scattered(manner, scatter: dict[str, float], chance: np.random.Generator):
-    """The same manner a little otherwise, by normal chance of the standard deviations `scatter` up to twice as far."""
-    off = np.clip(chance.standard_normal(len(scatter)), -2.0, 2.0)
-    return replace(manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)})
+    return throw(target, speed, thrower.side, style, thrower.skeleton, fps)
 
 
 def styled(base: ThrowStyle, manner: Manner, effort: float = 1.0) -> ThrowStyle:
@@ -129,11 +84,6 @@ def styled(base: ThrowStyle, manner: Manner, effort: float = 1.0) -> ThrowStyle:
 
 def _near_release(time: float) -> float:
     return float(np.exp(-0.5 * (time / 0.25) ** 2))
-
-
-def by_factors(rows: tuple, *factors: float) -> tuple:
-    """Rows (time, values...) with every value times its factor."""
-    return tuple((row[0], *(value * factor for value, factor in zip(row[1:], factors))) for row in rows)
 
 
 def _paced(rows: tuple, manner: Manner) -> tuple:

@@ -13,7 +13,7 @@ from beyond_mocap.evaluation.jerk import jerk, windowed
 from beyond_mocap.library.library import build
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading
-from beyond_mocap.motion.motion import Motion, forward_kinematics, place
+from beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics, place
 from beyond_mocap.motion.throws import throw
 from beyond_mocap.motion.track import Track
 from beyond_mocap.plan import Plan
@@ -42,8 +42,13 @@ def going(speed: float) -> Plan:
 def on_library(library, speed):
     """A throw on the library's skeleton, where the plan has the player at the release, and the plan."""
     one = throw((18.0, 0.0, 1.0), 25.0, skeleton=library.skeleton, fps=FPS)
-    begin = joined_throw.begins_at(one.motion, one.release, np.zeros(2)) - one.motion.root_positions[0, :2]
-    return place(one.motion, 0.0, (*begin, 0.0)), one.release, going(speed)
+    return released_over(one, np.zeros(2)), one.release, going(speed)
+
+
+def released_over(made, spot) -> Motion:
+    """A made throw whose hips are over `spot` (2,) m at the release."""
+    hips = at_frames(made.motion, np.array([made.release * made.motion.fps]))[0][0, :2]
+    return place(made.motion, 0.0, (*(spot - hips), 0.0))
 
 
 def same_where_kept(joined, motion) -> bool:
@@ -96,8 +101,7 @@ def test_what_lies_within_the_throw_gives_way(library):
 
 def test_other_bones_and_sizes_keep_the_exact_throw(library, made):
     # the adult of `motion.adult` is not the library's skeleton: the way there is found on the library's bones
-    begin = joined_throw.begins_at(made.motion, made.release, np.zeros(2)) - made.motion.root_positions[0, :2]
-    motion = place(made.motion, 0.0, (*begin, 0.0))
+    motion = released_over(made, np.zeros(2))
     way = joined_throw.run_up_and_recovery(library, going(0.0), motion, made.release, AT)
     assert way.motion.skeleton.names == motion.skeleton.names
     assert same_where_kept(joined_throw.laid_into(way.motion, way.start, motion, made.release, AT), motion)
@@ -161,8 +165,7 @@ def test_what_cannot_be_joined(library, made):
 
 def test_out_of_a_walk_and_back_by_the_library(library, made):
     walk = gait(1.4, 14.0, FPS)
-    begin = joined_throw.begins_at(made.motion, made.release, walk.root_positions[210, :2])
-    motion = place(made.motion, 0.0, (*(begin - made.motion.root_positions[0, :2]), 0.0))
+    motion = released_over(made, walk.root_positions[210, :2])
     way = joined_throw.around(library, walk, 0.0, motion, made.release, 7.0)
     joined = joined_throw.laid_into(way.motion, way.start, motion, made.release, 7.0)
     assert same_where_kept(joined, motion) and len(joined.motion) == len(walk)
@@ -177,8 +180,7 @@ def test_out_of_a_walk_and_back_by_the_library(library, made):
 
 def test_who_has_no_time_to_get_back_goes_on_from_there(library, made):
     run = gait(4.2, 6.0, FPS)
-    over = place(made.motion, 0.0, (*(joined_throw.begins_at(made.motion, made.release, run.root_positions[90, :2])
-                                      - made.motion.root_positions[0, :2]), 0.0))  # fmt: skip
+    over = released_over(made, run.root_positions[90, :2])
     assert not joined_throw.comes_in_time(run, 0.0, over, made.release, 3.0)
     begin = joined_throw.stops_at(run, 0.0, 3.0 - made.release) - made.motion.root_positions[0, :2]
     motion = place(made.motion, 0.0, (*begin, 0.0))
