@@ -2,7 +2,7 @@
 
     .venv-training/bin/python -m benchmarks.throw_experiments --quick        # small networks, few epochs
     .venv-training/bin/python -m benchmarks.throw_experiments                # his sizes and epochs: a day of one core
-    .venv-training/bin/python -m benchmarks.throw_experiments --tables       # only write the tables of what is done
+    .venv-training/bin/python -m benchmarks.throw_experiments --quick --tables  # train nothing, write the tables
 
 Every model is trained on one subject and tested on all others, what is asked for scaled by height. Broken off, by Ctrl-C
 or `--minutes`, the same command goes on. Models and figures go below build/throw-experiments; the tables into
@@ -22,11 +22,12 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import throw_folders
+from benchmarks import throw_folders, throw_results
 from benchmarks.places import DATA, ROOT
-from benchmarks.throw_runs import PAPER, QUICK, Run, Scale, Variant, results, runs, variants, work_off
+from benchmarks.throw_runs import PAPER, QUICK, Run, Scale, Variant, runs, variants, work_off
 
 PLACE = ROOT / "build" / "throw-experiments"
+RESULTS = ROOT / "benchmarks" / "throw_results"
 PAGE = ROOT / "docs" / "throw-experiments.md"
 BEGIN, END = "<!-- tables -->", "<!-- end of tables -->"
 PLANTED_SUBJECTS, PLANTED_THROWS, PLANTED_SEED = 4, 40, 1
@@ -85,25 +86,30 @@ def subjects_of(data: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(example.subject for example in examples_of(data)))
 
 
-def worked(run: Run, model_path: Path, scale: Scale) -> dict:
-    """One run: trains where no model is there yet, tests, and tells both. Without its JSON a run is tested anew with the
-    model that is there."""
+def worked(run: Run, folder: Path, scale: Scale) -> dict:
+    """One run: trains where no model is there yet, tests, and tells both."""
+    from beyond_mocap import __version__
     from beyond_mocap.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
     from beyond_mocap.files.network_npz import read_model
     from beyond_mocap.files.tables import plain
     from beyond_mocap.files.whole import atomic_write
 
-    beside = model_path.with_suffix(".trained")
+    place = run.place(folder)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    model_path, beside = place.with_suffix(".npz"), place.with_suffix(".trained")
     if not (model_path.is_file() and beside.is_file()):
-        atomic_write(beside, json.dumps(_train(run, model_path, scale), indent=1))
-    told = json.loads(beside.read_text("utf-8"))
+        atomic_write(beside, json.dumps(_train(run, model_path, scale)))
     model = read_model(model_path)
     tested = [e for e in examples_of(run.data) if (e.subject == run.subject) == run.variant.everyone]
     found = evaluate_throws(model, some_of_each(tested, scale.motions), FULL if run.variant.corrected else RAW)
-    return plain({"training": told, "parameters": parameters_of(model), **found.report()})
+    return {
+        "version": __version__, "training": json.loads(beside.read_text("utf-8")), "parameters": parameters_of(model),
+        "broken": sum("lose the body" in line for line in found.left_out), "each": plain(found.report()["each"]),
+    }  # fmt: skip
 
 
 def _train(run: Run, out: Path, scale: Scale) -> dict:
+    """Trains a run's model and tells how large it is and how long it was trained."""
     from training.config import config_of
     from training.train import train
 
@@ -112,21 +118,29 @@ def _train(run: Run, out: Path, scale: Scale) -> dict:
     from benchmarks.throw_linear import linear_model
 
     given = _given(run)
+    frames = sum(len(one.motion) - 1 for one in given)
     wished = {**run.variant.config, "action": ACTIONS[run.data], "fps": FPS}
-    if run.variant.everyone:
-        wished["epochs"] = -(-wished["epochs"] // (len(subjects_of(run.data)) - 1))
     if wished["units"] == "equal":
         wished["units"] = equal_units(run, scale, given[0].motion.skeleton)
+    steps = wished.pop("steps", None)
+    if steps:
+        wished["epochs"] = max(1, round(steps / -(-frames // wished["batch"])))
+    elif run.variant.everyone:
+        wished["epochs"] = -(-wished["epochs"] // (len(subjects_of(run.data)) - 1))
     config = config_of({**wished, "mirrored": False}, run.variant.name)  # all throw and kick with the same side
     begun = time.perf_counter()
     if run.variant.linear:
-        write_model(linear_model(given, config.settings), out)
-        return {"config": config.flat(), "examples": len(given), "minutes": (time.perf_counter() - begun) / 60.0}
-    model = train(given, config, checkpoint=out.with_suffix(".checkpoint.npz"),
-                  resume=out.with_suffix(".checkpoint.npz").is_file())
+        model = linear_model(given, config.settings)
+    else:
+        checkpoint = out.with_suffix(".checkpoint.npz")
+        model = train(given, config, checkpoint=checkpoint, resume=checkpoint.is_file())
+        checkpoint.unlink(missing_ok=True)
     write_model(model, out)
-    out.with_suffix(".checkpoint.npz").unlink(missing_ok=True)
-    return {"config": config.flat(), "examples": len(given), "minutes": (time.perf_counter() - begun) / 60.0}
+    return {
+        "examples": len(given), "frames": frames, "units": config.settings.units, "layers": config.settings.layers,
+        "steps": 0 if run.variant.linear else config.epochs * -(-frames // config.batch), "batch": config.batch,
+        "rate": config.learning_rate, "minutes": round((time.perf_counter() - begun) / 60.0, 2),
+    }  # fmt: skip
 
 
 def _given(run: Run) -> list:
@@ -145,7 +159,7 @@ def parameters_of(model) -> int:
 def equal_units(run: Run, scale: Scale, skeleton) -> int:
     """Units of a layer with which this run's networks have as many parameters as the phase-functioned hierarchy that
     they are compared with."""
-    other = next(v for v in variants(scale) if v.name == ("hierarchy" if run.variant.corrected else "hierarchy-raw"))
+    other = next(v for v in variants(scale) if v.name == "hierarchy")
     wanted = _size(skeleton, other.config)
     sizes = {units: _size(skeleton, {**run.variant.config, "units": units}) for units in range(8, 2049, 4)}
     return min(sizes, key=lambda units: abs(sizes[units] - wanted))
@@ -158,7 +172,7 @@ def _size(skeleton, config: dict) -> int:
     from beyond_mocap.synthesis.phase_network.chains import chains_of
     from beyond_mocap.synthesis.phase_network.features import widths
 
-    settings = config_of(config, "sizes").settings
+    settings = config_of({name: value for name, value in config.items() if name != "steps"}, "sizes").settings
     layers, units, points = settings.layers, settings.units, settings.points
     return sum(
         points * ((given + 1) * units + (layers - 1) * (units + 1) * units + (units + 1) * answered)
@@ -175,6 +189,7 @@ def main() -> int:
     options.add_argument("--motions", type=int, help="of each subject that are tested")
     options.add_argument("--data", nargs="+", choices=tuple(ACTIONS), default=list(ACTIONS))
     options.add_argument("--only", nargs="+", metavar="VARIANT", help="these, in this order")
+    options.add_argument("--steps", type=int, help="of Adam, in place of epochs")
     options.add_argument("--minutes", type=float, help="begin no further run after so many")
     options.add_argument("--tables", action="store_true", help="train nothing; write the tables of what is done")
     chosen = options.parse_args()
@@ -182,7 +197,7 @@ def main() -> int:
         print(f"{DATA} is missing: kicks are left out")
         chosen.data = [name for name in chosen.data if name != "lmd"]
     scale = QUICK if chosen.quick else PAPER
-    given = {name: getattr(chosen, name) for name in ("units", "epochs", "motions") if getattr(chosen, name)}
+    given = {name: getattr(chosen, name) for name in ("units", "epochs", "motions", "steps") if getattr(chosen, name)}
     scale = replace(scale, **given)
     folder = PLACE / scale.name
     every = {variant.name: variant for variant in variants(scale)}
@@ -194,21 +209,22 @@ def main() -> int:
         wanted: list[Variant] = [every[name] for name in chosen.only or every]
         todo = list(runs([(name, subjects_of(name)) for name in chosen.data], wanted))
         until = time.time() + 60.0 * chosen.minutes if chosen.minutes else float("inf")
-        left = work_off(todo, folder, lambda run, out: worked(run, out, scale), until, lambda line: print(line, flush=True))
-    write_tables(folder, scale)
+        left = work_off(todo, scale, RESULTS, lambda run: worked(run, folder, scale), until, lambda line: print(line, flush=True))
+    else:
+        throw_results.tidy(RESULTS, scale.name)
+        write_tables(scale)
     return 1 if left else 0
 
 
-def write_tables(folder: Path, scale: Scale) -> None:
+def write_tables(scale: Scale) -> None:
     """Puts the tables of what is done between the page's marks."""
     from beyond_mocap.files.whole import atomic_write
 
     from benchmarks.throw_tables import document
 
-    text = PAGE.read_text("utf-8") if PAGE.is_file() else f"# Experiments with throws and kicks\n\n{BEGIN}\n{END}\n"
-    head, _, rest = text.partition(BEGIN)
+    head, _, rest = PAGE.read_text("utf-8").partition(BEGIN)
     _, _, tail = rest.partition(END)
-    lines = document(results(folder), scale)
+    lines = document(throw_results.read(RESULTS, scale.name), scale)
     atomic_write(PAGE, "\n".join([head + BEGIN, "", *lines, "", END]) + tail)
 
 

@@ -17,20 +17,24 @@ WORDS = {"planted": "Planted throws", "lmd": "Recorded kicks"}
 """Data -> heading."""
 PAIRS = (
     ("Tables 8.1 to 8.4: one network or six, nothing corrected", "hierarchy-raw", "single-raw", "first"),
+    ("The same with frames fed back in training: one network or six", "hierarchy-fed-raw", "single-fed-raw", ""),
+    ("One network with its frames fed back in training, or not", "single-fed-raw", "single-raw", ""),
+    ("Six networks with their frames fed back in training, or not", "hierarchy-fed-raw", "hierarchy-raw", ""),
+    ("Six linear maps or one, nothing corrected", "linear-phased-raw", "linear-single-raw", ""),
     ("Tables 8.5 to 8.8: phase-functioned or feed-forward, all corrected", "hierarchy", "feed-forward", "second"),
+    ("As many parameters: phase-functioned or feed-forward", "hierarchy", "feed-forward-equal", ""),
     ("Linear maps with phases or without", "linear-phased", "linear", ""),
     ("The same, nothing corrected", "linear-phased-raw", "linear-raw", ""),
-    ("Six linear maps or one, nothing corrected", "linear-phased-raw", "linear-single-raw", ""),
+    ("His question of §9.2: one network with the end-effector loss against the same without", "single-effectors",
+     "single-raw", ""),
+    ("The same with frames fed back in training", "single-effectors-fed", "single-fed-raw", ""),
+    ("Six networks, or one with the end-effector loss, both fed back", "hierarchy-fed-raw", "single-effectors-fed", ""),
     ("Limbs told how inverse kinematics would reach, or not", "linear-guided", "linear-phased", ""),
     ("The same, nothing corrected", "linear-guided-raw", "linear-phased-raw", ""),
     ("Started as the shipped weights are, or trained from chance as he did", "start", "hierarchy", ""),
     ("The same, nothing corrected", "start-raw", "hierarchy-raw", ""),
-    ("As many parameters: one network or six", "hierarchy-raw", "single-equal", ""),
-    ("As many parameters: phase-functioned or feed-forward", "hierarchy", "feed-forward-equal", ""),
-    ("His question of §9.2: one network with the end-effector loss against the same without", "single-effectors",
-     "single-raw", ""),
-    ("One network with the end-effector loss, or six", "hierarchy-raw", "single-effectors", ""),
     ("Trained in order and fed back (§9.4) or each alone", "ours", "hierarchy", ""),
+    ("The shipped weights' start, trained on in order and fed back, or as it is", "ours", "start", ""),
     ("Inverse kinematics inside the loss or after the fact", "ours-ik", "ours", ""),
     ("Phases warped in time (§9.3) or by travelled distance", "ours-warped", "ours", ""),
 )
@@ -44,9 +48,8 @@ Found = Mapping[tuple[str, str, str], Mapping]
 
 def document(found: Found, scale: Scale) -> list[str]:
     """All tables of what is done."""
-    lines = [f"Scale {scale.name}: {scale.units} units a layer in the six networks, {2 * scale.units} in the one; "
-             f"{scale.epochs} epochs, {scale.epochs * 3 // 2} for the one, batches of {scale.batch} frames; tested on "
-             f"{'all' if scale.motions is None else scale.motions} motions of each other subject."]
+    lines = [f"Scale {scale.name}: tested on {'all' if scale.motions is None else scale.motions} motions of each other "
+             "subject; sizes and steps of Adam of each model stand in the next tables."]
     lines += ["", "### How all of them did", ""]
     for data, heading in WORDS.items():
         if any(key[0] == data for key in found):
@@ -66,19 +69,14 @@ def of_variant(found: Found, data: str, variant: str) -> dict[str, Mapping]:
 def subjects(found: Found, data: str, variant: str) -> Subjects | None:
     """The figures of one variant; None where nothing is done."""
     rows = [(subject, deviations(one), np.array([np.nan if each["impact"] is None else each["impact"]
-                                                 for each in one["each"]] + [np.nan] * broken(one)))
+                                                 for each in one["each"]] + [np.nan] * one["broken"]))
             for subject, one in of_variant(found, data, variant).items()]
     return gathered(variant, rows) if rows else None
 
 
 def deviations(one: Mapping) -> np.ndarray:
     """(N, 4) m of all motions of a run, infinite where networks lost the body so far that no motion came out."""
-    return np.array([each["deviation"] for each in one["each"]] + [[np.inf] * 4] * broken(one)).reshape(-1, 4)
-
-
-def broken(one: Mapping) -> int:
-    """How many motions of a run were given up because networks lost the body."""
-    return sum("lose the body" in line for line in one["left_out"])
+    return np.array([each["deviation"] for each in one["each"]] + [[np.inf] * 4] * one["broken"]).reshape(-1, 4)
 
 
 def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
@@ -98,7 +96,7 @@ def overview(found: Found, data: str, scale: Scale) -> list[str]:
     """One row per variant: means over its models."""
     lines = markdown.head([
         "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "as a body, cm", "bodies lost", "impact, m", "head, °", "head turns",
-        "jerk", "beyond limits", "s for one", "parameters", "minutes to train", "models",
+        "jerk", "beyond limits", "s for one", "parameters", "units x layers", "steps of frames", "minutes to train", "models",
     ])  # fmt: skip
     for variant in variants(scale):
         done = list(of_variant(found, data, variant.name).values())
@@ -119,8 +117,16 @@ def _figures(done: Sequence[Mapping]) -> list[str]:
         f"{int(lost.sum())} of {len(lost)}", _mean([one["impact"] for one in every], ".2f"),
         *(_mean([each[key] for each in every], form) for key, form in (
             ("head", ".1f"), ("head_share", ".2f"), ("jerk", ".2f"), ("beyond", ".3f"), ("seconds", ".2f"))),
-        f"{int(np.mean([one['parameters'] for one in done])):,}", _mean(trained, ".1f"), str(len(done)),
+        f"{int(np.mean([one['parameters'] for one in done])):,}", *_trained(done), _mean(trained, ".1f"), str(len(done)),
     ]  # fmt: skip
+
+
+def _trained(done: Sequence[Mapping]) -> tuple[str, str]:
+    """Sizes of the networks, and how many steps of how many frames they were trained; maps are not."""
+    told = done[0]["training"]
+    steps = sorted({one["training"]["steps"] for one in done})
+    size = f"{told['units']} x {told['layers']}" if told["units"] and told["steps"] else "-"
+    return size, f"{'–'.join(f'{n:,}' for n in {steps[0]: 0, steps[-1]: 0})} of {told['batch']}" if steps[-1] else "none"
 
 
 def _mean(values, form: str) -> str:

@@ -23,7 +23,8 @@ def sidak(level: float = 0.05, tests: int = 2) -> float:
     return 1.0 - (1.0 - level) ** (1.0 / tests)
 
 
-LEVEL = 0.025
+LEVEL = round(sidak(), 3)
+"""Of each test."""
 
 
 @dataclass(frozen=True, eq=False)

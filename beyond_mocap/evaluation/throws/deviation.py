@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 
@@ -12,10 +10,3 @@ def deviations(generated: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     in the order left hand, right hand, left foot, right foot."""
     return np.linalg.norm(np.asarray(generated, float) - np.asarray(wanted, float), axis=-1).mean(axis=0)
 
-
-def mean_deviation(generated: Sequence[np.ndarray], wanted: Sequence[np.ndarray]) -> np.ndarray:
-    """(4,) m over many motions, each (T, 4, 3) with a T of its own.
-
-    Eq. 4.1 divides by one n_f for all sequences; where lengths differ, every motion counts alike here.
-    """
-    return np.mean([deviations(*pair) for pair in zip(generated, wanted, strict=True)], axis=0)

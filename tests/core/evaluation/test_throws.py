@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.ball.physics import BASEBALL, PAPER
 from beyond_mocap.evaluation.throws import fredriksson
 from beyond_mocap.evaluation.throws.compare import compared, detectable, judged, kept, sidak
-from beyond_mocap.evaluation.throws.deviation import deviations, mean_deviation
+from beyond_mocap.evaluation.throws.deviation import deviations
 from beyond_mocap.evaluation.throws.impact import impact, let_go
 from beyond_mocap.evaluation.throws.subjects import comparisons, gathered
 from beyond_mocap.evaluation.throws.tables import figure_table, test_table as rows_of_tests, verdicts
@@ -86,8 +86,6 @@ def test_planted_deviations():
     wanted = np.random.default_rng(0).normal(size=(20, 4, 3))
     off = np.array([0.01, 0.02, 0.03, 0.04])[:, None] * [0.6, 0.0, 0.8]
     assert deviations(wanted + off, wanted) == pytest.approx([0.01, 0.02, 0.03, 0.04])
-    two = mean_deviation([wanted + off, wanted[:5]], [wanted, wanted[:5]])  # each motion counts alike
-    assert two == pytest.approx([0.005, 0.01, 0.015, 0.02])
 
 
 def hand_and_grip(made):
