@@ -4,8 +4,8 @@ benchmarks.throw_folders [--out build/throws]`.
 Made anew from `../shared/data`, which never becomes part of the project:
 
 - `lmd_kicks`: four players, twenty shots each, a skeleton each; target and ball were not recorded
-- `pitches`:   two pitches of CMU, and two pitches and two serves from markers, by `reconstruct` and `release`; six
-               throws of as many people are enough to look at, not to train on
+- `pitches`:   two pitches of CMU, and two pitches and two serves from markers, by `reconstruct` and `release`,
+               which tells how fast the ball left; six throws of few people are enough to look at
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ MARKERS = (
     "000870_003252_74_195_002_FF_808.c3d", "pitch_biodata.c3d", "kinematics_tennis_serve.c3d",
     "kinematics_tennis_serve_nan.c3d",
 )  # fmt: skip
-COLUMNS = ("file", "subject", "limb", "release_s")
+LAUNCH = ("launch_x_m_s", "launch_y_m_s", "launch_z_m_s")
+COLUMNS = ("file", "subject", "limb", "release_s", *LAUNCH)
 
 
 def lmd_kicks(place: Path = PLACE) -> Path:
@@ -91,7 +92,8 @@ def _from_markers(name: str, folder: Path) -> dict | None:
         return None
     print(f"{name}: {found.side} hand, {found.time:.3f} s, {found.speed:.1f} m/s by the {found.how}", file=sys.stderr)
     return {"file": f"{subject}/{out.name}", "subject": subject, "limb": f"{found.side}_hand",
-            "release_s": f"{found.time:.6f}"}  # fmt: skip
+            "release_s": f"{found.time:.6f}",
+            **{name: f"{value:.6f}" for name, value in zip(LAUNCH, found.velocity)}}  # fmt: skip
 
 
 def _write(path: Path, rows: Sequence[dict]) -> None:

@@ -398,19 +398,24 @@ def main(argv: list[str] | None = None, writers: Mapping[str, Writer] | None = N
 
 
 class _interrupts:
-    """While it lasts, Ctrl-C asks the work to stop instead of breaking it off; outside the main thread nothing is
-    done."""
+    """While it lasts, Ctrl-C, or a farm's request to end (SIGTERM), asks the work to stop instead of breaking it off; the
+    second one breaks it off. Outside the main thread nothing is done."""
 
     def __init__(self, told: Told):
-        self._told, self._before = told, None
+        self._told, self._before = told, {}
 
     def __enter__(self):
         if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGINT, self._told.cancel)
+            self._before = {kind: signal.signal(kind, self._asked) for kind in (signal.SIGINT, signal.SIGTERM)}
 
     def __exit__(self, *_):
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+        for kind, before in self._before.items():
+            signal.signal(kind, before)
+
+    def _asked(self, *_):
+        if self._told.cancelled():
+            raise KeyboardInterrupt
+        self._told.cancel()
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from .ball.physics import BASEBALL
 from .ball.wall import meets_wall
 from .errors import Cancelled, InputError
 from .files import bvh
-from .files.whole import atomic_write
+from .files.whole import atomic_write, whole_folder
 from .ball.made_kicks import kick
 from .motion import quaternion
 from .motion.kick_subjects import kick_style, kicker
@@ -108,32 +108,28 @@ def write_planted(
 ) -> int:
     """Makes `count` throws (or kicks, by `action`) of each of `subjects` people in `folder`; how many there are then.
 
-    seed: of the first subject, the others follow. InputError where the folder has files, or cannot be written.
+    The folder comes whole or not at all. seed: of the first subject, the others follow. InputError where the folder has
+    files, or cannot be written.
     """
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
-    folder = Path(folder)
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError(folder, "a folder that is not empty", "an empty or a new one", "choose another place")
-    rows = [",".join(COLUMNS)]
-    for number in range(subjects):
-        for order in range(count):
-            if cancelled():
-                raise Cancelled("cancelled")
-            who, example = planted(action, seed + number, order)
-            progress((number * count + order) / (subjects * count), f"{who}, {action} {order + 1}")
-            rows.append(_written(folder, who, f"{who}_{action}{order + 1:03d}", example))
-    atomic_write(folder / TABLE_NAME, "\n".join(rows) + "\n")
+    with whole_folder(folder) as part:
+        rows = [",".join(COLUMNS)]
+        for number in range(subjects):
+            for order in range(count):
+                if cancelled():
+                    raise Cancelled("cancelled")
+                who, example = planted(action, seed + number, order)
+                progress((number * count + order) / (subjects * count), f"{who}, {action} {order + 1}")
+                rows.append(_written(part, who, f"{who}_{action}{order + 1:03d}", example))
+        atomic_write(part / TABLE_NAME, "\n".join(rows) + "\n")
     return subjects * count
 
 
 def _written(folder: Path, who: str, name: str, example: Planted) -> str:
     """Writes one example; its row of the table."""
     place_of = folder / who
-    try:
-        place_of.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(place_of, error.strerror or "cannot be made", "a folder that can be written") from None
+    place_of.mkdir(exist_ok=True)
     bvh.write(place_of / f"{name}.bvh", example.motion)
     words, end = tuple(example.words.split()), example.motion.duration
     timeline = Timeline((Span(0.0, end, words),), (KeyMoment(round(example.release, 6), words),))

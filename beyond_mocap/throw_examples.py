@@ -21,7 +21,7 @@ from .errors import BeyondMocapError, Cancelled, InputError
 from .files import bvh
 from .files.content import content
 from .files.tables import number, read_rows
-from .library.scan import Annotations, find_clips
+from .library.scan import TABLE_NAME as ANNOTATIONS_NAME, Annotations, find_clips
 from .motion import quaternion
 from .motion.between_frames import cubic_at
 from .motion.grip import grip_of
@@ -29,10 +29,11 @@ from .motion.humanoid import Humanoid, identify
 from .motion.motion import Motion, end_positions, forward_kinematics, place, pose_kinematics
 from .motion.retarget import Retargeter
 from .motion.skeleton import Skeleton
-from .synthesis.phase_network.chains import EFFECTORS as LIMBS
+from .synthesis.phase_network.chains import EFFECTORS as LIMBS, chains_of
 from .synthesis.phase_network.example import Example, example_of, mirrored
 
 TABLE_NAME = "throws.csv"
+_PAGE = "docs/throw-examples.md"
 TARGET = ("target_x_m", "target_y_m", "target_z_m")
 LAUNCH = ("launch_x_m_s", "launch_y_m_s", "launch_z_m_s")
 _SAME_MOMENT = 0.5  # s between key moments that are of one throw
@@ -43,6 +44,9 @@ _LOOK = 0.001  # s before and after the release between which the ball's speed i
 _AROUND = 0.8  # s beyond an example's ends that are read too, for what networks see there
 _ON_GROUND = 0.4  # m, a toe below this kicks a ball that lies
 _LATE = 0.03  # s by which a foot's key moment may lead or follow the contact
+_FASTEST = 100.0  # m/s, no ball leaves a hand or a foot faster
+_TARGET_AWAY = (0.5, 200.0)  # m from the ball as it leaves to where it flew through
+_UNDER_FLOOR = 0.5  # m that a target may lie under what is taken for the floor
 
 
 @dataclass(frozen=True)
@@ -91,33 +95,74 @@ def examples_in(
 ) -> list[Example]:
     """The examples of `action` ("throw" or "kick") below `folder`, at `fps` frames per second, each in its own frame.
 
-    skeleton: bring all of them to this one; None leaves each its own. told: gets one line for each recording that is left
-    out, and why. mirror: of each also its mirror image, done with the other hand or foot. InputError: no folder, no
-    example in it, a table that cannot be read.
+    skeleton: bring all of them to this one; None leaves each its own. told: gets one line for each throw that is left
+    out, and why, and one for all recordings without any. mirror: of each also its mirror image, done with the other hand
+    or foot. InputError: no folder, no example in it, a table that cannot be read, a skeleton without hands or feet.
     """
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
+    if skeleton is not None:
+        chains_of(skeleton)
     folder = Path(folder)
     clips = find_clips(folder)
     names = [path.relative_to(folder).as_posix() for path in clips]
     words, table = Annotations(folder, clips), _table(folder, ACTIONS[action], set(names))
+    _tell_strangers(words, ACTIONS[action], folder, told)
     bring = _Bring(skeleton)
     found: list[Example] = []
+    without: list[str] = []
     for order, (path, name) in enumerate(zip(clips, names)):
         if cancelled():
             raise Cancelled("cancelled")
         progress(order / len(clips), path.name)
+        if not _told_of(path, ACTIONS[action], words, table.get(name)):
+            without.append(name)
+            continue
         try:
             found += _of_clip(path, name, ACTIONS[action], words, table.get(name), fps, bring, told)
         except InputError as error:
             told(f"{name}: left out, {error}")
+    if len(without) == len(clips):
+        raise _nothing(folder, action, clips, words)
+    if without:
+        told(f"{folder}: {len(without)} of {len(clips)} recordings left out, nobody wrote down a {action} in them; "
+             f"such as {without[0]}")  # fmt: skip
     if not found:
-        wanted = " or ".join(sorted(ACTIONS[action].words))
-        raise InputError(
-            folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the word {wanted}",
-            f"write NAME.txt beside NAME.bvh, or {TABLE_NAME}",
-        )
+        raise InputError(folder, f"each {action} in it had to be left out", "some that can be read",
+                         f"see the notes, and {_PAGE}")  # fmt: skip
     return [each for example in found for each in ((example, _renamed(example)) if mirror else (example,))]
+
+
+def _told_of(path: Path, action: Action, words: Annotations, rows: list[_Known] | None) -> bool:
+    """Whether anybody wrote down that a recording has such an action."""
+    return bool(rows) or any(_annotated(words, path, 120.0, action)) or _report_of(path).is_file()
+
+
+def _tell_strangers(words: Annotations, action: Action, folder: Path, told: Callable[[str], None]) -> None:
+    """A line for each table of annotations below the folder that tells of recordings which are not there."""
+    for place, rows in words.tables.items():
+        if place != folder.absolute() and folder.absolute() not in place.parents:
+            continue  # of a larger library, which may have others
+        named = [name for name, its in rows.items() if any(action.words & set(one.words) for one in its)]
+        missing = [name for name in named if not (place / name).is_file()]
+        if missing:
+            told(f"{place / ANNOTATIONS_NAME}: names {len(missing)} recordings that are not there, such as {missing[0]}")
+
+
+def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -> InputError:
+    """A folder without the action; who looked for the wrong one is told."""
+    names = {path.relative_to(folder).as_posix() for path in clips}
+    for other, its in ACTIONS.items():
+        rows = _table(folder, its, names) if other != action else {}
+        count = sum(_told_of(path, its, words, rows.get(path.relative_to(folder).as_posix())) for path in clips)
+        if other != action and count:
+            found = f"{len(clips)} BVH files, none with a {action}, {count} with a {other}"
+            return InputError(folder, found, f"recordings of a {action}", f"choose another folder, or the action {other}")
+    wanted = " or ".join(sorted(ACTIONS[action].words))
+    return InputError(
+        folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the word {wanted}",
+        f"write NAME.txt beside NAME.bvh, or {TABLE_NAME}; see {_PAGE}",
+    )
 
 
 def _renamed(example: Example) -> Example:
@@ -126,9 +171,6 @@ def _renamed(example: Example) -> Example:
 
 def _of_clip(path, name: str, action: Action, words: Annotations, rows, fps: float, bring, told) -> list[Example]:
     """All examples in one recording."""
-    if not rows and not any(_annotated(words, path, 120.0, action)) and not _report_of(path).is_file():
-        told(f"{name}: left out, nobody wrote a release for it")
-        return []
     motion = bvh.read(path).motion
     every = _known(path, motion, action, words, rows)
     out = []
@@ -212,10 +254,15 @@ def _row(row: dict[str, str], where: str) -> _Known:
 
     limb = (row.get("limb") or "").strip().lower()
     if limb and limb not in LIMBS:
-        raise InputError(where, f"limb {limb!r}", f"one of {', '.join(LIMBS)}")
+        raise InputError(where, f"limb {limb!r}"[:80], f"one of {', '.join(LIMBS)}")
+    launch, speed = vector(LAUNCH), value("speed_m_s")
+    for name, fast in (("speed_m_s", speed), ("launch", None if launch is None else float(np.linalg.norm(launch)))):
+        if fast is not None and not 0.0 < fast <= _FASTEST:
+            expected = f"more than 0, at most {_FASTEST:g} m/s"
+            raise InputError(where, f"{name} {fast:g} m/s", expected, "correct the cell or leave it empty")
     return _Known(
-        None, value("release_s"), LIMBS.index(limb) if limb else None, vector(TARGET), vector(LAUNCH),
-        value("speed_m_s"), (row.get("subject") or "").strip() or None,
+        None, value("release_s"), LIMBS.index(limb) if limb else None, vector(TARGET), launch, speed,
+        (row.get("subject") or "").strip() or None,
     )
 
 
@@ -236,7 +283,7 @@ def _measured(path: Path, action: Action) -> _Known | None:
         impact = report.get("impact_m")
         impact = np.array(impact, float) if isinstance(impact, list) and len(impact) == 3 else None
         known = [*launch, release] if impact is None else [*launch, release, *impact]
-        if not (launch.shape == (3,) and np.isfinite(known).all()):
+        if not (launch.shape == (3,) and np.isfinite(known).all() and np.linalg.norm(launch) <= _FASTEST):
             raise ValueError
     except (ValueError, KeyError, TypeError, UnicodeDecodeError, RecursionError):
         raise InputError(path, "no report of a release", "what the command 'release' writes") from None
@@ -274,12 +321,25 @@ def _example(name: str, motion: Motion, known: _Known, action: Action, fps: floa
     position, launch = _launched(cut, release, limb, known)
     if np.linalg.norm(launch) < _AT_REST:
         raise InputError("ball", f"{np.linalg.norm(launch):.1f} m/s at the release", f"at least {_AT_REST:g} m/s")
-    impact = _wall(position, launch, action) if known.target is None else known.target
+    impact = _wall(position, launch, action) if known.target is None else _checked(known.target, position, launch)
     there = bring(cut)
     if there is not cut:  # the same launch from another hand's place
         impact = impact + _ball(there, release, limb) - _ball(cut, release, limb)
     span = tuple(second - first for second in _stretch(motion, known, action))
     return example_of(name, who, there, limb, release, impact, launch, fps, span)
+
+
+def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:
+    """The target (3,) m that somebody wrote down. InputError where no ball that leaves `position` so flies through it."""
+    way = target - position
+    away, (low, high) = float(np.linalg.norm(way)), _TARGET_AWAY
+    if not low <= away <= high:
+        raise InputError("target", f"{away:.3g} m from the ball as it leaves", f"{low:g} to {high:g} m", "check the unit")
+    if target[2] < -_UNDER_FLOOR:
+        raise InputError("target", f"{-target[2]:.2f} m under the floor", "a place above it", "is Z up in the table?")
+    if way[:2] @ launch[:2] <= 0.0:
+        raise InputError("target", "not where the ball flies to", "a place ahead of it", "check the axes in the table")
+    return target
 
 
 def _stretch(motion: Motion, known: _Known, action: Action) -> tuple[float, float]:

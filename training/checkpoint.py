@@ -39,6 +39,12 @@ def path_of(out: str | os.PathLike) -> Path:
     return out.with_name(f"{out.stem}.checkpoint.npz")
 
 
+def check_there(path: Path) -> None:
+    """InputError where there is no checkpoint to go on from."""
+    if not path.is_file():
+        raise InputError(path, "no checkpoint there", "one, for --resume", "leave --resume out to begin anew")
+
+
 def write(path: Path, checkpoint: Checkpoint) -> None:
     """Writes it whole. InputError where the folder cannot be written."""
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(checkpoint.state)]
@@ -53,8 +59,7 @@ def read(path: Path, like: object, fits: str) -> Checkpoint:
 
     InputError, one line: missing, damaged, of another version, or of a training with other settings or recordings.
     """
-    if not path.exists():
-        raise InputError(path, "no checkpoint there", "one, for --resume", "leave --resume out to begin anew")
+    check_there(path)
     try:
         with np.load(path, allow_pickle=False) as file:
             told = json.loads(str(file["told"][()]))

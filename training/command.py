@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
+from beyond_mocap.commands.outputs import check_outputs
 from beyond_mocap.commands.told import Told
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.files.network_npz import write_model
+from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.synthesis.phase_network.chains import chains_of
 from beyond_mocap.synthesis.phase_network.example import Example
 from beyond_mocap.throw_examples import examples_in
 
@@ -23,13 +27,17 @@ def train_folder(options, told: Told) -> None:
     """Reads the folder, trains, and writes the model and its checkpoint; options: of `throw train`."""
     begun = time.perf_counter()
     config = read_config(options.config, seed=options.seed, epochs=options.epochs, action=options.action)
+    kept = checkpoint.path_of(options.out)
+    check_outputs(options.out, kept, never=(options.config, options.skeleton))
+    if options.resume:
+        checkpoint.check_there(kept)
     examples = _examples(options, config, told)
 
     def progress(share: float, text: str) -> None:
         told.progress(READING + (1.0 - READING) * share, text)
 
     model = train(
-        examples, config, checkpoint=checkpoint.path_of(options.out), resume=options.resume, minutes=options.minutes,
+        examples, config, checkpoint=kept, resume=options.resume, minutes=options.minutes,
         progress=progress, cancelled=told.cancelled,
     )
     write_model(model, options.out, half=options.half)
@@ -41,12 +49,22 @@ def train_folder(options, told: Told) -> None:
 
 def _examples(options, config: TrainingConfig, told: Told) -> list[Example]:
     """The folder's examples of the asked subjects, on one skeleton: the given one, else that of the first."""
-    skeleton = bvh.read(options.skeleton).motion.skeleton if options.skeleton else None
+    skeleton = _skeleton(options.skeleton) if options.skeleton else None
     found = _read(options, config, told, skeleton)
     first = found[0].motion.skeleton
     if skeleton is None and not all(example.motion.skeleton.same_bones(first) for example in found):
         found = _read(options, config, told, first)
     return found
+
+
+def _skeleton(path: Path) -> Skeleton:
+    """Whose bones the model is to have. InputError that names the file where it lacks hands or feet."""
+    skeleton = bvh.read(path).motion.skeleton
+    try:
+        chains_of(skeleton)
+    except InputError as error:
+        raise InputError(path, str(error)) from None
+    return skeleton
 
 
 def _read(options, config: TrainingConfig, told: Told, skeleton) -> list[Example]:

@@ -9,9 +9,12 @@ from pathlib import Path
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import json_values as values
+from beyond_mocap.files.content import utf8
 from beyond_mocap.synthesis.phase_network.model import ModelSettings
 
 PAGE = "docs/throws-training.md"
+LARGEST = 1_000_000
+"""Bytes of a file above which it is no config."""
 LIMITS = {
     "epochs": (0, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
     "final_rate": (0.0, 1.0), "keep": (0.05, 1.0), "l1": (0.0, 10.0), "limb_weight": (0.0, 1000.0),
@@ -61,7 +64,7 @@ class TrainingConfig:
     def __post_init__(self):
         for name, (low, high) in LIMITS.items():
             if not low <= getattr(self, name) <= high:
-                raise InputError(f"training: {name}", f"{getattr(self, name):g}", f"{low:g} to {high:g}", f"see {PAGE}")
+                raise InputError(f"training: {name}", f"{getattr(self, name)}", f"{low} to {high}", f"see {PAGE}")
 
     def with_settings(self, **changes) -> "TrainingConfig":
         """The same with other settings of the model."""
@@ -90,16 +93,15 @@ def config_of(told: dict, where: object = "config") -> TrainingConfig:
     read = {name: _value(value, known[name], f"{where}: {name}") for name, value in told.items()}
     of_model = {one.name for one in fields(ModelSettings)}
     start = TrainingConfig()
-    settings = replace(start.settings, **{name: value for name, value in read.items() if name in of_model})
-    return replace(start, settings=settings, **{name: value for name, value in read.items() if name not in of_model})
+    try:
+        settings = replace(start.settings, **{name: value for name, value in read.items() if name in of_model})
+        return replace(start, settings=settings, **{name: read[name] for name in read if name not in of_model})
+    except InputError as error:  # which does not know whose values they are
+        raise InputError(where, str(error)) from None
 
 
 def _object(path: Path) -> dict:
-    try:
-        text = path.read_text("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(path, "is no text", "JSON in UTF-8", f"see {PAGE}") from None
-    told = values.object_of(text, str(path), PAGE)
+    told = values.object_of(utf8(path, "a training's config", LARGEST), str(path), PAGE)
     values.check_object(told, str(path))
     return told
 

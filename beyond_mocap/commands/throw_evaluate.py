@@ -37,9 +37,10 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.network_npz import read_model
     from ..files.tables import write_report
     from ..files.whole import atomic_write
+    from ..throw_examples import TABLE_NAME
 
     begun = time.perf_counter()
-    check_outputs(options.report, options.html, never=(options.model,))
+    check_outputs(options.report, options.html, never=(options.model, options.examples / TABLE_NAME))
     model = read_model(options.model)
     every = _examples(options.examples, model, told)
     chosen = some_of_each(_of_subjects(every, options.subject, options.examples), options.motions)

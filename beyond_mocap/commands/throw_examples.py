@@ -38,4 +38,5 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     )
     told.end()
     seconds = time.perf_counter() - begun
-    print(f"{options.out}: {count} of {options.subjects} people, with {TABLE_NAME}, in {seconds:.1f} s")
+    what = f"{count} {options.action}{'s' * (count > 1)} of {options.subjects} {'person' if options.subjects == 1 else 'people'}"
+    print(f"{options.out}: {what}, with {TABLE_NAME}, in {seconds:.1f} s")

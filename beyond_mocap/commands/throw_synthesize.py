@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError
-from .numbers import between, positive, rate, whole
+from .numbers import between, positive, whole
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
 
@@ -29,7 +29,8 @@ def add(verbs):
     verb.add_argument("--speed", type=speed, metavar="M/S", help="of the ball as it leaves; default: what suits")
     moment = partial(between, low=-1e5, high=1e5, expected="seconds")
     verb.add_argument("--time", type=moment, metavar="SECONDS", help="at which it leaves; default: frame 0 is 0 s")
-    verb.add_argument("--fps", type=rate, help="default: the model's, 30 with --library")
+    rates = partial(between, low=10.0, high=480.0, expected="10 to 480 frames per second, in which a throw can be seen")
+    verb.add_argument("--fps", type=rates, help="default: the model's, 30 with --library")
     place = verb.add_mutually_exclusive_group()
     place.add_argument("--start", type=_place, metavar="X,Y", help="where the hips are in the first frame; default 0,0")
     place.add_argument("--over", type=_place, metavar="X,Y", help="where the hips are at the release")
@@ -57,10 +58,11 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     inputs = (options.model, options.skeleton, options.track, options.annotations)
     check_outputs(options.out, options.ball, options.report, never=inputs)
     write = writer_of(options.out, writers)
-    if bool(options.library) != bool(options.track) or (options.annotations and not options.track):
-        raise InputError("--library", "without --track, or the other way round", "both or none")
-    if options.track and options.time is None:
-        raise InputError("--track", "without --time", "the second at which the ball leaves", "add --time SECONDS")
+    for one, other, why in (("library", "track", "a player's way"), ("track", "library", "a folder of recordings"),
+                            ("annotations", "track", "a player's way"),
+                            ("track", "time", "the second at which the ball leaves")):  # fmt: skip
+        if getattr(options, one) and getattr(options, other) is None:
+            raise InputError(f"--{one}", f"without --{other}", why, f"add --{other}")
     model = _model(options)
     player = _Player.of(options, model, told) if options.library else None
     skeleton, form = _skeleton(options, player)
@@ -126,8 +128,13 @@ def _skeleton(options, player):
     if options.skeleton is None:
         return (player.skeleton if player else None), None
     from ..files import bvh
+    from ..motion.humanoid import identify
 
     clip = bvh.read(options.skeleton, options.unit)
+    try:
+        identify(clip.motion.skeleton)
+    except InputError as error:  # skeletons do not know their files
+        raise InputError(options.skeleton, str(error)) from None
     return clip.motion.skeleton, clip.form
 
 

@@ -41,8 +41,8 @@ class Told:
             print("\r" + " " * 80 + "\r", end="", file=self._stream, flush=True)
             self._last = ""
 
-    def cancel(self, *_) -> None:
-        """A signal handler: asks the work to stop."""
+    def cancel(self) -> None:
+        """Asks the work to stop."""
         self._stop.set()
 
     def cancelled(self) -> bool:

@@ -141,6 +141,9 @@ def _arrays(data: bytes) -> dict[str, np.ndarray]:
             if sum(member.file_size for member in members) > UNPACKED:
                 raise InputError("the arrays", f"more than {UNPACKED:,} bytes", _KIND, "choose another file")
             names = [member.filename.removesuffix(".npy") for member in members]
+            if _HEADER not in names:
+                checkpoint = "the checkpoint of a training" if "told" in names else "an .npz of something else"
+                raise InputError("the file", checkpoint, _KIND, "choose another file")
             if len(set(names)) < len(names):
                 raise InputError("the arrays", "two of one name", _KIND, "choose another file")
             return {name: _array(archive.read(member), name) for name, member in zip(names, members)}
@@ -194,8 +197,8 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
 
 
 def _header_text(arrays: dict[str, np.ndarray]) -> str:
-    header = arrays.pop(_HEADER, None)
-    if header is None or header.dtype != np.uint8:
+    header = arrays.pop(_HEADER)
+    if header.dtype != np.uint8:
         raise InputError("the file", "an .npz of something else", _KIND, "choose another file")
     try:
         return header.tobytes().decode("utf-8")

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.__main__ import _interrupts, main
 from beyond_mocap.annotation import read_timeline
+from beyond_mocap.commands.told import Told
 from beyond_mocap.files import bvh
 from beyond_mocap.motion.humanoid import stature
 from beyond_mocap.files.tables import read_ball, read_provenance
@@ -447,8 +448,9 @@ def test_python_m_runs_it(clips_folder, library, match, tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
-@pytest.mark.parametrize("moment", ["Reading", "Searching"])
-def test_ctrl_c_stops_and_leaves_nothing(clips_folder, library, match, tmp_path, moment):
+@pytest.mark.parametrize("moment, kind", [("Reading", signal.SIGINT), ("Searching", signal.SIGINT),
+                                          ("Searching", signal.SIGTERM)])  # fmt: skip
+def test_ctrl_c_or_an_end_asked_for_stops_and_leaves_nothing(clips_folder, library, match, tmp_path, moment, kind):
     times = np.arange(0.0, 240.0, 0.1)
     rows = np.column_stack([times, 30 * np.sin(times / 9), 20 * np.cos(times / 7)])
     (tmp_path / "long.csv").write_text(
@@ -462,12 +464,22 @@ def test_ctrl_c_stops_and_leaves_nothing(clips_folder, library, match, tmp_path,
     process = started("synthesize", "--json", *options, *more)
     for line in process.stderr:
         if json.loads(line)["text"].startswith(moment):
-            process.send_signal(signal.SIGINT)
+            process.send_signal(kind)
             break
     out, error = process.communicate(timeout=120)
     assert process.returncode == 130 and out == ""
     assert "cancelled" in error.splitlines()[-1] and "Traceback" not in error
     assert files_in(tmp_path) == before
+
+
+def test_the_second_ctrl_c_breaks_off_what_does_not_listen():
+    told = Told(False)
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with _interrupts(told), pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+        assert told.cancelled()
+        signal.raise_signal(signal.SIGINT)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
 needs_data = pytest.mark.skipif(

@@ -68,6 +68,38 @@ def test_a_folder_in_use_is_left_alone(folder, capsys):
 def test_an_unknown_action_and_cancelling(tmp_path):
     with pytest.raises(InputError, match="throw"):
         write_planted(tmp_path, "header", 1, 1)
+    asked = iter((False, True))
     with pytest.raises(Cancelled):
-        write_planted(tmp_path / "new", "throw", 1, 1, cancelled=lambda: True)
-    assert not (tmp_path / "new" / "throws.csv").exists()
+        write_planted(tmp_path / "new", "throw", 1, 2, cancelled=lambda: next(asked))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_comes_whole_or_not_at_all(tmp_path, monkeypatch):
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="mine.txt: a file"):
+        write_planted(tmp_path / "mine.txt", "throw", 1, 1)
+    with pytest.raises(InputError, match="cannot be written"):
+        write_planted(tmp_path / "mine.txt" / "new", "throw", 1, 1)
+    monkeypatch.setattr(bvh, "write", full)
+    with pytest.raises(InputError, match="^[^ ]*/new/adult/adult_throw001.bvh: cannot be written .No space"):
+        write_planted(tmp_path / "new", "throw", 1, 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def full(path, motion):
+    raise InputError(path, "cannot be written (No space left on device)", "a folder that can be written")
+
+
+def test_an_empty_folder_is_filled_unless_somebody_else_was_first(tmp_path):
+    assert write_planted(tmp_path / "a" / "new", "throw", 1, 1) == 1
+    (tmp_path / "empty").mkdir()
+    assert write_planted(tmp_path / "empty", "throw", 1, 1) == 1 and (tmp_path / "empty" / "throws.csv").is_file()
+
+    def other(share, text):  # writes into the same folder meanwhile
+        (tmp_path / "late").mkdir()
+        (tmp_path / "late" / "throws.csv").write_text("of another run")
+
+    with pytest.raises(InputError, match="not empty"):
+        write_planted(tmp_path / "late", "throw", 1, 1, progress=other)
+    assert [path.name for path in (tmp_path / "late").iterdir()] == ["throws.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "empty", "late"]

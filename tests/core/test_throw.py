@@ -191,18 +191,35 @@ def test_the_command_is_the_function(weights, tmp_path, capsys, model):
     assert np.abs(read_ball(names["ball.csv"]).positions - thrown.path.positions).max() < 1e-4
 
 
+STICK = """HIERARCHY
+ROOT Hips
+{ OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation End Site { OFFSET 0 10 0 } }
+MOTION
+Frames: 2
+Frame Time: 0.0333
+0 90 0 0 0 0
+0 90 0 0 0 0
+"""
+
+
 @pytest.mark.parametrize("extra, says", [
     (["--target", "12,3"], "X,Y,Z in metres"),
     (["--target", "320,0,1"], "what a human gives"),
     (["--target", "12,3,1", "--model", "none.npz"], "none.npz"),
     (["--target", "12,3,1", "--out", "x.obj"], "x.obj"),
-    (["--target", "12,3,1", "--track", "t.csv"], "--library"),
+    (["--target", "12,3,1", "--track", "t.csv"], "--track: without --library"),
+    (["--target", "12,3,1", "--library", "l"], "--library: without --track"),
+    (["--target", "12,3,1", "--annotations", "a.txt"], "--annotations: without --track"),
+    (["--target", "12,3,1", "--fps", "5"], "10 to 480"),
+    (["--target", "12,3,1", "--skeleton", "STICK"], "stick.bvh: skeleton"),
     (["--target", "12,3,1", "--ball-kind", "pebble"], "pebble"),
     (["--target", "12,3,1", "--seed", "-1"], "--seed"),
     (["--target", "12,3,1", "--unit", "nan"], "--unit"),
     (["--target", "-320,0,1", "--start", "-.5,-1"], "what a human gives"),
 ])
 def test_bad_command_lines_are_told_in_one_line(weights, tmp_path, capsys, extra, says):
+    (tmp_path / "stick.bvh").write_text(STICK)
+    extra = [str(tmp_path / "stick.bvh") if one == "STICK" else one for one in extra]
     found = main(["throw", "synthesize", "--model", str(weights), "--out", str(tmp_path / "o.bvh"), *extra])
     told = capsys.readouterr().err
     assert found == 2 and says in told and told.count("\n") == 1

@@ -2,17 +2,26 @@
 
 import json
 import shutil
+import tempfile
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics, place
-from beyond_mocap.planted_examples import planted, write_planted
+from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.planted_examples import COLUMNS, planted, write_planted
 from beyond_mocap.throw_examples import examples_in
+
+
+HEAD = ",".join(COLUMNS[:11])
 
 
 @pytest.fixture(scope="module")
@@ -129,12 +138,13 @@ def test_odd_recordings_are_told_and_left_out(own):
     shutil.copy(clip(own), own / "walk.bvh")
     told = []
     assert len(examples_in(own, told=told.append)) == 1
-    assert any("99" in line for line in told) and any(line.startswith("walk.bvh") for line in told)
+    assert any("99" in line for line in told) and any("1 of 3" in line and "walk.bvh" in line for line in told)
 
 
 @pytest.mark.parametrize(
     "change", [("limb", "nose"), ("release_s", "soon"), ("target_x_m", ""), ("file", "subject03/none.bvh"),
-     ("file", "subject03/../subject03/subject03_throw001.bvh")],
+     ("file", "subject03/../subject03/subject03_throw001.bvh"), ("speed_m_s", "0"), ("speed_m_s", "-5"), ("speed_m_s", "nan"),
+     ("speed_m_s", "1e9"), ("launch_x_m_s", "1e12"), ("launch_x_m_s", "inf"), ("launch_y_m_s", "1e308")],
 )
 def test_a_wrong_table_is_told_with_its_line(own, change):
     path = own / "throws.csv"
@@ -146,11 +156,79 @@ def test_a_wrong_table_is_told_with_its_line(own, change):
         examples_in(own)
 
 
+@pytest.mark.parametrize("target, said", [
+    ((9000.0, 0.0, 1.0), "200 m"), ((0.0, 0.0, -40.0), "under the floor"), (None, "flies to"), ((0.1, 0.1, 0.1), "0.5"),
+])
+def test_a_target_that_no_ball_flies_through_leaves_its_throw_out(own, target, said):
+    path = own / "throws.csv"
+    table = path.read_text().splitlines()
+    cells = dict(zip(table[0].split(","), table[1].split(",")))
+    ball, way, there = (np.array([float(cells[f"{name}_{axis}_m{unit}"]) for axis in "xyz"])
+                        for name, unit in (("ball", ""), ("launch", "_s"), ("target", "")))  # fmt: skip
+    there = ball - [*way[:2], 0.0] if target is None else there + target if said != "0.5" else ball + target
+    cells |= {f"target_{axis}_m": f"{value:.6f}" for axis, value in zip("xyz", there)}
+    path.write_text("\n".join([table[0], ",".join(cells.values()), *table[2:]]))
+    told = []
+    assert len(examples_in(own, told=told.append)) == 1 and "target" in told[0] and said in told[0]
+
+
+def test_annotations_of_what_is_not_there_are_told(own):
+    (own / "annotations.csv").write_text("file,start_frame,end_frame,key_frame,labels\nnobody.bvh,0,300,100,throwb right\n")
+    told = []
+    assert len(examples_in(own, told=told.append)) == 2
+    assert len(told) == 1 and "annotations.csv: names 1" in told[0] and "nobody.bvh" in told[0]
+
+
 def test_folders_without_examples(own, tmp_path):
-    with pytest.raises(InputError, match="kick"):
+    with pytest.raises(InputError, match="none with a kick, 2 with a throw"):
         examples_in(own, "kick")
+    for order in (1, 2):
+        clip(own, f"subject{order + 2:02d}").write_text("HIERARCHY")
+    with pytest.raises(InputError, match="each throw in it had to be left out"):
+        examples_in(own)
     with pytest.raises(InputError, match="no such folder"):
         examples_in(tmp_path / "nowhere")
+
+
+def test_a_skeleton_without_hands_is_refused_before_anything_is_read(own):
+    legs = Skeleton(("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightUpLeg", "RightLeg", "RightFoot"),
+                    (-1, 0, 1, 2, 0, 4, 5), [[0, 0, 0], *[[0, 0.1, 0], [0, 0, -0.4], [0, 0, -0.4]] * 2])  # fmt: skip
+    told = []
+    with pytest.raises(InputError, match="^skeleton: no"):
+        examples_in(own, skeleton=legs, told=told.append)
+    assert not told
+
+
+# Cells of every kind below the header as it is, and any text in its place.
+CELLS = st.one_of(st.floats().map(str), st.integers().map(str), st.text(max_size=6),
+                  st.sampled_from(["", "right_hand", "left_foot", "throw.bvh", "1e400", "-0", "nan"]))  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.one_of(
+    st.lists(st.lists(CELLS, min_size=11, max_size=11), max_size=3).map(lambda rows: "\n".join([HEAD, *map(",".join, rows)])),
+    st.lists(st.tuples(*[st.floats(allow_nan=False).map(str) for _ in range(8)]), min_size=1, max_size=2).map(
+        lambda rows: "\n".join([HEAD, *("throw.bvh,me,right_hand," + ",".join(row) for row in rows)])),
+    st.text(max_size=60),
+))
+def test_any_table_is_read_or_told_in_one_line(table):
+    with tempfile.TemporaryDirectory() as place:
+        Path(place, "throw.bvh").write_bytes(recording())
+        Path(place, "throws.csv").write_text(table, "utf-8")
+        told = []
+        try:
+            for example in examples_in(place, told=told.append):
+                assert np.isfinite(example.impact).all() and np.isfinite(example.launch).all()
+        except InputError as error:
+            told.append(str(error))
+        assert all(len(line.splitlines()) == 1 for line in told)
+
+
+@lru_cache
+def recording() -> bytes:
+    with tempfile.TemporaryDirectory() as place:
+        bvh.write(Path(place, "throw.bvh"), planted("throw", 3, 0)[1].motion)
+        return Path(place, "throw.bvh").read_bytes()
 
 
 def test_kicks_come_back_by_the_table_and_by_the_foot_alone(tmp_path):

@@ -1,8 +1,12 @@
 """The config: unknown names and bad values are refused in one line that names the place."""
 
 import json
+import tempfile
+from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from beyond_mocap.errors import InputError
 from training.config import TrainingConfig, config_of, read_config
@@ -27,10 +31,36 @@ def test_what_is_refused(tmp_path, text, said):
     path.write_text(text)
     with pytest.raises(InputError, match=said) as error:
         read_config(path)
-    assert len(str(error.value).splitlines()) == 1
+    assert len(str(error.value).splitlines()) == 1 and str(error.value).startswith(str(path))
 
 
-def test_no_text_is_refused(tmp_path):
+def test_what_is_no_file_of_text_is_refused(tmp_path):
     (tmp_path / "c.json").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="no text"):
-        read_config(tmp_path / "c.json")
+    for path, said in ((tmp_path / "c.json", "no text"), (tmp_path / "no.json", "no such file"), (tmp_path, "a folder")):
+        with pytest.raises(InputError, match=said) as error:
+            read_config(path)
+        assert str(error.value).startswith(str(path)) and "config" in str(error.value)
+
+
+def test_a_mark_at_the_start_is_no_fault(tmp_path):
+    (tmp_path / "c.json").write_text('\ufeff{"units": 32}', "utf-8")
+    assert read_config(tmp_path / "c.json").settings.units == 32
+
+
+# Numbers and texts of every kind under names that exist, and any JSON at all.
+VALUES = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=9))
+ANY = st.recursive(VALUES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=9), inner, max_size=3))
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.one_of(ANY, st.dictionaries(st.sampled_from(sorted(TrainingConfig().flat())), VALUES, max_size=4)))
+def test_any_json_is_a_config_or_refused_in_one_line(told):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "c.json")
+        path.write_text(json.dumps(told), "utf-8")
+        try:
+            config = read_config(path)
+        except InputError as error:
+            assert len(str(error).splitlines()) == 1 and str(error).startswith(str(path))
+        else:
+            assert config_of(config.flat()) == config

@@ -159,6 +159,8 @@ def test_what_is_no_file_of_weights_is_told(tmp_path):
     refused(tmp_path / "empty.npz")
     np.savez(tmp_path / "other.npz", weights=np.zeros(4))
     refused(tmp_path / "other.npz", "of something else")
+    np.savez(tmp_path / "x.checkpoint.npz", told=np.array("{}"), leaf_0000=np.zeros(4))
+    refused(tmp_path / "x.checkpoint.npz", "the checkpoint of a training")
     np.save(tmp_path / "one.npy", np.zeros(4))
     refused(tmp_path / "one.npy")
 
