@@ -108,8 +108,8 @@ class Thrown:
     3) m. turned rad, pace, later s, elsewhere m: how else the motion was changed (see `Corrected`). slowest: m/s
     below which no ball gets there. generated: the motion before the correction, where it was; generated_release: s in
     it; raw_deviation: m that hands and feet were off their wanted ways before any inverse kinematics, on average.
-    beyond: rad that a joint of the corrected limb is beyond the range of the model's examples at most, nan on other
-    bones than the model's. examples: names and weights of what it was planned from. warnings: lines for people.
+    beyond: rad that a joint of the corrected limb is beyond the model's limits at most, which is nothing but what other
+    bones or another rate have made of it before anything was corrected. examples: names and weights of what it was planned from. warnings: lines for people.
     """
 
     motion: Motion
@@ -364,16 +364,22 @@ class _Work:
     def generated(self, plan: Planned) -> tuple[Motion, float, float]:
         """The motion where it belongs, at the asked rate and on the asked skeleton; its release in seconds; how far
         hands and feet are from their wanted ways before any correction, m."""
+        from .synthesis.phase_network.frame_step import stepper
         from .synthesis.phase_network.generate import generate
+        from .synthesis.phase_network.limb_limits import LimbLimits
 
         found = generate(self.model, plan.description)
         motion, release = found.motion, plan.description.release / plan.description.fps
-        motion = self._at_rate(motion)
+        own = motion = self._at_rate(motion)
         if self.mirrored:
             motion = mirror(motion)
         if not motion.skeleton.same_bones(self.skeleton):
             motion = Retargeter(motion, self.skeleton).carry(motion)
         part = part_of(self.skeleton, self.limb, self.ball)
+        self.limits = LimbLimits.of(
+            stepper(self.model).limits, own, part_of(own.skeleton, self.own_limb, self.ball).chain(own), motion,
+            part.chain(motion), self.mirrored,
+        )
         frame = release * motion.fps
         hips = motion.root_positions[0, :2]
         motion = place(motion, 0.0, (-hips[0], -hips[1], 0.0))
@@ -403,9 +409,10 @@ class _Work:
             lies = np.array([*self._where(), self.ball.radius])
         part = part_of(self.skeleton, self.limb, self.ball, lies)
         found = corrected(
-            motion, part, release * motion.fps, self.target, self.ball, self.order.freedom, self.order.speed
+            motion, part, release * motion.fps, self.target, self.ball, self.order.freedom, self.order.speed,
+            self.limits.held,
         )
-        beyond = self._beyond(found.motion)
+        beyond = float(self.limits.beyond(found.motion).max())
         self._check_body(found, beyond)
         left = found.frame / motion.fps
         start = 0.0 if self.order.release_time is None else self.order.release_time - left
@@ -420,17 +427,6 @@ class _Work:
             self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw, beyond,
             tuple(zip(plan.names, map(float, plan.weights))), tuple(self.warnings),
         )  # fmt: skip
-
-    def _beyond(self, motion: Motion) -> float:
-        """rad that a joint of the throwing or kicking limb is beyond the model's limits at most."""
-        from .synthesis.phase_network.limits import JointLimits
-
-        if self.model.joint_limits is None or not motion.skeleton.same_bones(self.model.skeleton):
-            return np.nan
-        if self.mirrored:
-            motion = mirror(motion)
-        over = JointLimits(motion.skeleton, self.model.joint_limits).beyond(quaternion.to_matrix(motion.rotations))
-        return float(over[:, list(part_of(motion.skeleton, self.own_limb, self.ball).chain(motion))].max())
 
     def _check_body(self, found: Corrected, beyond: float) -> None:
         """InputError for a target that the ball reaches only if the body is bent out of shape, or never."""

@@ -6,10 +6,13 @@ import pytest
 from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation.throws.deviation import deviations
 from beyond_mocap.motion.adult import adult_skeleton
+from beyond_mocap.motion.throw_subjects import subject
 from beyond_mocap.planted_examples import planted
 from beyond_mocap.synthesis.phase_network.description import scaled
 from beyond_mocap.synthesis.phase_network.example import describe, example_of
 from beyond_mocap.synthesis.phase_network.generate import Options, generate
+from beyond_mocap.synthesis.phase_network.kinematics import matrices
+from beyond_mocap.synthesis.phase_network.limits import JointLimits
 from beyond_mocap.throw import WEIGHTS, Order, shipped_model, throw_at
 
 ACTIONS = ("throw", "kick")
@@ -64,5 +67,20 @@ def test_no_body_is_bent_out_of_shape_for_a_target(action, order, says):
         throw_at(shipped_model(action), order)
 
 
-def test_joints_of_the_other_hand_are_judged_as_well():
-    assert throw_at(shipped_model("throw"), Order((15.0, 4.0, 1.5), limb="left_hand")).beyond < np.radians(2.0)
+@pytest.mark.parametrize("order", [
+    Order((40.0, 0.0, 1.0)), Order((40.0, 0.0, 1.0), limb="left_hand"), Order((6.0, 0.0, 5.0)),
+])  # fmt: skip
+def test_no_joint_of_the_arm_leaves_its_limits(order):
+    thrown = throw_at(shipped_model("throw"), order)
+    assert thrown.beyond < 1e-6 and thrown.impact_error <= 0.10 and thrown.moved <= 0.05
+
+
+def test_joints_of_a_generated_kick_are_within_limits():
+    model = shipped_model("kick")
+    thrown = throw_at(model, Order((9.0, 0.0, 0.11)))
+    assert JointLimits(model.skeleton, model.joint_limits).beyond(matrices(thrown.motion)).max() < 1e-6
+
+
+def test_limits_of_other_bones_are_judged():
+    thrown = throw_at(shipped_model("throw"), Order((15.0, 4.0, 1.5)), subject(5).skeleton)
+    assert thrown.beyond < 1e-6

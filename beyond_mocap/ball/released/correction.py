@@ -21,7 +21,7 @@ from ...motion.between_frames import cubic_at
 from ...motion.motion import Motion, forward_kinematics, place
 from .. import batch
 from ..physics import Ball
-from .led_limb import LedLimb, at_once
+from .led_limb import Hold, LedLimb, at_once
 from .letting_go import AtFoot, InHand, carried, grip_point
 from .shift import shifts_about
 
@@ -88,19 +88,20 @@ class Corrected:
 
 def corrected(
     motion: Motion, part: InHand | AtFoot, frame: float, target: np.ndarray, ball: Ball,
-    freedom: Freedom | None = None, speed: float | None = None,
+    freedom: Freedom | None = None, speed: float | None = None, hold: Hold | None = None,
 ) -> Corrected:
     """The motion changed so that the ball leaves it about the fractional `frame` and flies through `target` (3,) m.
 
-    speed: m/s wished for as it leaves; it gives way where the body's own is far from it. InputError: a body without
-    that limb, a release at the motion's very ends, a target where the ball is.
+    speed: m/s wished for as it leaves; it gives way where the body's own is far from it. hold: what keeps the limb's
+    joints within their limits; where that leaves no way to the target the ball misses. InputError: a body without that
+    limb, a release at the motion's very ends, a target where the ball is.
     """
     freedom = freedom or Freedom()
     target = np.maximum(np.asarray(target, float), [-np.inf, -np.inf, ball.radius])
     part.chain(motion)
     if not _LEAST <= frame <= len(motion) - 1 - _LEAST:
         raise InputError("release", f"frame {frame:.1f} of {len(motion)}", f"at least {_LEAST} frames before and after")
-    return _Search(motion, part, float(frame), target, ball, freedom, speed).whole()
+    return _Search(motion, part, float(frame), target, ball, freedom, speed, hold).whole()
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +129,9 @@ class _Change:
 class _Search:
     """One correction. `frame`: of the motion as it was given."""
 
-    def __init__(self, motion, part, frame, target, ball, freedom: Freedom, speed):
+    def __init__(self, motion, part, frame, target, ball, freedom: Freedom, speed, hold):
         self.given, self.part, self.asked = motion, part, frame
-        self.target, self.ball, self.freedom, self.speed = target, ball, freedom, speed
+        self.target, self.ball, self.freedom, self.speed, self.hold = target, ball, freedom, speed, hold
         self.pivot = motion.root_positions[0] * [1.0, 1.0, 0.0]
         self.bounds = np.zeros(2)
         self.walks = freedom.elsewhere and not part.free and isinstance(part, AtFoot)
@@ -215,7 +216,7 @@ class _Search:
         """Newton's steps with the arm or leg as it follows; the best of them."""
         motion = self._moved(change)
         frame = source / (1.0 + change.pace)
-        limb = LedLimb.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps))
+        limb = LedLimb.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps), self.hold)
         best, base, step = None, change, 1.0
         follows, known = at_once(grip_point(motion, self.part, np.array([frame])).shape[1]), False
         for number in range(_ROUNDS):

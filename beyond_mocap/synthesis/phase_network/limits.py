@@ -11,7 +11,9 @@ As an array of a model: (J, 3, 3), rows middle (rotation vector, rad), lowest an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +30,7 @@ _ROUNDS = 8
 _CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
 _BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
 _OFF = 1e-9  # radians
+_TURNS = 6  # of box and hinges, until both are kept
 _LONG = 2.0  # radians: longer offsets may as well be meant the other way round
 _ONES = np.ones(3)
 _PARTS = np.zeros((9, 4))  # a matrix's nine numbers -> its skew part as a vector, and its trace
@@ -89,11 +92,23 @@ class JointLimits:
         self.middle = quaternion.to_matrix(quaternion.from_rotation_vector(limits[:, 0]))
         self._back = np.ascontiguousarray(self.middle.swapaxes(-1, -2))
         self.low, self.high = limits[:, 1], limits[:, 2]
-        self.hinges = _hinges(skeleton, self.middle)
+        self._hold(_hinges(skeleton, self.middle))
+
+    def _hold(self, hinges: tuple[Hinge, ...]) -> None:
+        self.hinges = hinges
         self._joints = np.array([hinge.joint for hinge in self.hinges], dtype=int)
         self._bones = np.array([hinge.bone for hinge in self.hinges]).reshape(-1, 3, 1)
         axes = [(np.cross(hinge.across, hinge.along), hinge.along) for hinge in self.hinges]
         self._axes = np.array(axes).reshape(-1, 2, 3)
+
+    def of_joints(self, joints: Sequence[int]) -> JointLimits:
+        """The limits of these joints alone, which are the only ones in what it is then asked of, in this order."""
+        joints, part = list(joints), copy(self)
+        part.middle, part._back, part.low, part.high = (
+            values[joints] for values in (self.middle, self._back, self.low, self.high)
+        )
+        part._hold(tuple(replace(one, joint=joints.index(one.joint)) for one in self.hinges if one.joint in joints))
+        return part
 
     def offsets(self, local: np.ndarray) -> np.ndarray:
         """Rotation vectors (..., J, 3) rad from the middle to local rotations (..., J, 3, 3)."""
@@ -121,23 +136,40 @@ class JointLimits:
         out[..., joints] = np.maximum(out[..., joints], self._backwards(local))
         return out
 
-    def within(self, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Local rotations (..., J, 3, 3) brought back, and how far they were outside (..., J) rad."""
+    def within(self, local: np.ndarray, given: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Local rotations (..., J, 3, 3) brought back, and how far they were outside (..., J) rad. given (..., J, 3, 3):
+        rotations that are allowed, even where they lie outside."""
+        low, high, most = self.low, self.high, _BACK
+        if given is not None:
+            allowed = self.offsets(given)
+            low, high = np.minimum(low, allowed), np.maximum(high, allowed)
+            most = np.maximum(most, -self.bends(given))
+        over = 0.0
+        for _ in range(_TURNS):  # a hinge that comes forward may leave the box, and the other way round
+            local, out = self._in_box(local, low, high)
+            over, back = np.maximum(over, out), self._backwards(local, most)
+            if not (back > _OFF).any():
+                break
+            local, over = self._forward(local, over, back)
+        return local, over
+
+    def _in_box(self, local, low, high) -> tuple[np.ndarray, np.ndarray]:
         offsets = self.offsets(local)
-        kept = np.minimum(np.maximum(offsets, self.low), self.high)
+        kept = np.minimum(np.maximum(offsets, low), high)
         over = np.abs(offsets - kept).max(-1)
         outside = over > _OFF
         if outside.any():
             local, joints = local.copy(), np.nonzero(outside)
             turns = quaternion.to_matrix(quaternion.from_rotation_vector(kept[joints]))
             local[joints] = self.middle[joints[-1]] @ turns
-        back = self._backwards(local)
-        if back.any():
-            local, over = local.copy(), over.copy()
-            for number, hinge in enumerate(self.hinges):
-                turn = quaternion.from_rotation_vector(back[..., number, None] * hinge.across)
-                local[..., hinge.joint, :, :] = quaternion.to_matrix(turn) @ local[..., hinge.joint, :, :]
-                over[..., hinge.joint] = np.maximum(over[..., hinge.joint], back[..., number])
+        return local, over
+
+    def _forward(self, local, over, back) -> tuple[np.ndarray, np.ndarray]:
+        local, over = local.copy(), over.copy()
+        for number, hinge in enumerate(self.hinges):
+            turn = quaternion.from_rotation_vector(back[..., number, None] * hinge.across)
+            local[..., hinge.joint, :, :] = quaternion.to_matrix(turn) @ local[..., hinge.joint, :, :]
+            over[..., hinge.joint] = np.maximum(over[..., hinge.joint], back[..., number])
         return local, over
 
     def bends(self, local: np.ndarray) -> np.ndarray:
@@ -146,9 +178,9 @@ class JointLimits:
         shares = self._axes @ bones
         return np.arctan2(shares[..., 0, 0], shares[..., 1, 0])
 
-    def _backwards(self, local: np.ndarray) -> np.ndarray:
-        """Radians (..., H) by which hinges bend further back than they may."""
-        return np.maximum(-_BACK - self.bends(local), 0.0)
+    def _backwards(self, local: np.ndarray, most: float | np.ndarray = _BACK) -> np.ndarray:
+        """Radians (..., H) by which hinges bend further back than `most`."""
+        return np.maximum(-most - self.bends(local), 0.0)
 
 
 def _hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:

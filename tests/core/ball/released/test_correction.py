@@ -85,3 +85,21 @@ def test_refuses_what_cannot_be():
         corrected(made.motion, part, 1.0, np.array([12.0, 0.0, 1.0]), BASEBALL)
     with pytest.raises(InputError, match="some way off"):
         corrected(made.motion, part, frame, grip_point(made.motion, part, np.array([frame]))[0, 0], BASEBALL)
+
+
+def test_a_joint_that_may_not_turn_further_does_not_and_the_ball_hits_all_the_same():
+    made = throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
+    part, target = InHand("right", made.grip), np.array([16.3, -0.6, 1.5])
+    arm = identify(made.motion.skeleton).right
+
+    def stiff(rotations, given):
+        """The wrist stays as it was."""
+        return np.concatenate([rotations[:, :2], given[:, 2:]], axis=1)
+
+    free, held = (
+        corrected(made.motion, part, made.release * 30.0, target, BASEBALL, Freedom.anchored(), None, hold)
+        for hold in (None, stiff)
+    )
+    assert np.any(free.motion.rotations[:, arm.hand] != made.motion.rotations[:, arm.hand])
+    assert np.array_equal(held.motion.rotations[:, arm.hand], made.motion.rotations[:, arm.hand])
+    assert impact(held, target) < 0.02 and held.moved < 0.05
