@@ -59,12 +59,15 @@ LEAST_KEPT = 0.25
 TURNING = 2.0
 """Radians a second at which a body may be turned towards where the throw begins; further apart it takes longer."""
 
+EDGE = 0.1
+"""Seconds at either end of the generated clip that serve the seams."""
+
 OWN_WORD = "generated"
 """The word that only the generated clip carries."""
 
 ACTIONS = {"throw": ("throwb",), "kick": ("kick",)}
 _CLIP = "generated throw"
-_EDGE = 0.1  # s at either end of the generated clip that serve the seams
+_WAITS = 0.5  # m/s that no joint of a body is as fast as which only stands
 _CATCH_UP = 0.8  # m/s by which the track is left behind or caught up with
 _LEADS = (1.0, 4.0)  # s that leading the track to the throw and back takes, at least and at most
 _SMOOTH = 0.7  # s of the window that takes the sway out of the throw's own path
@@ -363,7 +366,7 @@ def _likest(apart: np.ndarray, low: int, high: int, fade: int) -> int:
 def with_clip(library: Library, motion: Motion, release: float, action: str = "throw") -> Library:
     """The library with one clip more, in memory only: `motion`, on the library's skeleton, whose key moment lies
     `release` s behind its first frame."""
-    edge = int(_EDGE * motion.fps)
+    edge = int(EDGE * motion.fps)
     words = (*ACTIONS[action], OWN_WORD)
     key = float(np.clip(release * motion.fps, edge, len(motion) - 1 - edge))
     row = ClipAnnotation(edge, len(motion) - 1 - edge, key, words)
@@ -384,6 +387,21 @@ def standing(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0), fa
     root = np.tile(stance.positions[0], (count, 1))
     motion = Motion(skeleton, root, np.tile(local, (count, 1, 1)), fps)
     return place(motion, facing, (spot[0], spot[1], 0.0))
+
+
+def without_waiting(throw: Motion, release: float, keeps: float = FADE) -> tuple[Motion, float]:
+    """A throw without the time in which the body only stands, before it winds up and behind it, but for `keeps` s of
+    that at either end; and seconds from its first frame to its release. It is bit for bit what it was elsewhere."""
+    fps = throw.fps
+    speed = np.linalg.norm(np.diff(forward_kinematics(throw)[0], axis=0), axis=-1).max(axis=1) * fps
+    moves = np.flatnonzero(speed > _WAITS)
+    if not len(moves):
+        return throw, release
+    least, margin = int(np.ceil(2.0 * LEAST_KEPT * fps)), int(round(keeps * fps))
+    at = release * fps
+    first = int(np.clip(moves[0] - margin, 0, max(at - least, 0)))
+    end = int(np.clip(moves[-1] + 2 + margin, min(at + least + 1, len(throw)), len(throw)))
+    return throw.frames(first, end), release - first / fps
 
 
 def seam_jerk(joined: Joined) -> np.ndarray:

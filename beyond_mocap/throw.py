@@ -42,6 +42,7 @@ WEIGHTS = Path(__file__).parent / "synthesis" / "phase_network" / "weights"
 """Where the weights that come with the project lie, one file an action."""
 NEAREST = 1.5
 """Metres over the ground from body to target, at least."""
+_HIGHEST = 0.25  # of the stature, m above the ground that a ball lies at most which is kicked
 STATURES = (0.1, 10.0)
 """Metres of a body that throws."""
 _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be asked for
@@ -61,10 +62,11 @@ class Order:
     target: (3,) m, world, that the ball's centre is to go through. limb: of EFFECTORS, None: what the examples use.
     speed: m/s wished for as the ball leaves, None: what suits. ball: a kind's name or a `Ball`, None: baseball in a
     hand, football at a foot. One of start, over, ball_place (each (2,) or (3,) m over the ground) says where: where
-    the hips are in the first frame; where they are at the release; where the ball lies that is kicked. None: start at
-    the origin. The body faces as the examples do, against the target. release_time: s on the caller's clock at which
-    the ball leaves, None: the motion begins at 0. fps: of the result, None: the model's. seed: another motion with
-    the same aim. freedom: what the correction may change beside wrist or ankle.
+    the hips are in the first frame; where they are at the release; where the ball is that is kicked, on the ground or
+    as far above it as a foot gets. None: start at the origin. The body faces as the examples do, against the target.
+    release_time: s on the caller's clock at which the ball leaves, None: the motion begins at 0. fps: of the result,
+    None: the model's. seed: another motion with the same aim. freedom: what the correction may change beside wrist or
+    ankle.
     """
 
     target: tuple[float, float, float]
@@ -259,11 +261,21 @@ class _Work:
         if not STATURES[0] <= stature(self.skeleton) <= STATURES[1]:
             raise InputError("skeleton", f"a body of {stature(self.skeleton):.3g} m",
                              f"{STATURES[0]:g} to {STATURES[1]:g} m", "check the unit")  # fmt: skip
+        most = _HIGHEST * stature(self.skeleton)
+        if self._lies_high > most:
+            raise InputError("ball", f"{self._lies_high:.2f} m above the ground",
+                             f"at most {most:.2f} m, where a foot gets to it", "put it lower")  # fmt: skip
         if not self.model.examples:
             raise InputError("model", "no examples in it", "some, which motions are planned from", "train it anew")
         most = self.fastest
         if self.order.speed and self.order.speed > most:
             raise InputError("speed", f"{self.order.speed:.0f} m/s", f"at most {most:.0f} m/s, which a human gives it")
+
+    @property
+    def _lies_high(self) -> float:
+        """m above the ground of the centre of a ball that lies somewhere, as the order says."""
+        place = self.order.ball_place
+        return float(place[2]) if place is not None and len(place) > 2 else 0.0
 
     @property
     def fastest(self) -> float:
@@ -406,7 +418,7 @@ class _Work:
         """What came of it."""
         lies = None
         if self.order.ball_place is not None:
-            lies = np.array([*self._where(), self.ball.radius])
+            lies = np.array([*self._where(), max(self._lies_high, self.ball.radius)])
         part = part_of(self.skeleton, self.limb, self.ball, lies)
         found = corrected(
             motion, part, release * motion.fps, self.target, self.ball, self.order.freedom, self.order.speed,

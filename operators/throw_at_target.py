@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..beyond_mocap.errors import InputError
-from ..scene.throws import order, shown
+from ..scene.throws import made, order, shown
 from ..scene.throws.settings import thrower
 from .verb import BackgroundVerb, Verb
 
@@ -28,7 +28,7 @@ class AtTarget(BackgroundVerb):
     @staticmethod
     def work(order_, progress, cancelled, hurry):
         """Make it."""
-        return order.work(order_, progress, cancelled, hurry)
+        return made.work(order_, progress, cancelled, hurry)
 
     def apply(self, scene, result):
         """Armature, ball and figures."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -211,9 +212,13 @@ class _Player:
 
     def joined(self, thrown, told: Told):
         """The throw within the player's motion, and lines for people."""
-        from ..joined_throw import laid_into, run_up_and_recovery
+        from ..joined_throw import EDGE, laid_into, run_up_and_recovery, without_waiting
         from ..throw import within
 
+        motion, release = without_waiting(thrown.motion, thrown.release, EDGE)
+        first = round((thrown.release - release) * thrown.motion.fps)
+        shift = thrown.shift[first : first + len(motion)]
+        thrown = replace(thrown, motion=motion, release=release, shift=shift)
         way = run_up_and_recovery(
             self.library, self.plan, thrown.motion, thrown.release, self.at, self.action, told.progress, told.cancelled
         )

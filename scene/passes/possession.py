@@ -22,6 +22,7 @@ from ...beyond_mocap.motion.humanoid import identify
 from .. import armature, channels, linked
 from ..measure import frames_per_second, units_per_metre
 from ..ride.rig_look import alone
+from ..result import BeyondMocapBefore
 from ..set_aside import bring_back, put_aside
 from .settings import KEPT, BeyondMocapHold
 
@@ -129,15 +130,24 @@ def own_way(
 ) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
     """Frames (F,), the ball's own place on each, and the first and last frame on which its own action has a key; None
     where it has none."""
-    before = ball.beyond_mocap_ball.before
-    slots = before.action.slots if before.action is not None else ()
-    slot = next((one for one in slots if one.identifier == before.slot), None)
-    curves = channels.curves(before.action, slot) if slot is not None else {}
+    curves, stance = played_before(ball.beyond_mocap_ball.before)
     ends = channels.keyed_range(curves)
     first, last = min(hold.first for hold in holds) - 1, max(hold.last for hold in holds) + 1
     if ends is not None:
         first, last = min(first, ends[0]), max(last, ends[1])
-    frames, stance = np.arange(first, last + 1), json.loads(before.stance)[""]
+    frames = np.arange(first, last + 1)
+    return frames, way_of(curves, stance, frames), ends
+
+
+def played_before(before: BeyondMocapBefore) -> tuple[dict, list]:
+    """The curves of what a ball played before, and how it stood, as `set_aside.stance_of` has it."""
+    slots = before.action.slots if before.action is not None else ()
+    slot = next((one for one in slots if one.identifier == before.slot), None)
+    return channels.curves(before.action, slot) if slot is not None else {}, json.loads(before.stance)[""]
+
+
+def way_of(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix]:
+    """Where a ball is on frames (F,), units, by its curves and how it stands without them."""
     mode, paths = stance[0], ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
     still = dict(zip(paths, stance[1:]))
 
@@ -147,8 +157,7 @@ def own_way(
         return np.stack(columns, axis=1)
 
     places, turns = values("location"), values(_TURNS.get(mode, "rotation_euler"))
-    way = [Matrix.LocRotScale(place, _turn(mode, turn), None) for place, turn in zip(places, turns)]
-    return frames, way, ends
+    return [Matrix.LocRotScale(place, _turn(mode, turn), None) for place, turn in zip(places, turns)]
 
 
 def check_unaimed(ball: bpy.types.Object) -> None:

@@ -1,12 +1,12 @@
 """The ball of a throw or kick: in the hand or lying, then its flight; and its trajectory as a curve.
 
 Up to the last frame before the release a thrown ball is carried by the hand's bone (`passes.possession`), so that it
-stays in the hand when somebody works on the pose. What it did before comes back with `give_back`.
+stays in the hand when somebody works on the pose. What it did before goes on until then (`earlier`), and comes back with
+`give_back`.
 """
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import bpy
@@ -21,71 +21,113 @@ from ..passes import possession
 from ..passes.settings import KEPT
 from ..passes.shown import remove
 from ..set_aside import bring_back, drop, put_aside
+from . import earlier
 from .settings import MARK, BeyondMocapThrow
 
 if TYPE_CHECKING:
-    from .order import Result
+    from .made import Result
 
+FAR = 0.3
+"""Metres from which on it is told that a ball jumps to the hand."""
 NAMES = {"throw": "Thrown Ball", "kick": "Kicked Ball"}
 
 
-def own_place(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow) -> np.ndarray:
-    """(3,) m where a ball lies when nobody kicks it."""
-    place = ball.location
-    if wish.flown == ball and wish.ball_before.kept:
-        place = json.loads(wish.ball_before.stance)[""][1]
-    return np.array(place) / units_per_metre(scene)
-
-
-def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> bpy.types.Object:
-    """Let the ball go the way of a throw; it is made where there is none. Returns it."""
+def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> list[str]:
+    """Let the ball go the way of a throw; it is made where there is none. What it did before goes on until the hand has
+    it, or the foot meets it. Returns lines about it."""
     wish = body.beyond_mocap_throw
-    if wish.flown is not None and wish.flown != wish.ball and not (wish.ball is None and _is_made(wish)):
-        give_back(scene, wish)
+    if wish.flown is not None and (
+        earlier.flies_for(wish.flown, body)
+        or wish.flown != wish.ball
+        and not (wish.ball is None and _is_made(wish) and wish.flown.name in scene.objects)
+    ):
+        give_back(scene, body)
     kind = result.thrown.ball
     ball = wish.ball or wish.flown
-    if ball is None or ball.name not in scene.objects:
+    if ball is None:
+        sweep()
         ball = balls.create(bpy.context, NAMES[result.order.act], bake.collection(scene))
         ball[KEPT], wish.flown = True, ball
         drop(wish.ball_before, MARK)
-    _let_go(scene, ball)
-    if ball == wish.flown and _is_made(wish):
-        ball.scale = 3 * (kind.radius / balls.RADIUS,)
-    elif not wish.ball_before.kept:
-        put_aside(wish.ball_before, ball)
-    wish.flown = ball
-    channels.discard(ball, MARK)
-    ball.rotation_mode = "QUATERNION"
-    frames, places, turns, held = keys(scene, wish, result)
+    made = ball == wish.flown and _is_made(wish)
+    frames, places, turns, held, told = keys(scene, wish, result, None if made else ball)
     curves = {"location": places * units_per_metre(scene), "rotation_quaternion": turns}
-    named = {path: ("Object Transforms", values) for path, values in curves.items()}
-    channels.animate(ball, f"{ball.name} path", frames, named)[MARK] = True
+    _let_go(scene, ball, wish)
+
+    def write() -> None:
+        if made:
+            ball.scale = 3 * (kind.radius / balls.RADIUS,)
+        elif not wish.ball_before.kept:
+            put_aside(wish.ball_before, ball)
+        wish.flown = ball
+        channels.discard(ball, MARK)
+        ball.rotation_mode = "QUATERNION"
+        named = {path: ("Object Transforms", values) for path, values in curves.items()}
+        channels.animate(ball, f"{ball.name} path", frames, named)[MARK] = True
+
+    possession.anew(scene, ball, write)
     if held is not None:
         side = result.order.limb.partition("_")[0]
         bone = result.order.table.get(f"{side} hand") or result.order.skeleton.names[_hand(result)]
-        possession.take(scene, ball, body, bone, *held, how="KEEP")
+        wish.hold = possession.take(scene, ball, body, bone, *held, how="KEEP").name
+        channels.playing(ball)[0][MARK] = True
     wish.curve = trajectory(scene, wish.curve, ball, result.flight)
-    return ball
+    return told
 
 
-def give_back(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> None:
-    """The ball does what it did before; one that was made goes, and so does the trajectory."""
+def check(wish: BeyondMocapThrow, result: "Result") -> None:
+    """InputError where others carry the ball when a hand is to have it."""
+    if wish.ball is not None and result.order.act == "throw":
+        earlier.taken_from(wish.ball, wish, *_spans(result))
+
+
+def give_back(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
+    """The ball does what it did before; one that was made goes, and so does the trajectory. What an armature shares
+    with the one that it was duplicated from stays with that one."""
+    wish = body.beyond_mocap_throw
     ball, path = wish.flown, wish.curve
-    if path is not None:
-        data = path.data
-        bpy.data.objects.remove(path)
-        if not data.users:
-            bpy.data.curves.remove(data)
-    if ball is not None:
-        _let_go(scene, ball)
-        if _is_made(wish):
-            channels.discard(ball, MARK)
-            remove(ball)
-        elif wish.ball_before.kept:
-            bring_back(wish.ball_before, ball, MARK)
+    if ball is None or not earlier.flies_for(ball, body):
+        if path is not None:
+            data = path.data
+            bpy.data.objects.remove(path)
+            if not data.users:
+                bpy.data.curves.remove(data)
+        if ball is not None:
+            _brought_back(scene, ball, wish)
     drop(wish.ball_before, MARK)
-    for name in ("flown", "curve"):
+    for name in ("flown", "curve", "hold"):
         wish.property_unset(name)
+    sweep()
+
+
+def keep(body: bpy.types.Object) -> None:
+    """The ball is the user's from now on, with the way that it goes."""
+    wish = body.beyond_mocap_throw
+    ball = wish.flown
+    if ball is not None and not earlier.flies_for(ball, body):
+        for action in (channels.playing(ball)[0], ball.beyond_mocap_ball.before.action):
+            if action is not None:
+                action.pop(MARK, None)
+        ball.pop(KEPT, None)
+    drop(wish.ball_before, MARK)
+    for name in ("flown", "curve", "hold"):
+        wish.property_unset(name)
+
+
+def sweep() -> None:
+    """Remove the actions that balls of throws played which somebody has deleted."""
+    for action in [one for one in bpy.data.actions if one.get(MARK) and not one.users - one.use_fake_user]:
+        bpy.data.actions.remove(action)
+
+
+def _brought_back(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow) -> None:
+    made = _is_made(wish)
+    _let_go(scene, ball, wish)
+    if made:
+        channels.discard(ball, MARK)
+        remove(ball)
+    elif wish.ball_before.kept:
+        possession.anew(scene, ball, lambda: bring_back(wish.ball_before, ball, MARK))
 
 
 def _is_made(wish: BeyondMocapThrow) -> bool:
@@ -93,18 +135,27 @@ def _is_made(wish: BeyondMocapThrow) -> bool:
     return bool(wish.flown.get(KEPT)) and not wish.ball_before.kept
 
 
-def _let_go(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
-    """Nobody carries the ball any more."""
-    if len(ball.beyond_mocap_ball.holds):
-        possession.free(scene, ball)
+def _let_go(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow) -> None:
+    """The hand of this throw does not carry the ball any more."""
+    holds = ball.beyond_mocap_ball.holds
+    number = next((number for number, hold in enumerate(holds) if hold.name == wish.hold), None)
+    if number is not None:
+        possession.free(scene, ball, number)
+    wish.property_unset("hold")
+
+
+def _spans(result: "Result") -> tuple[int, int]:
+    """Scene frames on which the throw begins, and up to which the ball has not left."""
+    fps, joined = result.order.fps, result.joined
+    return int(round(joined.start * fps)) + joined.first, int(np.floor(joined.release * fps + CLOSEST))
 
 
 def keys(
-    scene: bpy.types.Scene, wish: BeyondMocapThrow, result: "Result"
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, int] | None]:
-    """Frames (F,), places (F, 3) m and rotations (F, 4) of the ball, and the frames on which the hand carries it: from
-    and to; None for a kick."""
-    fps, flight, joined = frames_per_second(scene), result.flight, result.joined
+    scene: bpy.types.Scene, wish: BeyondMocapThrow, result: "Result", ball: bpy.types.Object | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, int] | None, list[str]]:
+    """Frames (F,), places (F, 3) m and rotations (F, 4) of the ball; the frames on which the hand carries it, from and
+    to, None for a kick; lines for people. ball: None for one that has done nothing before."""
+    fps, flight, joined = result.order.fps, result.flight, result.joined
     release = joined.release * fps
     rest = flight.rests_from if flight.rests_from is not None else flight.end
     whole = np.arange(np.ceil(release + CLOSEST), np.ceil(release + rest * fps) + 1)
@@ -113,16 +164,32 @@ def keys(
     frames = np.sort(np.concatenate([whole, exact]))
     frames = frames[np.append(True, np.diff(frames) > CLOSEST)]
     seconds = (frames - release) / fps
-    places, turns = flight.at(seconds), flight.rotations(seconds)
-    last = int(np.floor(release + CLOSEST))
+    flies = frames, flight.at(seconds), flight.rotations(seconds)
+    begins, last = _spans(result)
     first = int(round(joined.start * fps))
+    does = earlier.moves(ball, wish) if ball is not None else None
     if result.order.act == "kick":
-        before = np.array([min(first, last - 1), last], float)
-        still = np.repeat(flight.at(np.zeros(1)), 2, axis=0)
-        return _all(before, still, np.repeat(turns[:1], 2, axis=0), frames, places, turns, None)
-    held = np.arange(first, last + 1)
-    spots, spun = in_hand(result, held - first)
-    return _all(held.astype(float), spots, spun, frames, places, turns, (first, last))
+        before = np.array([min(first, last - 1) if does is None else last, last], float)
+        lies = before[-2 if does is None else -1 :]
+        turns = flies[2][:1] if does is None else _earlier(scene, ball, wish, last, last)[2]
+        still = lies, np.repeat(flight.at(np.zeros(1)), len(lies), axis=0), np.repeat(turns, len(lies), axis=0)
+        if does is not None and does < last:
+            still = _joined(_earlier(scene, ball, wish, does, last - 1), still)
+        return *_flying(still, flies), None, []
+    taken = first if does is None else max(first, begins)
+    if ball is not None:
+        taken = earlier.taken_from(ball, wish, taken, last)
+    rows = np.arange(taken, last + 1)
+    held = rows.astype(float), *in_hand(result, rows - first)
+    told = []
+    if does is not None and does < taken:
+        way = _earlier(scene, ball, wish, does, taken - 1)
+        away = float(np.linalg.norm(way[1][-1] - held[1][0]))
+        if away > FAR:
+            told = [f"frame {taken}: the ball comes to the hand from {away:.1f} m away; let the hand take it before "
+                    "(Take Ball), or choose another ball"]
+        held = _joined(way, held)
+    return *_flying(held, flies), (taken, last), told
 
 
 def in_hand(result: "Result", rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -141,9 +208,21 @@ def _hand(result: "Result") -> int:
     return getattr(identify(result.order.skeleton), side).hand
 
 
-def _all(before, spots, spun, frames, places, turns, held):
-    """Both parts as one; the ball turns in the air as it did when it left."""
-    turns = quaternion.multiply(turns, quaternion.multiply(quaternion.inverse(turns[:1]), spun[-1:]))
-    both = zip((before, spots, spun), (frames, places, turns))
-    joined = [np.concatenate(pair) for pair in both]
-    return joined[0], joined[1], quaternion.continuous(joined[2]), held
+def _earlier(scene, ball, wish, first: int, last: int):
+    """Frames (F,), places (F, 3) m and rotations (F, 4) of what a ball does without this throw."""
+    frames = np.arange(first, last + 1)
+    way = earlier.way(ball, wish, frames)
+    places = np.array([place.to_translation() for place in way]) / units_per_metre(scene)
+    return frames.astype(float), places, np.array([tuple(place.to_quaternion()) for place in way])
+
+
+def _flying(before, flies):
+    """What a ball does before it leaves, and its flight, as one; it turns in the air as it did when it left."""
+    frames, places, turns = flies
+    turns = quaternion.multiply(turns, quaternion.multiply(quaternion.inverse(turns[:1]), before[2][-1:]))
+    frames, places, turns = _joined(before, (frames, places, turns))
+    return frames, places, quaternion.continuous(turns)
+
+
+def _joined(before, behind):
+    return tuple(np.concatenate(pair) for pair in zip(before, behind))

@@ -64,6 +64,7 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
     told: StringProperty(name="Told", options={"HIDDEN"}, description="What is to be known about it")
     before: PointerProperty(type=BeyondMocapBefore, description="What the armature played before")
     flown: PointerProperty(name="Flown", type=bpy.types.Object, options={"HIDDEN"}, description="The ball that flies")
+    hold: StringProperty(name="Hold", options={"HIDDEN"}, description="The stretch in which the hand carries the ball")
     ball_before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before")
     curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="The curve along the ball's way")
 

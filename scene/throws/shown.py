@@ -9,13 +9,12 @@ import numpy as np
 
 from .. import action, bake, channels, linked, rig_bake, session
 from ..measure import frames_per_second
-from ..passes.settings import KEPT
 from ..set_aside import bring_back, drop, put_aside
 from . import flown, order, rigged
 from .settings import MARK
 
 if TYPE_CHECKING:
-    from .order import Result
+    from .made import Result
 
 MOST_LINES = 12
 BAKED = (rig_bake.MARK, rig_bake.BEFORE, rig_bake.KEYS)
@@ -27,6 +26,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
     """Lay a throw on its armature and its ball."""
     wish, joined, fps = body.beyond_mocap_throw, result.joined, frames_per_second(scene)
     order.check(scene, body)
+    flown.check(wish, result)
     if result.library is not None:
         session.keep_library(result.library, result.order.unit)
     name, start, more = f"{body.name} {result.order.act}s", joined.start * fps, []
@@ -38,7 +38,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
             put_aside(wish.before, body)
         channels.discard(body, MARK)
         action.write(body, joined.motion, scene, start, name, generated=True)[MARK] = True
-    flown.show(scene, body, result)
+    more = [*more, *flown.show(scene, body, result)]
     last = joined.start + (len(joined.motion) - 1) / fps
     bake.lengthen(scene, fps * max(joined.release + result.seconds, last))
     wish.made, wish.release = result.order.act, joined.release * fps
@@ -52,7 +52,7 @@ def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     wish = body.beyond_mocap_throw
     linked.refuse(body, wish.flown)
     channels.check_free(body)
-    flown.give_back(scene, wish)
+    flown.give_back(scene, body)
     played = channels.playing(body)[0]
     if wish.rigged and played is not None and played.get(MARK):
         rigged.take_away(body)
@@ -65,17 +65,12 @@ def keep(body: bpy.types.Object) -> None:
     """The throw stays as the armature's own motion, its ball as an object of the user's."""
     wish = body.beyond_mocap_throw
     linked.refuse(body, wish.flown)
-    for thing in (body, wish.flown):
-        played = channels.playing(thing)[0] if thing is not None else None
-        if played is not None and played.get(MARK):
-            for name in (MARK, *(BAKED if thing == body else ())):
-                played.pop(name, None)
-    if wish.flown is not None:
-        wish.flown.pop(KEPT, None)
-    for before in (wish.before, wish.ball_before):
-        drop(before, MARK)
-    for name in ("flown", "curve"):
-        wish.property_unset(name)
+    played = channels.playing(body)[0]
+    if played is not None and played.get(MARK):
+        for name in (MARK, *BAKED):
+            played.pop(name, None)
+    drop(wish.before, MARK)
+    flown.keep(body)
     _settle(wish)
 
 

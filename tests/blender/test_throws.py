@@ -324,3 +324,161 @@ def test_a_kept_throw_of_a_rig_and_a_bake_are_not_lost_by_the_next_throw():
     press(bpy.ops.beyond_mocap.leave_throw)
     kept = body.animation_data.action
     assert kept.name == name and kept["beyond_mocap_rig"]
+
+
+def a_ball(place, name="Ball of mine"):
+    ball = importlib.import_module(f"{EXTENSION}.scene.ball").create(bpy.context, name, bpy.context.scene.collection)
+    ball.location = place
+    return ball
+
+
+def test_a_ball_in_the_air_is_kicked_where_it_is_or_refused_with_its_height():
+    body = a_body(target=(16.0, 3.0, 0.8))
+    wish = body.beyond_mocap_throw
+    wish.ball = a_ball((1.5, 0.5, 0.25))
+    press(bpy.ops.beyond_mocap.kick_at_target)
+    first = int(np.floor(wish.release))
+    assert ball_at(wish.ball, first) == pytest.approx((1.5, 0.5, 0.25), abs=1e-4)
+    assert closest(wish.ball, np.array((16.0, 3.0, 0.8)), first + 1, first + 60) < 0.10
+    press(bpy.ops.beyond_mocap.leave_throw)
+    wish.ball.location.z = 5.0
+    bpy.context.view_layer.update()
+    refused("5.00 m above the ground", bpy.ops.beyond_mocap.kick_at_target)
+
+
+@pytest.mark.parametrize("deleted", ["of the file", "of the scene"])
+def test_nothing_is_left_of_a_shown_ball_that_was_deleted(deleted):
+    body = a_body()
+    bpy.context.scene.frame_end = 250
+    actions, things = {one.name for one in bpy.data.actions}, {one.name for one in bpy.data.objects}
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    ball = body.beyond_mocap_throw.flown
+    if deleted == "of the file":
+        bpy.data.objects.remove(ball)
+    else:
+        with bpy.context.temp_override(selected_objects=[ball], active_object=ball):
+            bpy.ops.object.delete()
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert {one.name for one in bpy.data.actions} == actions
+    assert {one.name for one in bpy.data.objects} == things
+    press(bpy.ops.beyond_mocap.throw_at_target)  # and a new one is made
+    assert body.beyond_mocap_throw.flown.name in bpy.context.scene.objects
+
+
+def test_a_throw_that_begins_before_the_scene_is_told_or_waits():
+    body = a_body(frame=1)
+    wish = body.beyond_mocap_throw
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert "before the scene's first frame 1: set On Frame to" in wish.told
+    frame = int(wish.told.split("On Frame to ")[1].split()[0])
+    wish.frame = frame
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert "first frame" not in wish.told and wish.release == pytest.approx(frame, abs=0.51)
+    wish.frame = 0  # now, or as soon as it fits in
+    bpy.context.scene.frame_set(1)
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert wish.release == pytest.approx(frame, abs=1.51) and "the ball leaves on frame" in wish.told
+
+
+@pytest.mark.parametrize("first", ["throw", "kick"])
+def test_a_kept_ball_is_thrown_again(first):
+    body = a_body("walking_1_2")
+    wish = body.beyond_mocap_throw
+    press(getattr(bpy.ops.beyond_mocap, f"{first}_at_target"))
+    ball, release = wish.flown, wish.release
+    press(bpy.ops.beyond_mocap.keep_throw)
+    frames = [*range(40, int(release) + 50, 3)]
+    way = np.array([ball_at(ball, frame) for frame in frames])
+    names = {one.name for one in bpy.data.actions}
+    wish.ball, wish.frame = ball, 260
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    again = int(np.floor(wish.release))
+    assert np.abs([ball_at(ball, frame) - place for frame, place in zip(frames, way)]).max() < 2e-3
+    assert closest(ball, np.array(TARGET), again + 1, again + 60) < 0.10
+    hand = body.pose.bones[ball.constraints[-1].subtarget]
+    for frame in (again - 20, again):
+        assert np.linalg.norm(ball_at(ball, frame) - np.array(body.matrix_world @ hand.head)) < 0.3
+    wish.target.location.y -= 1.0
+    bpy.context.view_layer.update()
+    press(bpy.ops.beyond_mocap.throw_at_target)  # again, with the same ball
+    assert closest(ball, np.array(TARGET) - [0.0, 1.0, 0.0], again - 1, again + 60) < 0.10
+    assert np.abs([ball_at(ball, frame) - place for frame, place in zip(frames, way)]).max() < 2e-3
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert np.abs([ball_at(ball, frame) - place for frame, place in zip(frames, way)]).max() < 2e-3
+    assert {one.name for one in bpy.data.actions} == names
+
+
+def test_a_ball_that_rolls_or_was_put_down_is_kicked_where_it_is_by_then(room):
+    body = a_body(target=(16.0, 3.0, 0.8))
+    wish, ball = body.beyond_mocap_throw, a_ball((1.0, 0.5, 0.11))
+    ball.keyframe_insert("location", frame=1)
+    ball.location.x = 2.0
+    ball.keyframe_insert("location", frame=101)
+    wish.ball = ball
+    rolls = [ball_at(ball, frame) for frame in (10, 30, 59, 60)]
+    press(bpy.ops.beyond_mocap.kick_at_target)
+    for frame, place in zip((10, 30, 59, 60), rolls):
+        assert ball_at(ball, frame) == pytest.approx(place, abs=0.02 if frame == 60 else 1e-3)
+    first = int(np.floor(wish.release))
+    assert closest(ball, np.array((16.0, 3.0, 0.8)), first + 1, first + 60) < 0.10
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert np.allclose([ball_at(ball, frame) for frame in (10, 30, 59, 60)], rolls, atol=1e-6)
+
+
+def test_whose_throw_a_ball_shows_keeps_it_from_others():
+    one = a_body(target=(16.0, 3.0, 0.8))
+    ball = a_ball((1.5, 0.5, 0.11))
+    one.beyond_mocap_throw.ball = ball
+    press(bpy.ops.beyond_mocap.kick_at_target)
+    shown = ball_at(ball, 90)
+    bpy.ops.beyond_mocap.import_clips(filepath=str(SAMPLE / "standing_1.bvh"))
+    other = bpy.context.object
+    other.beyond_mocap_throw.ball, other.beyond_mocap_throw.target = ball, one.beyond_mocap_throw.target
+    other.beyond_mocap_throw.frame = 200
+    refused(f"Keep or Leave at {one.name} first", bpy.ops.beyond_mocap.kick_at_target)
+    assert ball_at(ball, 90) == pytest.approx(shown)
+    worlds.choose(one)
+    press(bpy.ops.beyond_mocap.keep_throw)
+    worlds.choose(other)
+    other.beyond_mocap_throw.target = an_empty(ball_at(ball, 260) + [-12.0, 4.0, 1.0])
+    press(bpy.ops.beyond_mocap.kick_at_target)  # where it has come to rest
+    assert ball_at(ball, 90) == pytest.approx(shown, abs=1e-3)
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert ball_at(ball, 90) == pytest.approx(shown, abs=1e-3)
+
+
+def test_a_duplicate_of_a_thrower_leaves_the_ball_to_him():
+    body = a_body()
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    ball = body.beyond_mocap_throw.flown
+    twin = body.copy()
+    bpy.context.scene.collection.objects.link(twin)
+    worlds.choose(twin)
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert ball.name in bpy.context.scene.objects and body.beyond_mocap_throw.flown == ball
+    first = int(np.floor(body.beyond_mocap_throw.release))
+    assert closest(ball, np.array(TARGET), first + 1, first + 60) < 0.10
+
+
+def test_a_target_that_moves_is_met_where_it_is_by_then():
+    body = a_body()
+    wish, carrier = body.beyond_mocap_throw, an_empty((0.0, 0.0, 0.0))
+    wish.target.parent = carrier
+    for frame, y in ((60, -2.0), (120, 4.0)):
+        carrier.location.y = y
+        carrier.keyframe_insert("location", frame=frame)
+    for curve in curves_of(carrier):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    first, away = int(np.floor(wish.release)), []
+    for frame in np.arange(first + 1, first + 60, 0.1):
+        place = ball_at(wish.flown, frame)
+        away.append(np.linalg.norm(place - np.array(wish.target.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation)))
+    assert min(away) < 0.15
+    assert len(bpy.data.scenes) == 1
+
+
+def curves_of(thing):
+    channels = importlib.import_module(f"{EXTENSION}.scene.channels")
+    return channels.curves(*channels.playing(thing)).values()

@@ -1,0 +1,169 @@
+"""The throw that comes of an order, worked out in any thread: never touches bpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .order import Order
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.ball.flight import Flight
+    from ...beyond_mocap.joined_throw import Joined
+    from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.motion.motion import Motion
+    from ...beyond_mocap.throw import Thrown
+
+FOLLOWED, LONGEST = 3.0, 10.0
+"""Seconds that the ball is followed behind the target, bouncing and rolling, and that it takes to get there at most."""
+_GUESS, _ROUNDS = 1.0, 5  # s of flight to a target that moves, to begin with; how often that is made better at most
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of an order: the throw, the whole motion that shows it, the ball's way from the release on (seconds 0), seconds
+    until it passes the target, and m/s^3 of the seams and what is usual there."""
+
+    order: Order
+    thrown: "Thrown"
+    joined: "Joined"
+    flight: "Flight"
+    seconds: float
+    library: "Library | None"
+    jerk: float
+    usual_jerk: float
+
+
+
+def work(order: Order, progress, cancelled, _hurry) -> Result:
+    """The throw, and the motion it is part of. Never touches bpy."""
+    from ...beyond_mocap import joined_throw
+    from ...beyond_mocap.ball.flight import fly
+    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.motion.retarget import Retargeter
+
+    library = order.library
+    if order.folder and library is None:
+        library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    own = order.own
+    if own is None:
+        own = joined_throw.standing(order.skeleton, 0.0, order.fps, order.place, order.facing)
+    elif order.table:
+        own = Retargeter(own, order.skeleton, keeps_travel=True).carry(own)
+    start = order.first / order.fps
+    asked = order
+    order, thrown, seconds = _met(order, own, start, library is not None, _share(progress, 0.0, 0.3), cancelled)
+    motion, release = _shown(thrown, library is not None)
+    told: tuple = ()
+    if library is not None:
+        way = joined_throw.around(
+            library, own, start, motion, release, order.at, order.act, _share(progress, 0.3, 1.0), cancelled
+        )
+        own, start, told = way.motion, way.start, way.warnings
+    joined = joined_throw.laid_into(own, start, motion, release, order.at, goes_on=library is None)
+    usual = joined_throw.usual_jerk(library, order.fps) if library is not None else float("nan")
+    joined = replace(joined, warnings=(*_when(asked, order, joined), *told, *joined.warnings))
+    up = np.array([0.0, 0.0, order.lift])
+    raised = replace(joined.motion, root_positions=joined.motion.root_positions + up)
+    joined = replace(joined, motion=raised)
+    launch = replace(thrown.launch, time=0.0, position=thrown.launch.position + up)
+    flight = fly(launch, thrown.ball, seconds + FOLLOWED)
+    return Result(order, thrown, joined, flight, seconds, library, float(joined_throw.seam_jerk(joined).max()), usual)
+
+
+def _met(order: Order, own: "Motion", start: float, joined: bool, progress, cancelled):
+    """The order as it can be kept, its throw, and the seconds that the ball flies: it leaves later where the throw would
+    begin before the scene and may wait, and a target that moves is met where it is by then."""
+    seconds = _GUESS
+    for _ in range(_ROUNDS):
+        target = order.targets[min(round(seconds * order.fps), len(order.targets) - 1)]
+        thrown = _thrown(order, target, own, start, joined, progress, cancelled)
+        guessed, seconds = seconds, _seconds(thrown)
+        late = int(np.ceil((order.begins + _shown(thrown, joined)[1] - order.at) * order.fps - 1e-6))
+        if order.waits and late > 0:
+            targets = order.targets[min(late, len(order.targets) - 1) :]
+            order = replace(order, at=order.at + late / order.fps, targets=targets, waits=False)
+        elif len(order.targets) == 1 or abs(seconds - guessed) * order.fps < 0.5:
+            break
+    return order, thrown, seconds
+
+
+def _when(asked: Order, order: Order, joined: "Joined") -> list[str]:
+    """Lines about a throw that does not fit into the scene before its release."""
+    first = round(order.begins * order.fps)
+    begins = round(joined.start * order.fps) + joined.first
+    if order.at != asked.at:
+        return [f"the ball leaves on frame {round(order.at * order.fps)}: sooner the {order.act} would begin before the "
+                f"scene's first frame"]
+    if begins >= first:
+        return []
+    frame = round(order.at * order.fps) + first - begins
+    return [f"the {order.act} begins on frame {begins}, before the scene's first frame {first}: set On Frame to {frame} "
+            "or more to see all of it"]
+
+
+def _shown(thrown: "Thrown", joined: bool) -> tuple["Motion", float]:
+    """What is shown of a throw, and its release in that: a body on its way does not stop to wait."""
+    from ...beyond_mocap.joined_throw import EDGE, FADE, without_waiting
+
+    return without_waiting(thrown.motion, thrown.release, EDGE if joined else FADE)
+
+
+def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
+    """The throw where it has to be: begun where an armature that only stands is; over where its own motion has it at
+    the release, if a library joins them; else begun where its own motion leads, since it is eased out of that."""
+
+    from ...beyond_mocap.joined_throw import comes_in_time, stops_at
+
+    def spot(seconds: float) -> tuple[float, ...]:
+        return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
+
+    model = _model(order)
+    if order.ball_place is not None:
+        return _thrown_from(order, target, model, {"ball_place": tuple(order.ball_place)}, progress, cancelled)
+    if order.own is None:
+        return _thrown_from(order, target, model, {"start": tuple(order.place)}, progress, cancelled)
+    thrown = _thrown_from(order, target, model, {"over": spot(order.at)}, progress, cancelled)
+    motion, release = _shown(thrown, joined)
+    begin = order.at - release
+    if not joined:
+        return _thrown_from(order, target, model, {"start": spot(begin)}, progress, cancelled)
+    if comes_in_time(own, start, motion, release, order.at):
+        return thrown
+    return _thrown_from(order, target, model, {"start": tuple(stops_at(own, start, begin))}, progress, cancelled)
+
+
+def _model(order: Order):
+    """The trained model that is asked for."""
+    from ...beyond_mocap.files.network_npz import read_model
+    from ...beyond_mocap.throw import shipped_model
+
+    return read_model(order.model) if order.model else shipped_model(order.act)
+
+
+def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) -> "Thrown":
+    """The throw that begins, or is at its release, or finds the ball, `where`."""
+    from ...beyond_mocap import throw
+
+    asked = throw.Order(
+        target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb, speed=order.speed or None, ball=order.kind,
+        fps=order.fps, seed=order.seed, **where,
+    )
+    return throw.throw_at(model, asked, order.skeleton, progress, cancelled)
+
+
+def _seconds(thrown: "Thrown") -> float:
+    """When the ball is nearest to where it passes the target, from the release on."""
+    from ...beyond_mocap.ball.flight import fly
+
+    flight = fly(replace(thrown.launch, time=0.0), thrown.ball, LONGEST)
+    times = np.arange(0.0, flight.end, 1.0 / 480.0)
+    apart = np.linalg.norm(flight.at(times) - thrown.impact, axis=1)
+    return float(times[int(np.argmin(apart))]) if np.all(np.isfinite(thrown.impact)) else _GUESS
+
+
+def _share(progress, low: float, high: float):
+    """A progress that fills a part of the bar."""
+    return lambda done, text: progress(low + (high - low) * done, text)
