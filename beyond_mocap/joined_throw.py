@@ -43,6 +43,7 @@ from .own_size import in_library_size, size_of
 from .plan import Plan
 from .polish.carry import Body, Resting, leg, limb_carried
 from .polish.meeting import eased
+from .polish.stepped_over import stepped_over
 from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
 from .synthesis.balance import balanced
 from .synthesis.footage import fetch
@@ -56,6 +57,9 @@ FADE = 0.5
 LEAST_KEPT = 0.25
 """Seconds before and behind the release that are never faded."""
 
+EASED = {"throw": 0.8, "kick": FADE}
+"""Seconds of that without a library: time for a step of each foot, where the throw leaves it."""
+
 TURNING = 2.0
 """Radians a second at which a body may be turned towards where the throw begins; further apart it takes longer."""
 
@@ -67,6 +71,7 @@ OWN_WORD = "generated"
 
 ACTIONS = {"throw": ("throwb",), "kick": ("kick",)}
 _CLIP = "generated throw"
+_STEPS_BELOW = 2.0  # m/s; who runs takes no small steps
 _WAITS = 0.5  # m/s that no joint of a body is as fast as which only stands
 _CATCH_UP = 0.8  # m/s by which the track is left behind or caught up with
 _LEADS = (1.0, 4.0)  # s that leading the track to the throw and back takes, at least and at most
@@ -161,8 +166,16 @@ def laid_into(
     new = own.root_positions.copy(), own.rotations.copy()
     new[0][first:end], new[1][first:end] = throw.root_positions, throw.rotations
     share = _old_share(len(own), first, kept, end)
-    root, rotations = _between(own.skeleton, new, old, share)
-    motion = Motion(own.skeleton, root, rotations, fps)
+    pose = _between(own.skeleton, new, old, share)
+    if goes_on:
+        standing = contacts.points(own)
+        inside = np.flatnonzero(share[first:end] < 0.5) + first
+        standing[inside] = contacts.points(throw)[inside - first]
+        for stretch in ((first, kept[0]), (kept[1], end)):
+            if _pace_over(old[0], stretch, fps) > _STEPS_BELOW:
+                continue
+            pose = stepped_over(own.skeleton, pose, standing, stretch, fps)
+    motion = Motion(own.skeleton, *pose, fps)
     away = old[0][kept[1]] - own.root_positions[kept[1]]
     told = _told(before, start + first / fps, turned, away, start + end / fps)
     return Joined(motion, start, start + first / fps + release, first, end, kept, away, turned, told)
@@ -540,6 +553,12 @@ def _with_rest_moved(own: Motion, frame: int, turn: float, offset: np.ndarray) -
         np.where(behind[:, None], moved.root_positions, own.root_positions),
         np.where(behind[:, None, None], moved.rotations, own.rotations),
     )
+
+
+def _pace_over(root: np.ndarray, stretch: tuple[int, int], fps: float) -> float:
+    """m/s over the ground of root (T, 3) m within a stretch, on average."""
+    part = root[stretch[0] : stretch[1], :2]
+    return float(np.linalg.norm(np.diff(part, axis=0), axis=1).mean() * fps) if len(part) > 1 else 0.0
 
 
 def _old_share(count: int, first: int, kept: tuple[int, int], end: int) -> np.ndarray:

@@ -55,14 +55,15 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     start = order.first / order.fps
     asked = order
     order, thrown, seconds = _met(order, own, start, library is not None, _share(progress, 0.0, 0.3), cancelled)
-    motion, release = _shown(thrown, library is not None)
+    motion, release = _shown(order, thrown, library is not None)
     told: tuple = ()
     if library is not None:
         way = joined_throw.around(
             library, own, start, motion, release, order.at, order.act, _share(progress, 0.3, 1.0), cancelled
         )
         own, start, told = way.motion, way.start, way.warnings
-    joined = joined_throw.laid_into(own, start, motion, release, order.at, goes_on=library is None)
+    fade = joined_throw.FADE if library is not None else joined_throw.EASED[order.act]
+    joined = joined_throw.laid_into(own, start, motion, release, order.at, goes_on=library is None, fade=fade)
     usual = joined_throw.usual_jerk(library, order.fps) if library is not None else float("nan")
     joined = replace(joined, warnings=(*_when(asked, order, joined), *told, *joined.warnings))
     up = np.array([0.0, 0.0, order.lift])
@@ -81,7 +82,7 @@ def _met(order: Order, own: "Motion", start: float, joined: bool, progress, canc
         target = order.targets[min(round(seconds * order.fps), len(order.targets) - 1)]
         thrown = _thrown(order, target, own, start, joined, progress, cancelled)
         guessed, seconds = seconds, _seconds(thrown)
-        late = int(np.ceil((order.begins + _shown(thrown, joined)[1] - order.at) * order.fps - 1e-6))
+        late = int(np.ceil((order.begins + _shown(order, thrown, joined)[1] - order.at) * order.fps - 1e-6))
         if order.waits and late > 0:
             targets = order.targets[min(late, len(order.targets) - 1) :]
             order = replace(order, at=order.at + late / order.fps, targets=targets, waits=False)
@@ -104,11 +105,11 @@ def _when(asked: Order, order: Order, joined: "Joined") -> list[str]:
             "or more to see all of it"]
 
 
-def _shown(thrown: "Thrown", joined: bool) -> tuple["Motion", float]:
+def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", float]:
     """What is shown of a throw, and its release in that: a body on its way does not stop to wait."""
-    from ...beyond_mocap.joined_throw import EDGE, FADE, without_waiting
+    from ...beyond_mocap.joined_throw import EASED, EDGE, without_waiting
 
-    return without_waiting(thrown.motion, thrown.release, EDGE if joined else FADE)
+    return without_waiting(thrown.motion, thrown.release, EDGE if joined else EASED[order.act])
 
 
 def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
@@ -126,7 +127,7 @@ def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, pro
     if order.own is None:
         return _thrown_from(order, target, model, {"start": tuple(order.place)}, progress, cancelled)
     thrown = _thrown_from(order, target, model, {"over": spot(order.at)}, progress, cancelled)
-    motion, release = _shown(thrown, joined)
+    motion, release = _shown(order, thrown, joined)
     begin = order.at - release
     if not joined:
         return _thrown_from(order, target, model, {"start": spot(begin)}, progress, cancelled)
