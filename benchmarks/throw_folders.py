@@ -91,9 +91,9 @@ def _from_markers(name: str, folder: Path) -> dict | None:
         print(f"{name}: left out: {error}", file=sys.stderr)
         return None
     print(f"{name}: {found.side} hand, {found.time:.3f} s, {found.speed:.1f} m/s by the {found.how}", file=sys.stderr)
+    launch = {} if "serve" in name else dict(zip(LAUNCH, found.velocity))  # a racket serves, of which a hand tells little
     return {"file": f"{subject}/{out.name}", "subject": subject, "limb": f"{found.side}_hand",
-            "release_s": f"{found.time:.6f}",
-            **{name: f"{value:.6f}" for name, value in zip(LAUNCH, found.velocity)}}  # fmt: skip
+            "release_s": f"{found.time:.6f}", **{axis: f"{value:.6f}" for axis, value in launch.items()}}  # fmt: skip
 
 
 def _write(path: Path, rows: Sequence[dict]) -> None:

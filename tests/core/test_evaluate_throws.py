@@ -1,5 +1,6 @@
 """A model of throws measured on motions: planted results of the generator come out as planted figures."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from beyond_mocap import evaluate_throws as recipe
 from beyond_mocap.errors import Cancelled, InputError
 from beyond_mocap.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
 from beyond_mocap.evaluation.throws.page import throws_page
+from beyond_mocap.evaluation.throws.strip import strip
 from beyond_mocap.files.tables import plain
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.adult import adult_skeleton
@@ -102,14 +104,15 @@ def test_kicks_have_no_impact_and_failures_are_told(examples, monkeypatch):
     found = evaluate_throws(Model(kick), [kick])
     assert np.isnan(found.impact).all() and plain(found.report())["impact_m"] is None
 
-    def fails(*_, **__):
-        raise InputError("description", "25 frames per second")
-
     monkeypatch.setattr(recipe, "generate", fails)
     none = evaluate_throws(Model(kick), [kick])
     assert none.motions == () and none.left_out == (f"{kick.name}: description: 25 frames per second",)
     with pytest.raises(Cancelled):
         evaluate_throws(Model(kick), [kick], cancelled=lambda: True)
+
+
+def fails(*_, **__):
+    raise InputError("description", "25 frames per second")
 
 
 def test_some_of_each_subject(examples):
@@ -124,5 +127,23 @@ def test_the_report_and_its_page(examples, monkeypatch):
     assert report["deviation_m"]["left_hand"] == pytest.approx(0.0, abs=1e-9)
     assert report["network_deviation_m"]["right_foot"] == pytest.approx(0.01 * 3**0.5)
     page = throws_page(report)
-    assert "<b>one" not in page and "&lt;b&gt;one" in page and "0.0173" in page and "ann &amp; bob" in page
-    assert "0.0553" in page  # his mean of the left arm in table 8.6
+    assert "<b>one" not in page and "&lt;b&gt;one" in page and ">1.73<" in page and "ann &amp; bob" in page
+    assert ">5.53<" in page  # cm, his mean of the left arm in table 8.6
+    assert page.count("<circle") == 8 and "NaN" not in page and ">nan" not in page
+
+
+def test_a_page_leaves_out_what_nothing_was_measured_of(examples, monkeypatch):
+    kick = replace(examples[0], limb=3)
+    generating(monkeypatch, [(kick.motion, 0.01)])
+    raw = throws_page(plain(evaluate_throws(Model(kick), [kick], RAW).report()))
+    assert "wall" not in raw and "impact" not in raw and "by the networks alone" in raw
+    assert raw.count("<circle") == 4  # nothing was corrected: one line for each hand and foot
+    monkeypatch.setattr(recipe, "generate", fails)
+    empty = throws_page(plain(evaluate_throws(Model(kick), [kick]).report()))
+    assert "<svg" not in empty and "No motions" in empty and "25 frames per second" in empty
+
+
+def test_all_dots_lie_on_their_axis():
+    made = strip([("one", "network", [(0.0, "a"), (7000.0, "b"), (2.9, "c")])], 3.0, "cm")
+    across = [float(x) for x in re.findall(r'cx="([-0-9.]+)"', made)]
+    assert across[0] == 210.0 and 210.0 < across[2] < across[1] <= 890.0
