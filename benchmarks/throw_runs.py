@@ -75,7 +75,7 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
     ours = {**few, **again, **FED, "guided": True, "linear_start": True, "ridge": 0.0, "rollout": 8, "learning_rate": 1e-4,
             "noise": 0.02, "frame": "hip", "wrist": "given", "units": max(scale.units, LEAST)}
     shipped = {**ours, "epochs": 0, "steps": None, "units": LEAST}
-    plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1, "guided": False}
+    plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1, "guided": False, "carried": False}
     return (
         *(Variant(name, words, {**plain, **changes}, not name.endswith("raw"), linear=True) for name, words, changes in (
             ("linear", "six linear maps", {"points": 1}), ("linear-phased", "six linear maps, by phase", {}),

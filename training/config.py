@@ -19,7 +19,7 @@ LIMITS = {
     "epochs": (0, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
     "final_rate": (0.0, 1.0), "keep": (0.05, 1.0), "l1": (0.0, 10.0), "limb_weight": (0.0, 1000.0),
     "body_weight": (0.0, 1000.0), "rollout": (1, 64), "single_frames": (0.0, 1.0), "noise": (0.0, 0.5),
-    "seed": (0, 2**31 - 1), "examples": (1, 1000), "ridge": (0.0, 10.0),
+    "start_noise": (0.0, 0.5), "seed": (0, 2**31 - 1), "examples": (1, 1000), "ridge": (0.0, 10.0),
 }
 
 
@@ -36,11 +36,14 @@ class TrainingConfig:
     single_frames: share of the training that goes by single frames before that. noise: radians by which the pose at the
     start of a stretch is off. mirrored: whether each example is also taken mirrored.
     linear_start: whether networks start from what linear regression says, else at random. ridge: of that regression, a
-    row; 0: chosen on examples that are left out for it. examples: most that the model keeps to start from (§7.7.1).
+    row; 0: chosen on examples that are left out for it. start_noise: radians by which joints are off in a copy of all
+    frames that regression sees too (`disturbed`); 0: none. examples: most that the model keeps to start from (§7.7.1).
     seed: of first weights, order, dropout and noise.
     """
 
-    settings: ModelSettings = field(default_factory=lambda: ModelSettings(units=96, conditioned=True, guided=True))
+    settings: ModelSettings = field(
+        default_factory=lambda: ModelSettings(units=96, conditioned=True, guided=True, carried=True)
+    )
     epochs: int = 0
     macro: int = 2
     batch: int = 512
@@ -58,6 +61,7 @@ class TrainingConfig:
     mirrored: bool = True
     linear_start: bool = True
     ridge: float = 0.0
+    start_noise: float = 0.07
     examples: int = 40
     seed: int = 0
 

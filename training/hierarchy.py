@@ -15,17 +15,19 @@ from beyond_mocap.synthesis.phase_network.answers import answered, network_outpu
 from beyond_mocap.synthesis.phase_network.chains import LIMB_OF, Chains
 from beyond_mocap.synthesis.phase_network.description import Windows
 from beyond_mocap.synthesis.phase_network.features import guides, network_input, phase_of
-from beyond_mocap.synthesis.phase_network.kinematics import Pose, places_and_turns
+from beyond_mocap.synthesis.phase_network.kinematics import Pose
 from beyond_mocap.synthesis.phase_network.limb_reach import bent_limb, hinge_axes
 from beyond_mocap.synthesis.phase_network.limits import JointLimits
 from beyond_mocap.synthesis.phase_network.model import SINGLE
 from beyond_mocap.synthesis.phase_network.network import forward
+from beyond_mocap.synthesis.phase_network.training_set import Steps
 
 from .arrays import ARRAYS
 from .config import TrainingConfig
+from .disturbed import disturbed, drawn
 from .losses import effector_error, joint_error, missed_ends, sizes
-from .networks import RIDGES, Linear, first_weights, linear_start, scales_of, sums
-from .recordings import Recordings, single_steps
+from .networks import RIDGES, Linear, Sums, first_weights, linear_start, scales_of, sums
+from .recordings import Recordings, single_steps, step_arrays
 
 DROPPED = (SINGLE, "hip", "body")
 """Networks that are trained with dropout (§7.6)."""
@@ -57,20 +59,42 @@ class Networks:
         self.scales, self._sums, alone = {}, {}, {}
         held = np.zeros(len(self.lengths), bool) if held is None else held
         held = np.repeat(held, np.array(self.lengths) - 1)
+        told = single_steps(recorded)
+        beside = self._beside(told) if config.linear_start and config.start_noise else None
         for name in self.settings.networks:
-            x, y, phase = single_steps(name, chains, self.settings, recorded, leg_reach)
+            x, y, phase = step_arrays(name, chains, self.settings, told, leg_reach)
             (mean_x, scale_x), (mean_y, scale_y) = scales_of(x), scales_of(y)
             self.scales[name] = {
                 "input_mean": mean_x, "input_scale": scale_x, "output_mean": mean_y, "output_scale": scale_y,
             }
-            x, theta = (x - mean_x) / scale_x, phase_function.weights(phase, self.settings.points).astype(np.float32)
+            theta = phase_function.weights(phase, self.settings.points).astype(np.float32)
+            alone[name] = ((x - mean_x) / scale_x, y, theta)
             if config.linear_start:
-                answer = (y - mean_y) / scale_y
-                told = guides(name, chains, self.settings)
-                self._sums[name] = [sums(x[rows], answer[rows], theta[rows], told) for rows in (~held, held)]
-            alone[name] = (x, y, theta)
+                parts = [(x, y)]
+                if beside is not None:
+                    parts.append(step_arrays(name, chains, self.settings, beside, leg_reach)[:2])
+                self._sums[name] = self._sums_of(name, parts, theta, held)
         firsts = np.concatenate([[0], np.cumsum(np.array(self.lengths[:-1], int) - 1)])
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
+
+    def _beside(self, told: Steps) -> Steps:
+        """The same steps from poses beside the truth."""
+        off = drawn(self.chains, len(told.pose.root), self.config.start_noise, self.config.seed)
+        return told._replace(pose=disturbed(self.chains, told.pose, *(one.astype(np.float32) for one in off)))
+
+    def _sums_of(self, name: str, parts: list, theta, held) -> list[Sums]:
+        """What regression needs of inputs and answers (F, in), (F, out): of rows that are not held out, and of those that
+        are."""
+        scales, guided = self.scales[name], guides(name, self.chains, self.settings)
+        found = []
+        for rows in (~held, held):
+            every = [
+                sums((x[rows] - scales["input_mean"]) / scales["input_scale"],
+                     (y[rows] - scales["output_mean"]) / scales["output_scale"], theta[rows], guided)
+                for x, y in parts
+            ]  # fmt: skip
+            found.append(every[0] if len(every) == 1 else every[0].plus(every[1]))
+        return found
 
     def frames(self, share: float) -> int:
         """Frames that are fed back when `share` of the training is done; 0: each network alone, one frame from the
@@ -188,19 +212,9 @@ class Networks:
         is never quite the truth."""
         if not self.config.noise:
             return pose
-        skeleton, joints = self.chains.skeleton, np.array(self.chains.joints)
+        joints, count = np.array(self.chains.joints), len(pose.root)
         turn, shift = jax.random.split(key)
-        vectors = self.config.noise * jax.random.normal(turn, (len(pose.root), len(joints), 3))
-        local = pose.local.at[:, joints].set(pose.local[:, joints] @ _small_turns(vectors))
-        root = pose.root + self.config.noise * ROOT_NOISE * jax.random.normal(shift, pose.root.shape)
-        positions, turns = places_and_turns(skeleton.offsets.astype(np.float32), skeleton.parents, root, local, ARRAYS)
-        return Pose(root, local, positions, turns, pose.moved)
-
-
-def _small_turns(vectors):
-    """Rotations (..., 3, 3) by rotation vectors (..., 3) in radians (Rodrigues)."""
-    angle = jnp.sqrt(jnp.sum(vectors**2, -1) + 1e-12)[..., None, None]
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    zero = jnp.zeros_like(x)
-    skew = jnp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*vectors.shape[:-1], 3, 3)
-    return jnp.eye(3) + jnp.sin(angle) / angle * skew + (1 - jnp.cos(angle)) / angle**2 * (skew @ skew)
+        vectors = self.config.noise * jax.random.normal(turn, (count, len(joints), 3))
+        every = jnp.zeros((count, len(self.chains.skeleton), 3)).at[:, joints].set(vectors)
+        beside = self.config.noise * ROOT_NOISE * jax.random.normal(shift, pose.root.shape)
+        return disturbed(self.chains, pose, every, jnp.zeros(count), beside, ARRAYS)

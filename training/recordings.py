@@ -16,6 +16,7 @@ from beyond_mocap.synthesis.phase_network.example import Example, describe, pose
 from beyond_mocap.synthesis.phase_network.features import network_input, phase_of
 from beyond_mocap.synthesis.phase_network.kinematics import Pose
 from beyond_mocap.synthesis.phase_network.model import ModelSettings
+from beyond_mocap.synthesis.phase_network.training_set import Steps
 
 
 class Recordings(NamedTuple):
@@ -59,14 +60,18 @@ def _padded(parts: list, longest: int) -> list[np.ndarray]:
     return out
 
 
-def single_steps(name: str, chains: Chains, settings: ModelSettings, recorded: Recordings, reach: dict):
-    """Inputs X (F, in), outputs Y (F, out) and phases (F,) of a network over all frames that have one after them, example
-    by example, float32. reach: of the legs, as `phase_of` takes it."""
+def single_steps(recorded: Recordings) -> Steps:
+    """All frames that have one after them (F, ...), example by example."""
     example = np.concatenate([np.full(length - 1, i) for i, length in enumerate(recorded.lengths)])
     frame = np.concatenate([np.arange(length - 1) for length in recorded.lengths])
     pose, window = recorded.at(example, frame)
-    after, _ = recorded.at(example, frame + 1)
-    x = network_input(name, chains, settings, pose, after, window)
-    y = network_output(name, chains, settings, pose, after)
-    phase = phase_of(name, chains, after, window, reach)
+    return Steps(pose, recorded.at(example, frame + 1)[0], window)
+
+
+def step_arrays(name: str, chains: Chains, settings: ModelSettings, told: Steps, reach: dict):
+    """Inputs X (F, in), outputs Y (F, out) and phases (F,) of a network over steps, float32. reach: of the legs, as
+    `phase_of` takes it."""
+    x = network_input(name, chains, settings, *told)
+    y = network_output(name, chains, settings, told.pose, told.after)
+    phase = phase_of(name, chains, told.after, told.window, reach)
     return x.astype(np.float32), y.astype(np.float32), phase.astype(np.float32)

@@ -208,7 +208,7 @@ def _header_text(arrays: dict[str, np.ndarray]) -> str:
 
 def _settings(row) -> ModelSettings:
     names = [field.name for field in fields(ModelSettings)]
-    check_names(row, "settings", names, [name for name in names if name != "guided"])
+    check_names(row, "settings", names, [name for name in names if name not in ("guided", "carried")])
     return ModelSettings(**row)
 
 

@@ -26,6 +26,8 @@ Where the text leaves something open, this is what was decided:
 - **Guided** (`guided`, ours; §9.3 wished for networks that know inverse kinematics): limbs are also told the rotations
   r by which the limb of frame n, as it hangs on its reference in n + 1, would reach the wanted place (`reached`). The
   network says what it wants with them; nothing is corrected afterwards.
+- **Carried** (`carried`, ours): the hip network is also told where the hips of frame n would be if they went along with
+  hands and feet (`hip_guide.carried`). The ground under the hips as in all that it is told.
 - **Wrist inferred**: no r¹, and the hand's relative rotation joins those of the arm, in input and output.
 - **Phase**: of a leg, that of d in n + 1, which stands in the input; of all others the motion phase of frame n.
 """
@@ -39,6 +41,7 @@ import numpy as np
 from .answers import network_output, origin, predicted
 from .chains import LIMB_OF, Chains
 from .description import Windows
+from .hip_guide import GUIDES, carried
 from .kinematics import Pose, flat, picked, pose_of, six, spread, transposed
 from .limb_reach import bent_limb, hinge_axes
 from .model import SINGLE, ModelSettings
@@ -72,8 +75,10 @@ def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach,
 
 def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
     """(b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (§7.3)."""
-    joints = _joints(chains, settings, pose, chains.hip_sees, xp)
-    return xp.concatenate([*_motion(chains, settings, pose, window, xp), *joints], axis=-1)
+    told = [*_motion(chains, settings, pose, window, xp), *_joints(chains, settings, pose, chains.hip_sees, xp)]
+    if settings.carried:
+        told.append(carried(chains, pose, window, origin(chains, settings, pose), xp))
+    return xp.concatenate(told, axis=-1)
 
 
 def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
@@ -147,7 +152,9 @@ def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, af
 
 
 def guides(name: str, chains: Chains, settings: ModelSettings) -> int:
-    """How many of a network's last inputs are what `reached` says."""
+    """How many of a network's last inputs are what `reached` or, of the hip, `carried` says."""
+    if name == "hip":
+        return GUIDES if settings.carried else 0
     return 6 * len(predicted(name, chains, settings)) if settings.guided and name in LIMB_OF else 0
 
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...errors import InputError
 from . import answers, features, phase_function
-from .chains import chains_of
+from .chains import Chains, chains_of
 from .description import BACK, SAMPLES, STEP, Windows
 from .kinematics import Pose
 from .limb_reach import LimbReach, posed
@@ -42,7 +43,9 @@ class Stepper:
 
     def __init__(self, model: ThrowModel):
         self.model = model
+        """InputError where networks are told other than their settings say."""
         self.chains = chains_of(model.skeleton)
+        _check_widths(model, self.chains)
         self.limits = JointLimits(model.skeleton, _limits_of(model))
         self.effectors = list(self.chains.effectors)
         self.hierarchy = OneFrame(model, self.chains) if model.settings.kind == "hierarchy" else None
@@ -102,6 +105,14 @@ class Stepper:
 def stepper(model: ThrowModel) -> Stepper:
     """The model made ready; kept, as models are asked again and again."""
     return Stepper(model)
+
+
+def _check_widths(model: ThrowModel, chains: Chains) -> None:
+    for name, (inputs, outputs) in features.widths(chains, model.settings).items():
+        network = model.networks[name]
+        if (network.inputs, network.outputs) != (inputs, outputs):
+            found = f"{network.inputs} inputs and {network.outputs} outputs"
+            raise InputError(f"model: network {name}", found, f"{inputs} and {outputs} on this skeleton", "train it again")
 
 
 def _limits_of(model: ThrowModel) -> np.ndarray:

@@ -39,7 +39,8 @@ class ModelSettings:
     the example begins (static, §7.3's capture frame). phase: by travelled distance (§7.4.1) or warped in time (§9.3).
     ik_layer: limbs were trained with their inverse kinematics inside the loss. conditioned: children were trained on
     what their parents predict (§9.4). guided: the networks of limbs are told how inverse kinematics would reach
-    (`features.reached`). fps: frames per second. action: throw or kick.
+    (`features.reached`). carried: the network of the hips is told where hands and feet would carry them
+    (`hip_guide.carried`). fps: frames per second. action: throw or kick.
     """
 
     kind: str = "hierarchy"
@@ -52,6 +53,7 @@ class ModelSettings:
     ik_layer: bool = False
     conditioned: bool = False
     guided: bool = False
+    carried: bool = False
     fps: float = 30.0
     action: str = "throw"
 
@@ -63,7 +65,7 @@ class ModelSettings:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
                 raise InputError(f"model settings: {name}", str(value)[:40], f"a whole number of {least} to {most}")
-        for name in ("ik_layer", "conditioned", "guided"):
+        for name in ("ik_layer", "conditioned", "guided", "carried"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError(f"model settings: {name}", str(getattr(self, name))[:40], "true or false")
         if isinstance(self.fps, bool) or not isinstance(self.fps, (int, float)) or not SLOWEST <= self.fps <= FASTEST:

@@ -8,6 +8,7 @@ import numpy as np
 from .answers import predicted
 from .chains import HIERARCHY, LIMB_OF, Chains
 from .description import Windows
+from .hip_guide import carried
 from .kinematics import Pose
 from .limb_reach import LimbReach
 from .model import ThrowModel
@@ -27,6 +28,7 @@ class OneFrame:
         settings = model.settings
         self.chains, self.points = chains, settings.points
         self.static, self.given = settings.frame == "static", settings.wrist == "given"
+        self.carried = settings.carried
         self.networks = [model.networks[name].frame for name in HIERARCHY]
         self.bounds = [model.networks[name].bounds for name in HIERARCHY]
         self.reach = [model.leg_reach[name[:-4]] for name in LIMB_OF[2:]]
@@ -68,7 +70,8 @@ class OneFrame:
         start = pose.positions[self.chains.hips] * (0.0 if self.static else _GROUND)
         trajectories = np.concatenate([window.points - start, window.deltas], axis=1)
         places = pose.positions[self.hip_sees] - start
-        return _row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_sees])
+        guide = [carried(self.chains, pose, window, start)] if self.carried else []
+        return _row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_sees], *guide)
 
     def _hips(self, after: Pose, y: np.ndarray, pose: Pose) -> Pose:
         """The body with its hips where the first network says; joints above them only move."""

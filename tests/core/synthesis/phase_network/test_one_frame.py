@@ -93,6 +93,7 @@ def test_one_pose_at_once_is_the_same_kinematics(plain_and_dressed, which):
 @pytest.mark.parametrize("settings", [
     {}, {"wrist": "inferred"}, {"frame": "static"}, {"points": 1}, {"wrist": "inferred", "frame": "static", "points": 5},
     {"guided": True}, {"guided": True, "wrist": "inferred"},
+    {"carried": True}, {"carried": True, "frame": "static"},
 ])
 def test_it_says_what_the_plain_functions_say(plain_and_dressed, which, settings):
     example = plain_and_dressed[which]
