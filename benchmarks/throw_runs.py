@@ -154,9 +154,15 @@ def work_off(
 ) -> int:
     """Works off what is not done; how many are left. kept: folder of the results. do: gets a run, returns what it found.
     until: seconds of the clock (`time.time`) after which no further run is begun."""
-    done = {key: one.get("stamp") for key, one in throw_results.read(kept, scale.name).items()}
-    left = [run for run in todo if done.get(run.key) != run.stamp(scale)]
+
+    def is_done(run: Run) -> bool:  # asked for each anew: another process may work off the same queue from its other end
+        found = throw_results.read(kept, scale.name).get(run.key)
+        return found is not None and found.get("stamp") == run.stamp(scale)
+
+    left = [run for run in todo if not is_done(run)]
     for order, run in enumerate(left):
+        if is_done(run):
+            continue
         if time.time() >= until:
             told(f"{len(left) - order} of {len(todo)} runs are left; the same command goes on")
             return len(left) - order
