@@ -17,7 +17,8 @@ from pathlib import Path
 from benchmarks import throw_results
 
 HIS = {"conditioned": False, "ik_layer": False, "rollout": 1, "frame": "static", "phase": "distance", "noise": 0.0,
-       "linear_start": False, "guided": False, "learning_rate": 3e-4, "l1": 0.01, "limb_weight": 50.0, "body_weight": 33.0}
+       "linear_start": False, "guided": False, "carried": False, "learning_rate": 3e-4, "l1": 0.01, "limb_weight": 50.0,
+       "body_weight": 33.0}
 """What all of his models have in common (§7). He names no learning rate."""
 FED = {"conditioned": True, "batch": 128, "rollout": 4, "noise": 0.02, "keep": 1.0, "learning_rate": 1e-3}
 """What keeps a network that is given its own answers on the road: they are fed back in training too, from poses that are
@@ -72,8 +73,9 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
     first = {**HIS, **dropped, "wrist": "inferred"}
     second = {**HIS, **dropped, "wrist": "given"}
     single = {**first, **many, "kind": "single"}
-    ours = {**few, **again, **FED, "guided": True, "linear_start": True, "ridge": 0.0, "rollout": 8, "learning_rate": 1e-4,
-            "noise": 0.02, "frame": "hip", "wrist": "given", "units": max(scale.units, LEAST)}
+    ours = {**FED, **_long(scale.epochs // 2, scale.fed and scale.fed // 2), "guided": True, "carried": True,
+            "linear_start": True, "ridge": 0.0, "start_noise": 0.07, "rollout": 8, "learning_rate": 1e-4, "frame": "hip",
+            "wrist": "given", "units": max(scale.units, LEAST)}
     shipped = {**ours, "epochs": 0, "steps": None, "units": LEAST}
     plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1, "guided": False, "carried": False}
     return (
