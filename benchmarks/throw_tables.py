@@ -96,7 +96,7 @@ def overview(found: Found, data: str, scale: Scale) -> list[str]:
     """One row per variant: means over its models."""
     lines = markdown.head([
         "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "as a body, cm", "bodies lost", "impact, m", "head, °", "head turns",
-        "jerk", "beyond limits", "s for one", "parameters", "units x layers", "steps of frames", "minutes to train", "models",
+        "jerk", "beyond limits", "parameters", "units x layers", "steps of frames", "models",
     ])  # fmt: skip
     for variant in variants(scale):
         done = list(of_variant(found, data, variant.name).values())
@@ -111,13 +111,12 @@ def _figures(done: Sequence[Mapping]) -> list[str]:
     every = [each for one in done for each, gone in zip(one["each"], lost_ones(deviations(one))) if not gone]
     deviation, alone, body = (100.0 * np.array([each[key] for each in every]).reshape(-1, 4)
                               for key in ("deviation", "network", "body"))
-    trained = [one["training"]["minutes"] for one in done if "minutes" in one["training"]]
     return [
         *(_mean(column, ".1f") for column in deviation.T), _mean(alone, ".1f"), _mean(body, ".1f"),
         f"{int(lost.sum())} of {len(lost)}", _mean([one["impact"] for one in every], ".2f"),
         *(_mean([each[key] for each in every], form) for key, form in (
-            ("head", ".1f"), ("head_share", ".2f"), ("jerk", ".2f"), ("beyond", ".3f"), ("seconds", ".2f"))),
-        f"{int(np.mean([one['parameters'] for one in done])):,}", *_trained(done), _mean(trained, ".1f"), str(len(done)),
+            ("head", ".1f"), ("head_share", ".2f"), ("jerk", ".2f"), ("beyond", ".3f"))),
+        f"{int(np.mean([one['parameters'] for one in done])):,}", *_trained(done), str(len(done)),
     ]  # fmt: skip
 
 
@@ -125,8 +124,9 @@ def _trained(done: Sequence[Mapping]) -> tuple[str, str]:
     """Sizes of the networks, and how many steps of how many frames they were trained; maps are not."""
     told = done[0]["training"]
     steps = sorted({one["training"]["steps"] for one in done})
-    size = f"{told['units']} x {told['layers']}" if told["units"] and told["steps"] else "-"
-    return size, f"{'–'.join(f'{n:,}' for n in {steps[0]: 0, steps[-1]: 0})} of {told['batch']}" if steps[-1] else "none"
+    size = f"{told['units']} x {told['layers']}" if told["steps"] else "-"
+    least_and_most = " to ".join(f"{count:,}" for count in dict.fromkeys((steps[0], steps[-1])))
+    return size, f"{least_and_most} of {told['batch']}" if steps[-1] else "none"
 
 
 def _mean(values, form: str) -> str:
