@@ -35,19 +35,21 @@ def beside(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path]:
 
 @contextlib.contextmanager
 def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
-    """A new folder beside `path` to write to, as `beside`: it becomes `path` when the block ends well, and is gone with
-    all that is in it when it does not. Folders above are made. InputError where `path` is there and not empty, or cannot
-    be written."""
-    path = Path(os.path.abspath(path))  # "." and "..", which have no name to stand beside
-    part = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.part")
+    """A hidden folder in `path`, which has to be new or empty, to write to. All that is in it moves up into `path` when
+    the block ends well, and is gone, with `path` where it was new, when it does not. Folders above are made. InputError
+    where `path` has files, of another run too, or cannot be written."""
+    path = Path(path)
+    part, new = path / f".{os.getpid()}.{threading.get_ident()}.part", not path.exists()
+    if not new and not path.is_dir():
+        raise InputError(path, "a file", "an empty or a new folder", "choose another place")
+    if not new and (found := next(path.iterdir(), None)):
+        what = f"a folder that is not empty ({found.name})"
+        raise InputError(path, what, "an empty or a new one", "choose another place")
     try:
-        _check_free(path)
         part.mkdir(parents=True)
         yield part
-        _check_free(path)
-        with contextlib.suppress(FileNotFoundError):
-            path.rmdir()
-        os.replace(part, path)
+        for one in sorted(part.iterdir()):
+            os.replace(one, path / one.name)
     except OSError as error:
         found = f"cannot be written ({error.strerror or error})"
         raise InputError(path, found, "a folder that can be written", "choose another place") from None
@@ -56,14 +58,9 @@ def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
         raise InputError(where, rest) from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
-
-
-def _check_free(path: Path) -> None:
-    """InputError where a place is taken."""
-    if path.is_dir() and any(path.iterdir()):
-        raise InputError(path, "a folder that is not empty", "an empty or a new one", "choose another place")
-    if path.exists() and not path.is_dir():
-        raise InputError(path, "a file", "an empty or a new folder", "choose another place")
+        if new:
+            with contextlib.suppress(OSError):  # not empty: all is well
+                path.rmdir()
 
 
 def atomic_write(path: str | os.PathLike, content: str | bytes) -> None:

@@ -90,16 +90,17 @@ def full(path, motion):
     raise InputError(path, "cannot be written (No space left on device)", "a folder that can be written")
 
 
-def test_an_empty_folder_is_filled_unless_somebody_else_was_first(tmp_path):
+def test_an_empty_folder_is_filled_by_one_run(tmp_path):
     assert write_planted(tmp_path / "a" / "new", "throw", 1, 1) == 1
     (tmp_path / "empty").mkdir()
-    assert write_planted(tmp_path / "empty", "throw", 1, 1) == 1 and (tmp_path / "empty" / "throws.csv").is_file()
 
-    def other(share, text):  # writes into the same folder meanwhile
-        (tmp_path / "late").mkdir()
-        (tmp_path / "late" / "throws.csv").write_text("of another run")
+    def other(share, text):  # a second run into the same folder
+        with pytest.raises(InputError, match="not empty"):
+            write_planted(tmp_path / "empty", "throw", 1, 1)
 
-    with pytest.raises(InputError, match="not empty"):
-        write_planted(tmp_path / "late", "throw", 1, 1, progress=other)
-    assert [path.name for path in (tmp_path / "late").iterdir()] == ["throws.csv"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "empty", "late"]
+    assert write_planted(tmp_path / "empty", "throw", 1, 1, progress=other) == 1
+    for place in (tmp_path / "a" / "new", tmp_path / "empty"):
+        assert sorted(path.name for path in place.iterdir()) == ["adult", "throws.csv"]
+    with pytest.raises(Cancelled):
+        write_planted(tmp_path / "a" / "other", "throw", 1, 1, cancelled=lambda: True)
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["new"]
