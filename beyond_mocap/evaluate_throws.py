@@ -47,12 +47,13 @@ class ThrowFigures:
     name, subject: the example's. deviation (4,) m: mean distance of wrists and toes from where they were wanted, of the
     motion as it comes out. network (4,) m: the same of what the networks said in each frame, before anything corrected
     it. body (4,) m: as deviation, but of a body with bones of constant length also where the joints of a single network
-    float, which `deviation` follows as his tables do. impact m: from where the ball of the generated motion crosses a wall 4 m from the thrower (§8.2), or meets the
-    ground before, to where the ball of the wanted one does; NaN without a hand that throws. far_impact m: the same where
-    its target is. own_impact m: there, from the wanted ball to the target, which tells what scaling does to a flight. head: degrees between the head's rotations. head_share: how much the
-    head turns against the chest, over how much the example's does. jerk: the 99th percentile of it over the example's.
-    bones m: how much the longest-changing bone changes. beyond: share of rotations beyond the joints' limits, NaN
-    where the model knows none. seconds: that it took, of `duration` s.
+    float, which `deviation` follows as his tables do. impact m: from where the ball of the generated motion crosses a
+    wall 4 m from the thrower (§8.2), or meets the ground before, to where the ball of the wanted one does; NaN without
+    a hand that throws. far_impact m: the same where its target is. own_impact m: there, from the wanted ball to the
+    target, which tells what scaling does to a flight. head: degrees between the heads' rotations. head_share: how much
+    the head turns against the chest, over how much the example's does. jerk: the 99th percentile of it over the
+    example's. bones m: by how much the bone that changes most changes. beyond: share of rotations beyond the joints'
+    limits, NaN where the model knows none. seconds: that it took, of `duration` s.
     """
 
     name: str
@@ -106,8 +107,8 @@ class Evaluated:
         whole = [one for one, gone in zip(self.motions, lost, strict=True) if not gone]
         inside = kept(self.impact[~lost])
         return {
-            "options": asdict(self.options), "left_out": list(self.left_out), "motions": len(self.motions), "lost": int(lost.sum()),
-            "subjects": sorted({one.subject for one in self.motions}),
+            "options": asdict(self.options), "left_out": list(self.left_out), "motions": len(self.motions),
+            "lost": int(lost.sum()), "subjects": sorted({one.subject for one in self.motions}),
             "deviation_m": dict(zip(EFFECTORS, _means(self.deviation[~lost]), strict=True)),
             "network_deviation_m": dict(zip(EFFECTORS, _means(self.network[~lost]), strict=True)),
             "body_deviation_m": dict(zip(EFFECTORS, _means(self.body[~lost]), strict=True)),

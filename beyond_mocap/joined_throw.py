@@ -90,9 +90,8 @@ _usual: weakref.WeakKeyDictionary[Library, dict] = weakref.WeakKeyDictionary()
 
 @dataclass(frozen=True, eq=False)
 class RunUp:
-    """A player's motion around a throw, on the throw's own skeleton. start:
-    seconds of its first frame on the track's clock. seams: frames that begin another clip. warnings: lines for
-    people."""
+    """A player's motion around a throw, on the throw's own skeleton. start: seconds of its first frame on the track's
+    clock. seams: frames that begin another clip. warnings: lines for people."""
 
     motion: Motion
     start: float
@@ -211,7 +210,7 @@ def run_up_and_recovery(
     plain, told = _led(plan, throw, release, at, action)
     size = size_of(plan, library.skeleton)
     bones = library.skeleton.scaled(size)
-    same = _same(throw.skeleton, bones)
+    same = throw.skeleton.same_bones(bones, 1e-5)
     own = throw if same else Retargeter(throw, bones, keeps_travel=True).carry(throw)
     own = Motion(library.skeleton, own.root_positions / size, own.rotations, own.fps)
     plain = in_library_size(plain, size)
@@ -493,7 +492,7 @@ def _led(plan: Plan, throw: Motion, release: float, at: float, action: str) -> t
     if plan.pins:
         told.append("the plan's pins count for nothing beside a throw")
     track = led_through(plan, throw, release, at)
-    return replace(plan, track=track, timeline=asked, pins=(), made=plan.made, method="path"), told
+    return replace(plan, track=track, timeline=asked, pins=(), method="path"), told
 
 
 def _asked(timeline: Timeline, begin: float, finish: float, at: float, words) -> tuple[Timeline, list[str]]:
@@ -601,8 +600,3 @@ def _told(before: float, begin: float, turned: float, moved: np.ndarray, end: fl
             (end, end),
         ))  # fmt: skip
     return tuple(told)
-
-
-def _same(a: Skeleton, b: Skeleton) -> bool:
-    """Whether two skeletons are one."""
-    return a.names == b.names and a.parents == b.parents and np.allclose(a.offsets, b.offsets, atol=1e-5)

@@ -93,8 +93,13 @@ class Order:
             raise InputError("speed", f"{self.speed:g} m/s", "more than 0")
         if self.seed < 0:
             raise InputError("seed", str(self.seed)[:40], "0 or more")
-        if sum(value is not None for value in (self.start, self.over, self.ball_place)) > 1:
+        given = [value for value in (self.start, self.over, self.ball_place) if value is not None]
+        if len(given) > 1:
             raise InputError("throw", "several places", "one of start, over and ball_place")
+        if any(len(value) not in (2, 3) or not np.all(np.isfinite(value)) for value in given):
+            raise InputError("throw", f"a place {given[0]}"[:60], "x, y or x, y, z in metres")
+        if self.fps is not None and not 0.0 < self.fps < np.inf:
+            raise InputError("fps", f"{self.fps:g}", "more than 0 frames a second")
         if self.ball_place is not None and self.limb is not None and self.limb.endswith("hand"):
             raise InputError("throw", "a place where the ball lies", "a foot that kicks it")
 
@@ -108,10 +113,11 @@ class Thrown:
     the ball at the motion's rate, carried or lying, then in flight, beyond the motion's end until it is past its
     target. launch, flight. target, impact: (3,) m. moved: m that the wrist or ankle was moved at most, by shift (T,
     3) m. turned rad, pace, later s, elsewhere m: how else the motion was changed (see `Corrected`). slowest: m/s
-    below which no ball gets there. generated: the motion before the correction, where it was; generated_release: s in
-    it; raw_deviation: m that hands and feet were off their wanted ways before any inverse kinematics, on average.
+    below which no ball gets there. asked_speed: m/s wished for, without a wish what came. raw_deviation: m that hands
+    and feet were off their wanted ways before any inverse kinematics, on average.
     beyond: rad that a joint of the corrected limb is beyond the model's limits at most, which is nothing but what other
-    bones or another rate have made of it before anything was corrected. examples: names and weights of what it was planned from. warnings: lines for people.
+    bones or another rate have made of it before anything was corrected. examples: names and weights of what it was
+    planned from. warnings: lines for people.
     """
 
     motion: Motion
@@ -133,8 +139,6 @@ class Thrown:
     elsewhere: float
     slowest: float
     asked_speed: float
-    generated: Motion
-    generated_release: float
     raw_deviation: float
     beyond: float
     examples: tuple[tuple[str, float], ...]
@@ -252,7 +256,7 @@ class _Work:
         """InputError for limbs, actions and speeds that cannot be."""
         name, what = EFFECTORS[self.limb], self.model.settings.action
         if name.endswith("foot") != self.kicks:
-            raise InputError("throw", f"a {what} with the {name.replace('_', ' ')}", f"a model trained for it",
+            raise InputError("throw", f"a {what} with the {name.replace('_', ' ')}", "a model trained for it",
                              f"this one was trained for {what}s: give another model")  # fmt: skip
         body = identify(self.skeleton)
         limb = getattr(body, name.split("_")[0])
@@ -436,7 +440,7 @@ class _Work:
             found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
             ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
             found.moved, found.shift, found.turned, found.pace, found.later, found.elsewhere, self.arcs.slowest,
-            self.order.speed or float(np.linalg.norm(found.velocity)), motion, release, raw, beyond,
+            self.order.speed or float(np.linalg.norm(found.velocity)), raw, beyond,
             tuple(zip(plan.names, map(float, plan.weights))), tuple(self.warnings),
         )  # fmt: skip
 

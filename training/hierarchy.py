@@ -35,7 +35,7 @@ ROOT_NOISE = 0.3
 """Metres by which the root is off at the start of a stretch, for each radian of noise."""
 
 IK_SHARE = 0.5
-"""How much of the way the layer of inverse kinematics brings a limb, as `generate.Options.share` has it."""
+"""How much of the way the layer of inverse kinematics brings a limb; in use it is `generate.Options.share`, more."""
 
 
 class Networks:

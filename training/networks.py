@@ -1,4 +1,4 @@
-"""The networks as jax trains them: first weights, and to and from what use has (`PhaseNetwork`)."""
+"""The networks as jax trains them: first weights, and what use has of them (`PhaseNetwork`)."""
 
 from __future__ import annotations
 
@@ -126,10 +126,3 @@ def to_use(params: dict, scales: dict) -> PhaseNetwork:
     """The trained network for use; scales: input_mean, input_scale, output_mean, output_scale."""
     arrays = {name: tuple(np.asarray(one) for one in params[name]) for name in ("weights", "biases")}
     return PhaseNetwork(**arrays, **{name: np.asarray(value) for name, value in scales.items()})
-
-
-def from_use(network: PhaseNetwork) -> tuple[dict, dict]:
-    """Parameters and scales of a trained network, to go on from."""
-    params = {name: [jnp.asarray(one) for one in getattr(network, name)] for name in ("weights", "biases")}
-    names = ("input_mean", "input_scale", "output_mean", "output_scale")
-    return params, {name: np.asarray(getattr(network, name)) for name in names}

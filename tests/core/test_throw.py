@@ -133,7 +133,7 @@ def test_refuses_what_cannot_be(model, order, says):
 @pytest.mark.parametrize("wrong", [
     {"target": (1.0, 2.0)}, {"target": (1.0, np.nan, 0.0)}, {"limb": "tail"}, {"ball": "pebble"}, {"speed": -1.0},
     {"start": (0.0, 0.0), "over": (0.0, 0.0)}, {"limb": "left_hand", "ball_place": (0.0, 0.0)},
-    {"seed": -1},
+    {"seed": -1}, {"start": (1.0,)}, {"over": (np.nan, 0.0)}, {"ball_place": (0.0, np.inf)}, {"fps": -30.0},
 ])
 def test_refuses_orders_that_say_nothing(wrong):
     with pytest.raises(InputError):

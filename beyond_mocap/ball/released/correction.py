@@ -321,7 +321,6 @@ class _Search:
             spread[0] = spread[0] - away[:, None]
         there, gap, speed = self._arrives(
             *(value + np.tensordot(nudge[:, :6], part, 1) for value, part in zip(spread, follows)), nudge[:, 6],
-           
             nudge[:, 7] / (1.0 + now.pace), rest, now.seconds + nudge[:, -1],
         )  # fmt: skip
         missing = np.concatenate([there - self.target, gap], axis=1).reshape(count, each, -1)

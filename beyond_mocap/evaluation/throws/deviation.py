@@ -9,4 +9,3 @@ def deviations(generated: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """(4,) m of one motion: mean distance over its frames; both (T, 4, 3) m in one frame of reference, the effectors
     in the order left hand, right hand, left foot, right foot."""
     return np.linalg.norm(np.asarray(generated, float) - np.asarray(wanted, float), axis=-1).mean(axis=0)
-

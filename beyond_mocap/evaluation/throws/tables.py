@@ -32,9 +32,8 @@ def test_table(new: Subjects, old: Subjects, his: fredriksson.Printed | None = N
     found = comparisons(new, old)
     both = [name for name in new.subjects if name in old.subjects]
     lines = _head(["trained on", *_COLUMNS])
-    for row, subject in enumerate(both):
-        lines.append(_row([subject, *[_signed(one.differences[row] if row < len(one.differences) else np.nan)
-                                      for one in found]]))
+    for subject in both:
+        lines.append(_row([subject, *map(_signed, _row_of(new, subject) - _row_of(old, subject))]))
     lines += [
         _row(["avg.", *[_signed(one.mean) for one in found]]), _row(["stdev.", *_numbers([one.spread for one in found])]),
         _row(["Shapiro-Wilk p", *[_p(one.normal) for one in found]]), _row(["p", *[_told(one) for one in found]]),
@@ -57,6 +56,11 @@ def verdicts(new: Subjects, old: Subjects) -> list[str]:
         lines.append(f"normality is rejected for {', '.join(ranks)}: signed ranks, whose p is at least "
                      f"{max(one.least_p for _, one in found):.4f} with so few subjects")
     return lines
+
+
+def _row_of(way: Subjects, subject: str) -> np.ndarray:
+    """(5,) m."""
+    return way.figures[way.subjects.index(subject)]
 
 
 def _told(one: Comparison) -> str:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...errors import InputError
 from ...motion.skeleton import frozen_array
-from .chains import EFFECTORS
 from .phases import motion_phase, warped_phase
 
 STEP = 0.1
@@ -25,7 +24,7 @@ class Description:
     ground at the origin, +X from there to the impact.
 
     effectors: (T, 4, 3) m, places of left and right wrist, left and right toe. hands: (T, 2, 3, 3), rotations of the
-    hand joints in the world, or None. limb: which of `EFFECTORS` throws or kicks. release: fractional frame at which
+    hand joints in the world, or None. limb: which of `chains.EFFECTORS` throws or kicks. release: fractional frame at which
     the ball leaves it. impact: (3,) m, what the ball is to hit. fps: frames per second. before (B, 4, 3), after (A,
     4, 3): places of the effectors in the frames beyond both ends, where they are known; else they are taken to keep
     still.
@@ -56,11 +55,6 @@ class Description:
 
     def __len__(self) -> int:
         return len(self.effectors)
-
-    @property
-    def limb_name(self) -> str:
-        """The limb that throws or kicks."""
-        return EFFECTORS[self.limb]
 
 
 class Windows(NamedTuple):

@@ -42,8 +42,8 @@ class Stepper:
     """A model made ready to say one frame after the other."""
 
     def __init__(self, model: ThrowModel):
-        self.model = model
         """InputError where networks are told other than their settings say."""
+        self.model = model
         self.chains = chains_of(model.skeleton)
         _check_widths(model, self.chains)
         self.limits = JointLimits(model.skeleton, _limits_of(model))

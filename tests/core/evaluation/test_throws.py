@@ -129,6 +129,17 @@ def test_a_made_throw_hits_what_it_was_aimed_at():
     assert np.linalg.norm(found - (4.0, 0.3, 1.2)) < 0.05
 
 
+def test_each_difference_stands_in_its_own_subjects_row():
+    ways = []
+    for name, off in (("new", 0.0), ("old", 0.01)):
+        rows = [(who, np.full((12, 4), 0.1 * k + off), np.full(12, np.nan)) for k, who in enumerate("abc", 1)]
+        ways.append(gathered(name, [("a", np.full((12, 4), 9.0), np.full(12, np.nan)), *rows[1:]]))
+    rows = {line.split(" | ")[0].strip("| "): line for line in rows_of_tests(*ways)}
+    assert "| - | - | - | - | - |" in rows["a"]  # lost all its bodies
+    assert "-0.0100 | -0.0100 | -0.0100 | -0.0100 | - |" in rows["b"]
+    assert "-0.0100" in rows["c"] and "-0.0100" in rows["avg."]
+
+
 def test_tables_are_written():
     rng = np.random.default_rng(1)
     rows = [(name, rng.uniform(0.02, 0.05, (20, 4)), np.append(rng.uniform(0.5, 1.0, 19), 50.0)) for name in "abcd"]
