@@ -4,28 +4,14 @@ import shutil
 import time
 
 import bpy
-from tab import PICTURES, TAB, moves, output, room, run, sample, settings, window, within
+from tab import PICTURES, TAB, moves, output, press, room, run, sample, settings, settled, until, window, within
 from window import unfold
 
-LIMIT = 900
 
 
 def listing():
     """The list of clips."""
     return bpy.context.window_manager.beyond_mocap_clips
-
-
-def until(true, limit=180.0, what=""):
-    """Wait until something is true."""
-    start = time.monotonic()
-    while not true():
-        assert time.monotonic() - start < limit, f"not so after {limit} s {what}"
-        yield 0.05
-
-
-def idle():
-    """Nothing runs."""
-    return not window.window.modal_operators
 
 
 def opened(name="library"):
@@ -50,20 +36,21 @@ def unfolded():
 def check_the_list_and_its_buttons():
     folder = yield from opened()
     run("beyond_mocap.build_library")
-    yield from until(lambda: idle() and listing().total)
-    assert listing().total == 43 and not listing().missing
+    yield from settled()
+    yield from until(lambda: listing().total == 43 and not listing().missing, what=lambda: listing().total)
     fold = unfolded()
     yield from drawn()
     window.picture(PICTURES / "library-list.png")
     listing().find = "kick"
-    yield 1.0
+    yield from drawn()
     window.picture(PICTURES / "library-found.png")
     yield from press("import_clip")
-    assert bpy.context.object.name.startswith("kick") and moves(bpy.context.object), bpy.context.object
+    yield from until(lambda: bpy.context.object and bpy.context.object.name.startswith("kick"), what=lambda: bpy.context.object)
+    assert moves(bpy.context.object), bpy.context.object
     window.picture(PICTURES / "library-imported.png")
     shutil.move(folder, folder.with_name("library-moved"))
     settings().library_watch = True
-    yield from until(lambda: listing().missing, 60.0, "the folder is gone")
+    yield from until(lambda: listing().missing, what="the folder is gone")
     yield from drawn()
     window.picture(PICTURES / "library-missing.png")
     fold()
@@ -77,19 +64,6 @@ def drawn():
         yield 0.2
 
 
-def press(operator):
-    """Find one button of the operator, from below, and press it."""
-    area = window.area("VIEW_3D")
-    region = window.sidebar(area)
-    for y in range(region.y + 8, region.y + region.height, 12):
-        place = region.x + int(region.width * 0.4), y
-        if operator in (yield from window.points_at(area, region, place)):
-            yield from window.click(*place)
-            yield 0.8
-            return
-    raise AssertionError(f"no button {operator}")
-
-
 def check_news_are_told_and_nothing_is_built():
     folder = yield from opened("watched")
     run("beyond_mocap.build_library", "EXEC_DEFAULT")
@@ -97,7 +71,7 @@ def check_news_are_told_and_nothing_is_built():
     yield 1.0
     for number in range(3):
         shutil.copy(folder / "walking_1_2.bvh", folder / f"new_{number}.bvh")
-    yield from until(lambda: listing().news == "3 new clips", 60.0, "3 new clips")  # the folder may be read between two
+    yield from until(lambda: listing().news == "3 new clips", what=lambda: listing().news)  # it may be read between two
     assert listing().total == 43, listing().total
     yield 0.5
     window.picture(PICTURES / "library-news.png")
@@ -112,7 +86,8 @@ def check_ten_thousand_files_do_not_freeze_the_window():
     yield 2.0
     start = time.perf_counter()
     run("beyond_mocap.list_clips")
-    yield from until(lambda: idle() and listing().total > 10000)
+    yield from settled()
+    yield from until(lambda: listing().total > 10000, what=lambda: listing().total)
     output.say(f"     listed {listing().total} clips in {time.perf_counter() - start:.2f} s")
     settings().library_watch = True
     fold, spent = unfolded(), []
@@ -151,7 +126,8 @@ def check_clips_of_other_forms_are_converted():
     (folder / "broken.fbx").write_bytes(b"no such thing")
     yield 0.5
     run("beyond_mocap.build_library")
-    yield from until(lambda: idle() and listing().total, 240.0, "the build")
+    yield from settled()
+    yield from until(lambda: listing().total)
     paths = [clip.path for clip in listing().shown]
     assert "walking_1_2.fbx" in paths and "jogging_2_9.glb" in paths and "broken.fbx" not in paths, paths
     assert window.window.scene.name != "Import" and "Import" not in bpy.data.scenes
@@ -183,8 +159,7 @@ def check_dropped_files():
     folder = yield from opened("dropped")
     yield from window.move(700, 400)
     drop(folder, "walking_1_2.bvh")
-    yield 1.0
-    assert bpy.context.object.name.startswith("walking_1_2")
+    yield from until(lambda: bpy.context.object and bpy.context.object.name.startswith("walking_1_2"))
     glb(folder / "dropped")
     count = len(bpy.data.objects)
     drop(folder, "dropped.glb")
@@ -197,10 +172,12 @@ def check_dropped_files():
     words = folder / "words.txt"
     words.write_text("1 2 running\n")
     drop(folder, "words.txt")
-    yield 1.0
-    player = settings().players[settings().active_player]
-    timeline = room("scene.strips").read(player, window.window.scene)
-    assert [span.words for span in timeline.spans] == [("running",)], timeline
+
+    def spans():
+        player = settings().players[settings().active_player]
+        return [span.words for span in room("scene.strips").read(player, window.window.scene).spans]
+
+    yield from until(lambda: spans() == [("running",)], what=spans)
 
 
 def check_a_clip_is_annotated():
@@ -208,7 +185,9 @@ def check_a_clip_is_annotated():
     (folder / "kick_low_top.txt").unlink()
     run("beyond_mocap.list_clips", "EXEC_DEFAULT")
     run("beyond_mocap.annotate_clip", path="kick_low_top.bvh")
+    yield from settled()
     run("beyond_mocap.propose_words")
+    yield from settled()
     rig = bpy.context.object
     area = window.area("PROPERTIES")
     kind, area.type = area.type, "NLA_EDITOR"
@@ -220,7 +199,8 @@ def check_a_clip_is_annotated():
     yield from drawn()
     window.picture(PICTURES / "library-annotated.png")
     yield from press("save_words")
-    assert (folder / "kick_low_top.txt").is_file()
+    yield from until((folder / "kick_low_top.txt").is_file)
+    yield from settled()
     assert "kick right" in (folder / "kick_low_top.txt").read_text()
     before = (folder / "kick_low_top.txt").read_text()
     run("beyond_mocap.propose_words", least=0.9)
@@ -243,7 +223,8 @@ def check_assets_have_pictures():
     run("beyond_mocap.list_clips", "EXEC_DEFAULT")
     listing().find = "kick"
     run("beyond_mocap.make_assets", which="SHOWN")
-    yield from until(lambda: idle() and len([a for a in bpy.data.actions if a.asset_data]) == 3)
+    yield from settled()
+    yield from until(lambda: len([a for a in bpy.data.actions if a.asset_data]) == 3)
     listing().find = ""
     area = window.area("VIEW_3D")
     area.ui_type = "ASSETS"

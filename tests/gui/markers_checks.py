@@ -4,10 +4,9 @@ import time
 
 import bpy
 import mathutils
-from ball_checks import choose, press, thing, until
-from tab import PICTURES, assert_no_trouble_since, output, room, run, sample, wait_for_work, window
+from ball_checks import choose, thing
+from tab import PICTURES, assert_no_trouble_since, output, press, room, run, sample, settled, until, wait_for_work, window
 
-LIMIT = 500
 MARKERS = "BEYOND_MOCAP_PT_markers"
 
 
@@ -44,7 +43,8 @@ def check_a_dropped_recording_becomes_a_cloud_that_plays():
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
     run("wm.drop_import_file", directory=f"{sample() / 'markers'}/", files=[{"name": "throw.c3d"}])
-    yield 0.5
+    yield from until(lambda: "throw" in bpy.data.objects)
+    yield from settled()
     look(16)
     assert len(cloud().labels) == 46 and cloud().set_name == "driveline"
     graph = bpy.context.evaluated_depsgraph_get()
@@ -78,7 +78,7 @@ def check_escape_leaves_everything_as_it_was():
     mark, before = len(output.text()), len(bpy.data.objects)
     back = yield from own_tab()
     yield from press("reconstruct_markers")
-    yield from until(lambda: bpy.context.window_manager.beyond_mocap_work.kind == "reconstruct markers", 10.0)
+    yield from until(lambda: bpy.context.window_manager.beyond_mocap_work.kind == "reconstruct markers")
     yield from window.press("ESC")
     yield from wait_for_work()
     assert len(bpy.data.objects) == before and not cloud().figures
@@ -91,7 +91,8 @@ def check_a_body_is_reconstructed_by_its_button():
     back = yield from own_tab()
     start = time.monotonic()
     yield from press("reconstruct_markers")
-    yield from until(lambda: cloud().figures, 240.0)
+    yield from until(lambda: cloud().figures)
+    yield from settled()
     output.say(f"     {time.monotonic() - start:.1f} s; {' ; '.join(cloud().figures.splitlines())}")
     body = cloud().body
     look(10)

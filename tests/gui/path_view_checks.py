@@ -3,10 +3,9 @@
 import time
 
 import bpy
-from tab import PICTURES, TAB, output, room, run, sample, window, within
+from tab import PICTURES, TAB, output, room, run, sample, settled, until, window, within
 from window import Stand, unfold
 
-LIMIT = 500
 SWITCHES = ("path_source", "path_new", "path_trackers", "path_residuals", "path_ghost")
 
 
@@ -18,7 +17,7 @@ def a_rider():
     bpy.ops.beyond_mocap.edit_path(kind="NURBS", count=8)
     for name in SWITCHES:
         setattr(bpy.context.scene.beyond_mocap.view, name, True)
-    yield 0.5
+    yield from settled()
 
 
 def redrawn(count):
@@ -137,10 +136,7 @@ def check_the_panel_is_quick():
 
 def check_figures_come_when_the_curve_is_at_rest():
     yield from a_rider()
-    for _ in range(60):
-        if "skate" in rider().beyond_mocap_ride.figures:
-            break
-        yield 0.25
+    yield from until(lambda: "skate" in rider().beyond_mocap_ride.figures)
     told = room("scene.ride.figure_lines").lines(rider().beyond_mocap_ride.figures)
     output.say("     " + "; ".join(line.replace("\t", " ") for line in told.splitlines()))
     assert "Feet slide" in told and "Off the path" in told
@@ -161,15 +157,17 @@ def check_keys_flick_through_the_cameras_and_back():
         before, seen = [list(row) for row in view.view_matrix], []
         for key in ("J", "NUMPAD_0", "J", "NUMPAD_0"):
             yield from window.press(key, shift=True)
-            yield 0.3
+            yield 0.3  # the view glides
             assert view.view_perspective == "CAMERA"
             seen.append(scene.camera.get("beyond_mocap_path_camera"))
         assert seen == list(kinds), seen
         yield from window.press("J", shift=True)
-        yield 0.5
-        assert scene.camera == own and view.view_perspective == perspective
-        apart = max(abs(a - b) for row, old in zip(view.view_matrix, before) for a, b in zip(row, old))
-        assert apart < 1e-4, f"{perspective}: the view came back elsewhere, by {apart}"
+
+        def apart():
+            return max(abs(a - b) for row, old in zip(view.view_matrix, before) for a, b in zip(row, old))
+
+        yield from until(lambda: scene.camera == own and view.view_perspective == perspective, 60.0)
+        yield from until(lambda: apart() < 1e-4, 60.0, lambda: f"{perspective}: the view came back elsewhere, by {apart()}")
 
 
 def check_keys_nudge_and_the_rider_follows():
@@ -184,14 +182,15 @@ def check_keys_nudge_and_the_rider_follows():
     yield 0.5
     riders, frame = room("scene.ride.riders"), bpy.context.scene.frame_current
     start, laid = tuple(bpy.context.object.data.splines[0].points[4].co), riders.shown(rider()).number
-    for key in ("UP_ARROW", "UP_ARROW", "RIGHT_ARROW", "PAGE_UP"):
+    for count, key in enumerate(("UP_ARROW", "UP_ARROW", "RIGHT_ARROW", "PAGE_UP"), 1):
         yield from window.press(key, alt=True)
-        yield 0.5
+        yield from until(lambda: riders.shown(rider()).number - laid >= count, 60.0)
+        yield from settled()
     moved = [round(a - b, 4) for a, b in zip(bpy.context.object.data.splines[0].points[4].co, start)]
     assert moved[:3] == [0.1, 0.2, 0.1] and bpy.context.scene.frame_current == frame, moved
     assert riders.shown(rider()).number - laid == 4
     for _ in range(4):
         yield from window.press("Z", ctrl=True)
-        yield 0.5
+        yield from settled()
     back = [round(a - b, 4) for a, b in zip(bpy.context.object.data.splines[0].points[4].co, start)]
     assert back[:3] == [0.0, 0.0, 0.0] and bpy.context.mode == "EDIT_CURVE", (back, bpy.context.mode)

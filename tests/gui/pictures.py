@@ -8,7 +8,6 @@ from mathutils import Euler
 from tab import EXTENSION, TAB, output, room, run, sample, window
 from window import unfold
 
-LIMIT = 400
 KEPT = pathlib.Path("docs/pictures")
 NAMES = {"players": "track", "synthesis": "synthesize"}  # panels whose page has another name
 TABS = 22  # pixels of a sidebar's right edge that are its tabs

@@ -1,11 +1,11 @@
 """Making takes with the window alive: players queue, each arrives as it is made, and nothing stale is ever written."""
 
+import threading
 import time
 
 import bpy
-from tab import PICTURES, TAB, output, room, run, sample, settings, window
+from tab import PICTURES, TAB, output, room, run, sample, settings, settled, until, window, within
 
-LIMIT = 600
 
 
 def work():
@@ -18,39 +18,41 @@ def states():
     return [player.result.state for player in settings().players]
 
 
-def until(true, limit=120.0):
-    """Wait until something is true."""
-    start = time.monotonic()
-    while not true():
-        assert time.monotonic() - start < limit, f"not so after {limit} s: {work().kind} {work().text!r} {states()}"
-        yield 0.02
-
-
 def idle():
     """Nothing is being made."""
     return not work().kind and not window.window.modal_operators
 
 
-class slowly:
-    """Work that takes `seconds` longer than it does, in small naps, and notices a cancel."""
-
-    def __init__(self, seconds):
-        self.orders, self.seconds = room("scene.orders"), seconds
+class held:
+    """Holds back all work until it is let go, one after the other or all, and notices a cancel meanwhile."""
 
     def __enter__(self):
+        self.orders, self.begun, self.free = room("scene.orders"), 0, 0
         self.before = self.orders.work
 
-        def slow(order, library, progress, cancelled, hurry):
-            end = time.monotonic() + self.seconds
-            while time.monotonic() < end and not cancelled() and not hurry():
+        def waits(order, library, progress, cancelled, hurry):
+            number, self.begun = self.begun, self.begun + 1
+            while number >= self.free and not cancelled() and not hurry():
                 progress(0.1, "waiting on purpose")
                 time.sleep(0.01)
             return self.before(order, library, progress, cancelled, lambda: False)
 
-        self.orders.work = slow
+        self.orders.work = waits
+        return self
+
+    def go(self, count=1000):
+        """Let so many of the works go on."""
+        self.free = count
 
     def __exit__(self, *error):
+        self.go()
         self.orders.work = self.before
+
+
+def worked_off():
+    """Wait until no thread of ours works any more, whoever wanted to hear of it."""
+    yield from until(lambda: not any(one.name.startswith("beyond-mocap synth") for one in threading.enumerate()))
+    yield 0.5
 
 
 def opened():
@@ -61,14 +63,14 @@ def opened():
     yield from window.open_tab(area, TAB)
     if room("scene.session").library(bpy.path.abspath(settings().library_folder), None) is None:
         run("beyond_mocap.build_library")
-        yield from until(idle)
+        yield from settled()
     run("ed.undo_push", "EXEC_DEFAULT", message="opened")
 
 
 def check_players_queue_and_each_has_its_own_step():
     yield from opened()
     settings().players[1].use = False
-    with slowly(0.6):
+    with held() as hold:
         run("beyond_mocap.synthesize")
         yield 0.2
         settings().players[0].use, settings().players[1].use = False, True
@@ -76,9 +78,11 @@ def check_players_queue_and_each_has_its_own_step():
         yield from until(lambda: work().waiting)
         assert work().waiting == settings().players[1].name and len(window.window.modal_operators) == 1
         window.picture(PICTURES / "result-queue.png")
+        hold.go(1)
         yield from until(lambda: states() == ["PREVIEW", "NONE"])
         assert work().kind, "the second is not being made any more"
-        yield from until(idle)
+        hold.go()
+        yield from settled()
     assert states() == ["PREVIEW", "PREVIEW"]
     yield 0.5
     window.picture(PICTURES / "result-preview.png")
@@ -112,32 +116,32 @@ def check_the_window_is_alive_while_takes_are_made():
     run("beyond_mocap.synthesize")
     yield 0.05
     begun = time.monotonic()
-    busy, longest = yield from ticks(60.0)
+    busy, longest = yield from ticks(600.0)
     output.say(f"     ticks a second: {quiet:.0f} idle, {busy:.0f} while making ({busy / quiet:.0%}) for "
                f"{time.monotonic() - begun:.1f} s; longest wait {longest:.2f} s")
     assert states() == ["PREVIEW", "PREVIEW"]
-    assert busy > min(0.25 * quiet, 8.0)  # a machine that is busy with something else has few ticks anyway
+    within("seconds from tick to tick while making", 1.0 / busy, 1.0 / 8.0)
 
 
 def check_escape_cancels_and_finish_early_keeps():
     yield from opened()
-    with slowly(5.0):
+    with held():
         run("beyond_mocap.synthesize")
         yield 0.5
         window.picture(PICTURES / "result-running.png")
         yield from window.move(900, 500)
         yield from window.press("ESC")
-        yield from until(idle, 15.0)
+        yield from settled()
         assert states() == ["NONE", "NONE"]
         run("beyond_mocap.synthesize")
         yield 0.3
         run("beyond_mocap.cancel", "EXEC_DEFAULT", keep=True)
-        yield from until(idle)
+        yield from settled()
         assert states() == ["PREVIEW", "NONE"], states()
         run("beyond_mocap.synthesize")
         yield 0.3
         run("beyond_mocap.cancel", "EXEC_DEFAULT")
-        yield from until(idle, 15.0)
+        yield from settled()
         assert states() == ["PREVIEW", "NONE"], states()
 
 
@@ -147,13 +151,14 @@ def check_undo_in_the_middle():
     settings().players[1].use = False
     settings().alpha = 0.6
     run("ed.undo_push", "EXEC_DEFAULT", message="changed")
-    with slowly(1.0):
+    with held() as hold:
         run("beyond_mocap.synthesize")
         yield 0.4
         run("ed.undo")
         assert settings().alpha < 0.5
+        hold.go()
         yield from until(lambda: states()[0] == "PREVIEW")
-        yield from until(idle)
+        yield from settled()
     plan = room("scene.session").made(settings().players[0].take).plan
     assert abs(plan.alpha - settings().alpha) < 1e-6, plan.alpha
 
@@ -170,7 +175,7 @@ def check_keys_by_hand_and_what_is_out_of_date():
     yield from opened()
     settings().players[1].use = False
     run("beyond_mocap.synthesize")
-    yield from until(idle)
+    yield from settled()
     run("beyond_mocap.accept", "EXEC_DEFAULT", form="ACTION")
     body = settings().players[0].body
     bpy.context.view_layer.objects.active = body
@@ -186,15 +191,15 @@ def check_keys_by_hand_and_what_is_out_of_date():
     yield from window.press("I")
     yield 0.5
     run("object.mode_set", "EXEC_DEFAULT", mode="OBJECT")
-    yield from until(lambda: "hand-made" in told(), 40.0)
+    yield from until(lambda: "hand-made" in told())
     output.say(f"     told: {told().strip()}")
     settings().alpha = 0.35
-    yield from until(lambda: "choices" in told(), 40.0)
+    yield from until(lambda: "choices" in told())
     yield 0.6
     window.picture(PICTURES / "result-out-of-date.png")
     run("beyond_mocap.update", player=settings().players[0].name)
-    yield from until(idle)
-    yield from until(lambda: "choices" not in told(), 40.0)
+    yield from settled()
+    yield from until(lambda: "choices" not in told())
     assert settings().players[0].result.hand_keys, told()
     window.window.scene.frame_set(77)
     turned = settings().players[0].body.pose.bones["LeftArm"].rotation_quaternion
@@ -205,7 +210,7 @@ def check_variants_and_a_stretch():
     yield from opened()
     settings().players[1].use = False
     run("beyond_mocap.variants", count=3)
-    yield from until(idle, 120.0)
+    yield from settled()
     yield 0.6
     window.picture(PICTURES / "result-variants.png")
     takes = [variant.name for variant in settings().players[0].result.variants]
@@ -219,7 +224,7 @@ def check_variants_and_a_stretch():
     for number, strip in enumerate(strips):
         strip.select = number == len(strips) // 2
     run("beyond_mocap.resynthesize_stretch")
-    yield from until(idle)
+    yield from settled()
     assert settings().players[0].result.state == "PREVIEW" and settings().players[0].take not in takes
     run("beyond_mocap.discard", "EXEC_DEFAULT")
     assert settings().players[0].take == takes[1] and states()[0] == "ACCEPTED"
@@ -228,35 +233,39 @@ def check_variants_and_a_stretch():
 def check_whatever_happens_in_the_middle():
     """The player renamed or removed, its rig deleted, another scene shown, another file opened."""
     yield from opened()
-    with slowly(0.8):
+    with held() as hold:
         run("beyond_mocap.synthesize")
         yield 0.2
         settings().players[0].name = "Another name"
         settings().players.remove(1)
-        yield from until(idle)
+        hold.go()
+        yield from settled()
     assert states() == ["PREVIEW"] and settings().players[0].take
-    with slowly(0.8):
+    with held() as hold:
         run("beyond_mocap.synthesize")
         yield 0.2
         bpy.data.objects.remove(settings().players[0].body)
-        yield from until(idle)
+        hold.go()
+        yield from settled()
     assert states() == ["PREVIEW"] and settings().players[0].body is not None
     first = window.window.scene.name
-    with slowly(0.8):
+    with held() as hold:
         take = settings().players[0].take
         run("beyond_mocap.synthesize")
         yield 0.2
         window.window.scene = bpy.data.scenes.new("Elsewhere")
-        yield 2.5
+        hold.go()
+        yield from worked_off()
         assert bpy.data.scenes[first].beyond_mocap.players[0].take == take and "Elsewhere" in bpy.data.scenes
         window.window.scene = bpy.data.scenes[first]
-        yield from until(idle)
+        yield from settled()
         assert settings().players[0].take != take
-    with slowly(3.0):
+    with held() as hold:
         run("beyond_mocap.synthesize")
         yield 0.2
         bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
         yield 0.5
         assert idle() and states() == ["NONE", "NONE"]
-        yield 3.5
+        hold.go()
+        yield from worked_off()
         assert states() == ["NONE", "NONE"] and not room("scene.queue").names()

@@ -5,9 +5,8 @@ import importlib
 import addon_utils
 import bpy
 from mathutils import Euler
-from tab import EXTENSION, PICTURES, moves, output, press_button, sample, window
+from tab import EXTENSION, PICTURES, TAB, moves, output, press_button, sample, settled, until, window
 
-LIMIT = 480
 
 
 def room(name):
@@ -41,20 +40,21 @@ def check_bake_to_a_rigify_rig():
     assert len(room("rig").table_of(settings)) >= 22, settings.told
     bpy.ops.ed.undo_push(message="before the bake")
     yield from press_button("bake_to_rig(targets='CHOSEN'")  # one press is one undo step
-    yield 2.5
+    yield from until(lambda: bpy.data.objects[name].animation_data and bpy.data.objects[name].animation_data.action)
+    yield from settled()
     rig = bpy.data.objects[name]
     output.say(f"     {bpy.context.scene.beyond_mocap.rig.told.splitlines()[-2:]}")
-    assert rig.animation_data.action and moves(rig), "the rig does not move"
+    assert moves(rig), "the rig does not move"
     assert rig.pose.bones["thigh_parent.L"]["IK_FK"] == 1.0
     yield from look(rig, bpy.context.scene.beyond_mocap.rig.source)
     with bpy.context.temp_override(window=window.window):
         bpy.ops.ed.undo()
-    yield 0.5
+    yield from settled()
     rig = bpy.data.objects[name]
     assert rig.animation_data.action is None and rig.pose.bones["thigh_parent.L"]["IK_FK"] == 0.0
     with bpy.context.temp_override(window=window.window):
         bpy.ops.ed.redo()
-    yield 0.5
+    yield from settled()
     assert bpy.data.objects[name].animation_data.action is not None
 
 
@@ -86,10 +86,8 @@ def check_the_map_and_the_export_draw():
     fold_again = unfold(panel)
     bpy.context.scene.beyond_mocap.rig.reduces = True
     area = window.area("VIEW_3D")
-    yield from window.open_tab(area, "Beyond Mocap")
-    for _ in range(12):
-        if not (yield from window.scroll(window.sidebar(area))):
-            break
+    yield from window.open_tab(area, TAB)
+    yield from window.scroll(area, window.sidebar(area), 20.0)
     yield 0.5
     window.picture(PICTURES / "rig_panel.png")
     fold_again()

@@ -1,16 +1,16 @@
 """Live Stream and Play Live in the window: a body does what arrives, strikes are answered while the scene plays."""
 
 import math
+import os
 import threading
 import time
 
 import bpy
 import mathutils
-from ball_checks import choose, own_tab, press, thing, until
-from tab import PICTURES, assert_no_trouble_since, output, room, sample, window
+from ball_checks import choose, own_tab, thing
+from tab import PICTURES, assert_no_trouble_since, output, press, room, sample, until, window, within
 
-LIMIT = 500
-PORT = 7361
+PORT = 7361 + os.getpid() % 997  # another session's stream may be on this machine
 SENT = {}
 
 
@@ -51,16 +51,18 @@ def check_a_body_does_what_arrives():
     scene().beyond_mocap_stream.port = PORT
     back = yield from own_tab("stream")
     yield from press("stream_start")
-    assert told().on and told().state == "waiting"
+    yield from until(lambda: told().on and told().state == "waiting", what=lambda: told().state)
     SENT["end"] = send("passes/library/volley_pass.bvh")
     yield from until(lambda: scene().beyond_mocap_stream.body is not None)
     look_from((0.0, 0.0, 0.9), 5.0)
     yield from until(lambda: "Latency" in told().figures and told().hit)
-    body, places = scene().beyond_mocap_stream.body, set()
-    for _ in range(10):
-        yield 0.2
-        places.add(tuple(round(value, 3) for value in body.pose.bones[0].location))
-    assert len(places) > 2, "it stands still"
+    places = set()
+
+    def place_after_place():
+        places.add(tuple(round(value, 3) for value in scene().beyond_mocap_stream.body.pose.bones[0].location))
+        return len(places) > 2
+
+    yield from until(place_after_place, what="it stands still")
     output.say(f"     {' ; '.join(told().figures.splitlines())} ; {told().hit}")
     yield from window.move(300, 300)
     yield 1.0
@@ -72,8 +74,7 @@ def check_a_body_does_what_arrives():
 def check_a_stream_that_stops_is_told():
     mark = len(output.text())
     SENT.pop("end")()
-    yield from until(lambda: told().state == "stalled")
-    assert "no frame for" in told().line
+    yield from until(lambda: told().state == "stalled" and "no frame for" in told().line, what=lambda: told().line)
     assert_no_trouble_since(mark)
 
 
@@ -86,27 +87,27 @@ def check_strikes_are_answered_while_the_scene_plays():
     look_from((0.0, 0.5, 0.6), 11.0)
     back = yield from own_tab("live")
     yield from press("stream_play")
-    yield from until(lambda: told().playing, 240.0)
+    yield from until(lambda: told().playing)
     bpy.ops.screen.animation_play()
     end = send("passes/library/volley_pass.bvh")
     try:
         rally = room("scene.stream.play").rally
-        yield from until(lambda: rally() is None or rally().passes >= 1, 120.0)
+        yield from until(lambda: rally() is None or rally().passes >= 1)
         assert rally() is not None, told().played
-        frame, holder = scene().frame_current, rally().holder
+        frame, passes, holder = scene().frame_current, rally().passes, rally().holder
         output.say(f"     {' / '.join(told().played.splitlines())} ; frame {frame}")
         yield from window.move(300, 300)
         yield 1.5
         window.picture(PICTURES / "play_live.png")
-        assert scene().frame_current != frame, "the scene does not go on"
-        assert holder == "Ben" and thing("Passing Ball").animation_data
+        yield from until(lambda: scene().frame_current != frame, 60.0, "the scene goes on")
+        assert (holder == "Ben" or passes > 1) and thing("Passing Ball").animation_data
     finally:
         end()
         bpy.ops.screen.animation_cancel(restore_frame=False)
     choose(scene().beyond_mocap_passes.players["Cho"].body.name)
     yield from until(lambda: room("scene.stream.play").target(scene()) == "Cho" or rally().holder == "Cho")
     yield from press("stream_end")
-    assert rally() is None and not told().playing
+    yield from until(lambda: rally() is None and not told().playing)
     back()
     assert_no_trouble_since(mark)
 
@@ -116,6 +117,7 @@ def check_it_is_stopped():
     back = yield from own_tab("stream")
     start = time.monotonic()
     yield from press("stream_stop")
-    assert not told().on and time.monotonic() - start < 20.0
+    yield from until(lambda: not told().on)
+    within("stopped, s", time.monotonic() - start, 20.0)
     back()
     assert_no_trouble_since(mark)

@@ -73,76 +73,120 @@ def assert_no_trouble_since(mark):
     assert not trouble(printed), "printed:\n" + "\n".join(list(dict.fromkeys(printed.splitlines()))[:40])
 
 
-def press_all(wanted=None, then=None):
-    """Press each button of the tab (or only the wanted operators'), page by page; return the calls that were pressed.
+def until(true, limit=300.0, what=""):
+    """Wait until something is true, and return the seconds that it took. `what` is told where it never is: a text, or a
+    function that says what there is instead. The limit is for what hangs; the slowest machine gets there long before."""
+    start = time.monotonic()
+    while not true():
+        told = (what() if callable(what) else what) if time.monotonic() - start > limit else ""
+        assert time.monotonic() - start < limit, f"not so after {limit:g} s: {told!r}; at work: {unrest()}"
+        yield 0.05
+    return time.monotonic() - start
 
-    `then` is what to do after each press; without it, whatever began is ended by Escape.
-    """
+
+def unrest():
+    """What is still at work, or begins by itself in a moment, and so may still change the file; empty where nothing is."""
+    manager = bpy.context.window_manager
+    busy = [operator.bl_idname for operator in window.window.modal_operators]
+    busy += [work for work in (manager.beyond_mocap_work.kind, manager.beyond_mocap_work.waiting) if work]
+    busy += [f"scene.{name}.live" for name in ("ride", "aimed", "passes") if room(f"scene.{name}.live")._seen["dirty"]]
+    live = room("scene.live")._seen
+    busy += ["scene.live"] if settings().live and (live["dirty"] or live["quick"]) else []
+    waits = bpy.app.timers.is_registered(room("scene.strip_events")._later)
+    return busy + ["scene.strip_events"] * waits
+
+
+def settled(limit=300.0):
+    """Wait until nothing is at work any more, nor about to begin: what was done just now has had all its consequences."""
+    quiet = 0
+
+    def still():
+        nonlocal quiet
+        quiet = 0 if unrest() else quiet + 1
+        return quiet > 3  # between the end of one thing and the beginning of the next there may be a look
+
+    yield 0.05
+    yield from until(still, limit)
+
+
+def press_all(wanted=None):
+    """Press each button of the tab (or only the wanted operators'), page by page; return the calls that were pressed.
+    Whatever began is ended by Escape."""
     area = window.area("VIEW_3D")
     yield from window.open_tab(area, TAB)
     region = window.sidebar(area)
-    pressed, more = [], True
-    while more and not (wanted and len(pressed) >= len(wanted)):
-        found = yield from window.buttons(area, region)
-        new = [call for call in found if call not in pressed and (wanted is None or operator_of(call) in wanted)]
-        moved = False  # a press may move the others: then they are looked for again
-        for call in new:
-            if (yield from window.points_at(area, region, found[call])) == call:
-                pressed.append(call)
-                yield from press_one(call, found[call], then or end_what_began)
-            else:
-                moved = True
-        more = moved or bool(wanted and new) or (yield from window.scroll(region))
+    yield from window.to_the_top(area, region)
+    pressed, usable, more = [], {}, True
+
+    def new(call):
+        usable[call] = can_run(call)
+        return call not in pressed and (wanted is None or operator_of(call) in wanted)
+
+    while more:
+        _, call = yield from window.scan(area, region, window.command_under_pointer, new)
+        if call:
+            pressed.append(call)
+            reaction = yield from end_what_began()
+            output.say(f"     pressed {call}: {reaction if usable[call] else 'greyed out'}")
+        more = call or (yield from window.scroll(area, region))
     return pressed
+
+
+def press(operator, *words, editor="VIEW_3D", limit=120.0):
+    """Click the operator's button in the tab that is in front, once it is there and may be pressed. `operator` may go on
+    with its first arguments; `words` are others of its call."""
+    area = window.area(editor)
+    begins = f"bpy.ops.beyond_mocap.{operator}" + "(" * ("(" not in operator)
+
+    def meant(call):
+        return call.startswith(begins) and all(word in call for word in words)
+
+    yield from until(lambda: can_run(begins, editor), limit, f"{operator} may be pressed")
+    yield from window.click_first(area, window.sidebar(area), meant, window.command_under_pointer, limit)
 
 
 def press_button(operator, editor="VIEW_3D"):
     """Find the operator's button in our tab and click it; `operator` may go on with its first arguments."""
-    area = window.area(editor)
-    yield from window.open_tab(area, TAB)
-    region = window.sidebar(area)
-    wanted = f"bpy.ops.beyond_mocap.{operator}" + "(" * ("(" not in operator)
-    place = yield from window.find(area, region, lambda call: call.startswith(wanted), window.command_under_pointer)
-    yield from window.click(*place)
-    yield 0.3
+    yield from window.open_tab(window.area(editor), TAB)
+    yield from press(operator, editor=editor)
 
 
 def fill_in(path, text, editor="VIEW_3D"):
     """Find the field of a property in our tab by the end of its data path, and type into it."""
     area = window.area(editor)
     yield from window.open_tab(area, TAB)
-    region = window.sidebar(area)
-    place = yield from window.find(area, region, lambda found: found.endswith(path), window.field_under_pointer)
-    yield from window.click(*place)
+    yield from window.click_first(area, window.sidebar(area), lambda found: found.endswith(path), window.field_under_pointer)
+    yield 0.3
     yield from window.press("LEFTMOUSE")
     yield 0.3
     yield from window.write(text)
     yield 0.3
 
 
+def browser():
+    """The file browser that is open: its window and its area; None and None where there is none."""
+    for other in bpy.context.window_manager.windows:
+        for area in other.screen.areas:
+            if area.type == "FILE_BROWSER" and area.spaces.active.params is not None:
+                return other, area
+    return None, None
+
+
 def choose_file(path):
     """Choose a file in the file browser that is open, as one who types its folder and name and presses Enter."""
-    def browser():
-        for other in bpy.context.window_manager.windows:
-            for area in other.screen.areas:
-                if area.type == "FILE_BROWSER" and area.spaces.active.params is not None:
-                    return other, area
-        return None, None
-
-    for _ in range(50):
-        other, area = browser()
-        if other is not None:
-            break
-        yield 0.1
-    assert other is not None, "no file browser has opened"
-    parameters = area.spaces.active.params
+    yield from until(lambda: browser()[0] is not None, 60.0, "no file browser has opened")
+    parameters = browser()[1].spaces.active.params
     parameters.directory, parameters.filename = str(path.parent).encode(), path.name
     yield 1.0
-    middle = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
-    other.event_simulate(type="MOUSEMOVE", value="NOTHING", **middle)
-    yield 0.2
-    other.event_simulate(type="RET", value="PRESS", **middle)
-    yield 1.0
+    start = time.monotonic()
+    while browser()[0] is not None:  # while it still reads the folder it hears nothing
+        assert time.monotonic() - start < 60.0, "the file browser does not close"
+        other, area = browser()
+        middle = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
+        other.event_simulate(type="MOUSEMOVE", value="NOTHING", **middle)
+        yield 0.2
+        other.event_simulate(type="RET", value="PRESS", **middle)
+        yield 1.0
 
 
 def operator_of(call):
@@ -154,44 +198,33 @@ def operator_of(call):
     return call.split("(")[0].rpartition(".")[2]
 
 
-def press_one(call, place, then):
-    """Press the button that stood there, and tell what came of it."""
-    usable = can_run(call)
-    yield from window.click(*place)
-    yield 0.3
-    reaction = yield from then()
-    output.say(f"     pressed {call}: {reaction if usable else 'greyed out'}")
-
-
-def can_run(call):
+def can_run(call, editor="VIEW_3D"):
     """Whether a button's operator says that it can be used just now."""
     group, name = call.split("(")[0].split(".")[-2:]
-    area = window.area("VIEW_3D")
+    area = window.area(editor)
     with bpy.context.temp_override(window=window.window, area=area, region=window.sidebar(area)):
         return getattr(getattr(bpy.ops, group), name).poll()
 
 
-def end_what_began():
+def end_what_began(limit=300.0):
     """Leave the file browser, dialog or running operator that a button brought up; say which it was."""
-    manager = bpy.context.window_manager
+    manager, start = bpy.context.window_manager, time.monotonic()
     reaction = "done"
-    for _ in range(20):
-        browser = next((w for w in manager.windows if any(a.type == "FILE_BROWSER" for a in w.screen.areas)), None)
+    while time.monotonic() - start < limit:
+        other = next((w for w in manager.windows if any(a.type == "FILE_BROWSER" for a in w.screen.areas)), None)
         running = [operator.bl_idname for operator in window.window.modal_operators]
-        if browser is None and not running:
+        if other is None and not running:
             return reaction
-        reaction = "opened the file browser" if browser else f"ran {running}"
-        yield from window.escape_from(browser or window.window)
-        yield 0.5
+        reaction = "opened the file browser" if other else f"ran {running}"
+        yield from window.escape_from(other or window.window)
+        yield 0.3
     raise AssertionError(f"{reaction} and did not end by Escape")
 
 
-def wait_for_work(limit=120):
-    """Wait until no operator is running any more; say how long it took."""
+def wait_for_work():
+    """Wait until no operator is running any more, nor anything that it started; say how long it took."""
     start = time.monotonic()
-    while window.window.modal_operators:
-        assert time.monotonic() - start < limit, f"still running after {limit} s"
-        yield 0.2
+    yield from settled()
     return f"took {time.monotonic() - start:.1f} s"
 
 

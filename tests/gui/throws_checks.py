@@ -5,9 +5,7 @@ import time
 
 import bpy
 import numpy as np
-from tab import EXTENSION, PICTURES, assert_no_trouble_since, output, sample, wait_for_work, window, within
-
-LIMIT = 200
+from tab import EXTENSION, PICTURES, assert_no_trouble_since, output, press, sample, settled, until, window, within
 
 
 def body():
@@ -40,15 +38,6 @@ def scene_of_one():
     yield 1
 
 
-def press(verb):
-    """Click a button by its call."""
-    area = window.area("VIEW_3D")
-    place = yield from window.find(area, window.sidebar(area), lambda call: f".{verb}(" in call, window.command_under_pointer)
-    yield from window.move(*place)
-    yield from window.press("LEFTMOUSE")
-    yield 0.3
-
-
 def look(frame, name):
     """The body from the side on a frame, as a picture."""
     window.window.scene.frame_set(frame)
@@ -67,11 +56,8 @@ def check_throw():
     began = len(output.text())
     before = len(bpy.data.objects)
     yield from press("throw_at_target")
-    start = time.monotonic()
-    yield from wait_for_work()
-    while not body().beyond_mocap_throw.made:
-        assert time.monotonic() - start < 90.0, "no throw came"
-        yield 0.1
+    yield from until(lambda: body().beyond_mocap_throw.made, what="a throw comes")
+    yield from settled()
     wish = body().beyond_mocap_throw
     assert abs(wish.release - 70.0) <= 0.51 and wish.flown is not None, wish.figures
     for frame, name in ((62, "windup"), (70, "release"), (76, "after")):
@@ -82,10 +68,10 @@ def check_throw():
         most = min(most, float(np.linalg.norm(np.array(wish.flown.matrix_world.translation) - there)))
     assert most < 0.5, f"the ball passes the target by {most:.2f} m"  # whole frames only: 0.7 m apart at 20 m/s
     bpy.ops.ed.undo()
-    yield 0.5
+    yield from settled()
     assert not body().beyond_mocap_throw.made and len(bpy.data.objects) == before
     bpy.ops.ed.redo()
-    yield 0.5
+    yield from settled()
     assert body().beyond_mocap_throw.made == "throw"
     assert_no_trouble_since(began)
 
@@ -96,7 +82,7 @@ def check_cancel():
     before = len(bpy.data.objects), len(bpy.data.actions)
     yield from press("throw_at_target")
     yield from window.press("ESC")
-    yield from wait_for_work()
+    yield from settled()
     yield 1
     assert not body().beyond_mocap_throw.made and (len(bpy.data.objects), len(bpy.data.actions)) == before
 

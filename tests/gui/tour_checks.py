@@ -3,16 +3,14 @@ rig, undo all the way back to the empty file, and redo all the way."""
 
 import pathlib
 import sys
-import time
 
 import addon_utils
 import bpy
-from tab import PICTURES, choose_file, fill_in, moves, output, press_button, sample, settings, window
+from tab import PICTURES, choose_file, fill_in, moves, output, press_button, sample, settings, settled, until, window
 
 sys.path.insert(0, str(pathlib.Path("tests/blender").resolve()))
 from undo import state  # noqa: E402
 
-LIMIT = 540
 
 
 def the_file():
@@ -21,15 +19,6 @@ def the_file():
     found["frames"] = found["frames"][:3]
     del found["chosen"]
     return found
-
-
-def work_is_done(limit=90):
-    """Wait until nothing runs any more."""
-    start = time.monotonic()
-    while window.window.modal_operators or bpy.context.window_manager.beyond_mocap_work.kind:
-        assert time.monotonic() - start < limit, "still at work"
-        yield 0.1
-    yield 0.5
 
 
 def into_the_view():
@@ -48,6 +37,8 @@ def importing():
     """Tracking by the file browser: a dot, and its words as strips."""
     yield from press_button("import_tracking")
     yield from choose_file(sample() / "match" / "player1.csv")
+    yield from until(lambda: len(settings().players) == 1)
+    yield from settled()
     player, = settings().players
     assert player.dot is not None and player.dot.animation_data.nla_tracks
 
@@ -55,10 +46,10 @@ def importing():
 def building():
     """The folder is typed, the library built."""
     yield from fill_in("library_folder", str(sample() / "library"))
-    assert settings().library_folder == str(sample() / "library"), settings().library_folder
+    yield from until(lambda: settings().library_folder == str(sample() / "library"), what=lambda: settings().library_folder)
     yield from press_button("build_library")
-    yield from work_is_done()
-    assert "clips" in settings().library_holds
+    yield from settled()
+    yield from until(lambda: "clips" in settings().library_holds)
 
 
 def annotating():
@@ -67,17 +58,14 @@ def annotating():
     bpy.context.scene.frame_set(100)
     yield from into_the_view()
     yield from window.press("J")
-    yield 0.5
+    yield from until(window.window.modal_operators.keys, what="J begins to annotate")
     window.picture(PICTURES / "tour-annotate.png")
     for key in ("TWO", "ONE", "RET"):
         yield from window.press(key)
-        yield 0.2
     yield from window.press("ESC")
-    yield 0.3
     if window.window.modal_operators:
         yield from window.press("ESC")
-        yield 0.3
-    assert not window.window.modal_operators
+    yield from settled()
     assert strips() != before
 
 
@@ -93,22 +81,23 @@ def cancelling():
     yield from press_button("synthesize")
     yield from into_the_view()
     yield from window.press("ESC")
-    yield from work_is_done()
+    yield from settled()
     assert the_file() == before or states() == ["PREVIEW"], "neither cancelled nor done"
 
 
 def synthesizing():
     """The preview is on a body."""
     yield from press_button("synthesize")
-    yield from work_is_done()
-    assert states() == ["PREVIEW"], states()
+    yield from settled()
+    yield from until(lambda: states() == ["PREVIEW"], what=states)
     window.picture(PICTURES / "tour-preview.png")
 
 
 def accepting():
     """The body keeps it."""
     yield from press_button("accept")
-    assert states() == ["ACCEPTED"], states()
+    yield from until(lambda: states() == ["ACCEPTED"], what=states)
+    yield from settled()
     assert moves(settings().players[0].body)
 
 
@@ -126,9 +115,9 @@ def a_rig():
 def baking():
     """The rig is chosen by its button, and moves as the body does."""
     yield from press_button("use_selected_rig")
-    rig = settings().rig.target
-    assert rig is not None
+    yield from until(lambda: settings().rig.target is not None)
     yield from press_button("bake_to_rig")
+    yield from settled()
     assert moves(settings().rig.target), "the rig stands still"
     window.picture(PICTURES / "tour-rig.png")
 
@@ -143,7 +132,7 @@ def check_the_tour():
     reached = [the_file()]
     for step in STEPS:
         yield from step()
-        yield 0.3
+        yield from settled()
         if the_file() != reached[-1]:
             reached.append(the_file())
         output.say(f"     {step.__name__}: done")
@@ -162,7 +151,7 @@ def walk(key, wanted, **held):
     while left:
         assert count < 60, f"{len(left)} of {len(wanted)} states have not come back"
         yield from window.press(key, **held)
-        yield 0.3
+        yield from settled()
         count += 1
         if the_file() == left[0]:
             left.pop(0)

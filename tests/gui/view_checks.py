@@ -4,10 +4,9 @@ import time
 
 import bpy
 from mathutils import Euler, Quaternion
-from tab import PICTURES, TAB, output, room, sample, settings, window, within
+from tab import PICTURES, TAB, output, room, sample, settings, until, window, within
 from window import Stand
 
-LIMIT = 600
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
 
 
@@ -17,12 +16,10 @@ def switch(*names):
         setattr(settings().view, name, name in names)
 
 
-def prepared(limit=30.0):
+def prepared():
     """Wait until every player that is shown is prepared."""
-    store, start = room("scene.overlays.store"), time.monotonic()
-    while any(store.prepared(player.take) is None for player in store.shown_players(settings())):
-        assert time.monotonic() - start < limit, "not prepared in time"
-        yield 0.1
+    store = room("scene.overlays.store")
+    yield from until(lambda: all(store.prepared(player.take) for player in store.shown_players(settings())), what="prepared")
 
 
 def made(seconds=8.0):
@@ -196,10 +193,9 @@ def check_a_warning_goes_to_its_frame():
     with bpy.context.temp_override(window=window.window, area=area, region=next(r for r in area.regions if r.type == "WINDOW")):
         bpy.context.scene.frame_set(1)
         bpy.ops.beyond_mocap.jump_to("INVOKE_DEFAULT", stops="5.000 7.000", player=player.name, frame_view=True)
-    yield 0.5
+    yield from until(lambda: (area.spaces.active.region_3d.view_location - before).length > 0.1, what="the view has moved")
     assert bpy.context.scene.frame_current == 1 + 5 * bpy.context.scene.render.fps
     assert bpy.context.view_layer.objects.active == body
-    assert (area.spaces.active.region_3d.view_location - before).length > 0.1, "the view has not moved"
     assert bpy.context.window_manager.beyond_mocap_playhead.why or not room("scene.overlays.store")._prepared
 
 
@@ -234,7 +230,7 @@ def check_nothing_stays_of_what_is_gone():
     yield from prepared()
     yield from redrawn(3)
     draw, store = room("scene.overlays.draw"), room("scene.overlays.store")
-    assert draw._batches and store._prepared
+    yield from until(lambda: draw._batches and store._prepared)
     with bpy.context.temp_override(window=window.window):
         bpy.ops.ed.undo_push(message="before")
         bpy.data.objects.remove(settings().players[0].body)
@@ -246,10 +242,10 @@ def check_nothing_stays_of_what_is_gone():
         bpy.ops.ed.undo_push(message="discarded")
     yield 0.3
     yield from redrawn(3)
-    assert not store._prepared, "takes that nobody shows are still prepared"
+    yield from until(lambda: not store._prepared, 60.0, "takes that nobody shows are still prepared")
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 0.5
     yield from redrawn(2)
     bpy.context.scene.beyond_mocap.view.track = True
     yield from redrawn(2)
-    assert not [key for key in draw._batches if key[0]], "batches of takes that are gone"
+    yield from until(lambda: not [key for key in draw._batches if key[0]], 60.0, "batches of takes that are gone")

@@ -42,6 +42,59 @@ class Output:
         os.write(self.terminal, (line + "\n").encode())
 
 
+class Sent:
+    """What a scout has to do and what it reports. look(): the text of what is under the pointer; wanted(text): whether to
+    click it. `found`: text -> place, of all that was seen on the way; `clicked`: the text of what was; `back`: whether it
+    has come to the end."""
+
+    def __init__(self, window, look, wanted):
+        self.window, self.look, self.wanted = window, look, wanted
+        self.found, self.text, self.place, self.clicked, self.back = {}, "", None, "", False
+
+    def at(self, place):
+        """The pointer is moved here. Of two texts that differ the second was met right here; one that stays may be that of
+        the button that the pointer has left."""
+        if place == self.place and (text := self.look()) != self.text:
+            self.text = text
+            if text:
+                self.found.setdefault(text, place)
+        self.place = place
+
+    def end(self):
+        """All places have been seen: click the first thing that is wanted, before anything is drawn and may move."""
+        self.back = True
+        self.clicked = next((text for text in self.found if self.wanted(text)), "")
+        if self.clicked:
+            self.window.arrive(*self.found[self.clicked])
+            self.window.event("LEFTMOUSE", "PRESS")
+            self.window.event("LEFTMOUSE", "RELEASE")
+
+
+class Scout(bpy.types.Operator):
+    """Reads what is under the pointer while many moves are handled at once. Looking after each of them, as the next one
+    comes, takes a hundredth of the time that it takes to wait until each has been drawn, and nothing moves meanwhile."""
+
+    bl_idname, bl_label = "window_test.scout", "Scout"
+    sent = None
+
+    def invoke(self, context, event):
+        """Ride along with all events from now on."""
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Look at each move; end at F24."""
+        if event.type == "F24":
+            Scout.sent.end()
+            return {"FINISHED"}
+        if event.type == "MOUSEMOVE":
+            Scout.sent.at((event.mouse_x, event.mouse_y))
+        return {"PASS_THROUGH"}
+
+
+bpy.utils.register_class(Scout)
+
+
 class Window:
     """Blender's first window, with one pointer."""
 
@@ -70,6 +123,13 @@ class Window:
         self.pointer = (int(x), int(y))
         self.event("MOUSEMOVE", "NOTHING")
         yield 0.015
+
+    def arrive(self, x, y):
+        """Put the pointer there, and be there: the first event leaves the button before, the second enters this one, at
+        the third a scout reads what the second has done."""
+        self.pointer = (int(x), int(y))
+        for _ in range(3):
+            self.event("MOUSEMOVE", "NOTHING")
 
     def press(self, key, **held):
         """A key or mouse button, down and up; held: ctrl=True and the like."""
@@ -104,20 +164,27 @@ class Window:
         yield from self.move(x, y)
         yield from self.press("LEFTMOUSE")
 
-    def open_tab(self, area, category):
+    def open_tab(self, area, category, limit=60.0):
         """Show the editor's sidebar with this tab in front."""
         area.spaces.active.show_region_ui = True
-        yield 0.5
-        for _ in range(20):  # a sidebar has no tabs to choose from before it has been drawn
-            try:
-                self.sidebar(area).active_panel_category = category
-                break
-            except AttributeError:
-                area.tag_redraw()
-                yield 0.25
-        assert self.sidebar(area).active_panel_category == category, f"no tab {category} in the {area.type}"
+        start, region = time.monotonic(), self.sidebar(area)
+        while self.category(region) != category or region.width <= 1:
+            assert time.monotonic() - start < limit, f"no tab {category} in the {area.type}"
+            area.tag_redraw()
+            yield 0.1
+            try:  # a sidebar has no tabs to choose from before it has been drawn
+                region.active_panel_category = category
+            except (AttributeError, TypeError):
+                pass
         area.tag_redraw()
-        yield 0.5
+        yield 0.2
+
+    def category(self, region):
+        """The tab in front; "" before there are any."""
+        try:
+            return region.active_panel_category
+        except AttributeError:
+            return ""
 
     def command_under_pointer(self, area, region):
         """The Python call of the button under the pointer, as Blender itself writes it; "" where there is none."""
@@ -128,11 +195,6 @@ class Window:
                 bpy.ops.ui.copy_python_command_button()
         return manager.clipboard
 
-    def points_at(self, area, region, place):
-        """Move to this place; return the call of the button there, or ""."""
-        yield from self.move(*place)
-        return self.command_under_pointer(area, region)
-
     def field_under_pointer(self, area, region):
         """The full data path of the property under the pointer; "" where there is none."""
         manager = bpy.context.window_manager
@@ -142,38 +204,64 @@ class Window:
                 bpy.ops.ui.copy_data_path_button(full_path=True)
         return manager.clipboard
 
-    def find(self, area, region, wanted, what, step=14):
-        """Where the first thing is that `wanted(text)` is true of, looked for from the top of the region, page by page.
-        what(area, region): the text of what is under the pointer."""
-        while (yield from self.scroll(region, "WHEELUPMOUSE")):
-            pass
-        more = True
-        while more:
-            for y in range(region.y + region.height - 8, region.y + 4, -step):
-                for share in (0.3, 0.6, 0.83):
-                    yield from self.move(region.x + region.width * share, y)
-                    if wanted(what(area, region)):
-                        return region.x + int(region.width * share), y - 3
-            more = yield from self.scroll(region)
+    def find(self, area, region, wanted, what, limit=60.0):
+        """Where the first thing is that `wanted(text)` is true of, looked for from the top of the region, page by page,
+        again and again: what shows it may not be drawn yet. what(area, region): the text of what is under the pointer."""
+        found = yield from self.visit(area, region, lambda _: False, what, lambda found, _: any(map(wanted, found)), limit)
+        return next(place for text, place in found.items() if wanted(text))
+
+    def click_first(self, area, region, wanted, what, limit=60.0):
+        """Click the first thing that `wanted(text)` is true of, looked for as `find` does."""
+        yield from self.visit(area, region, wanted, what, lambda _, clicked: clicked, limit)
+
+    def visit(self, area, region, wanted, what, done, limit):
+        """Scan from the top of the region, page by page, again and again, until done(found, clicked); return what was
+        found last."""
+        start = time.monotonic()
+        while time.monotonic() - start < limit:
+            area.tag_redraw()
+            yield from self.to_the_top(area, region)
+            more = True
+            while more:
+                found, clicked = yield from self.scan(area, region, what, wanted)
+                if done(found, clicked):
+                    return found
+                more = yield from self.scroll(area, region)
         raise AssertionError("not found in the sidebar")
 
-    def buttons(self, area, region, step=12):
-        """Move over all that the region shows; return each operator's button: its call -> where it is."""
-        found = {}
-        columns = [region.x + int(region.width * share) for share in (0.2, 0.5, 0.83)]
-        for y in range(region.y + region.height - 8, region.y + 4, -step):
-            for x in columns:
-                if call := (yield from self.points_at(area, region, (x, y))):
-                    found.setdefault(call, (x, y))
-        return found
+    def scan(self, area, region, what, wanted=lambda text: False):
+        """Move over all that the region shows, and click the first thing there that `wanted(text)` is true of. Return what
+        is there, its text -> where it is, and what was clicked: its text, or ""."""
+        rows = range(region.y + region.height - 8, region.y + 4, -9)
+        columns = [region.x + int(region.width * share) for share in (0.2, 0.3, 0.5, 0.6, 0.83)]
+        yield 0.05
+        with bpy.context.temp_override(window=self.window, area=area, region=region):
+            bpy.ops.window_test.scout("INVOKE_DEFAULT")
+        scout, start = Sent(self, lambda: what(area, region), wanted), time.monotonic()
+        Scout.sent = scout
+        for place in [(x, y) for y in rows for x in columns]:
+            self.arrive(*place)
+        self.event("F24", "PRESS")
+        while not scout.back:
+            assert time.monotonic() - start < 60.0, "the scout has not come back"
+            yield 0.01
+        self.event("F24", "RELEASE")
+        yield 0.05
+        return scout.found, scout.clicked
 
-    def scroll(self, region, wheel="WHEELDOWNMOUSE"):
-        """Turn the wheel over the region by about half of what it shows; return whether it moved."""
+    def to_the_top(self, area, region):
+        """Scroll up as far as it goes."""
+        for _ in range(20):
+            if not (yield from self.scroll(area, region, -2.0)):
+                return
+
+    def scroll(self, area, region, pages=0.5):
+        """Scroll down by so many of what the region shows, or up; return whether it moved."""
         before = region.view2d.view_to_region(0, 0, clip=False)
-        yield from self.move(region.x + region.width // 2, region.y + region.height // 2)
-        for _ in range(8):
-            self.event(wheel, "PRESS")
-            yield 0.1
+        with bpy.context.temp_override(window=self.window, area=area, region=region):
+            bpy.ops.view2d.pan("EXEC_DEFAULT", deltax=0, deltay=-int(pages * region.height))
+        region.tag_redraw()
+        yield 0.1  # laid out anew, what went beyond an end comes back
         return region.view2d.view_to_region(0, 0, clip=False) != before
 
     def picture(self, path):
