@@ -1,5 +1,6 @@
 """What undo has to bring back: a list of all that a file holds, to be compared before and after."""
 
+import functools
 import zlib
 
 import bpy
@@ -64,28 +65,38 @@ def keys(action):
 
 def ours(item):
     """Our groups of properties on one piece of data, as plain values; empty where nothing is set."""
-    found = {name: plain(getattr(item, name)) for name in dir(item) if name.startswith(OURS)
-             and isinstance(getattr(item, name), bpy.types.PropertyGroup)}
+    groups = ((name, getattr(item, name)) for name in ours_on(type(item)))
+    found = {name: plain(group) for name, group in groups if isinstance(group, bpy.types.PropertyGroup)}
     return {name: value for name, value in found.items() if value}
+
+
+@functools.cache
+def ours_on(kind):
+    """Names of what the extension hangs on a type of Blender's data."""
+    return [known.identifier for known in kind.bl_rna.properties if known.identifier.startswith(OURS)]
 
 
 def plain(group):
     """A group of properties as plain values, groups within it too; data as its name."""
-    found = {}
-    for known in group.bl_rna.properties:
-        if known.identifier in {"rna_type", "bl_rna"}:
-            continue
-        value = getattr(group, known.identifier)
-        if known.type == "COLLECTION":
-            value = [plain(item) for item in value]
-        elif known.type == "POINTER":
-            value = value and (plain(value) if isinstance(value, bpy.types.PropertyGroup) else value.name)
-        elif getattr(known, "is_array", False):
-            value = tuple(value)
-        elif known.type == "ENUM" and known.is_enum_flag:
-            value = sorted(value)
-        found[known.identifier] = value
-    return found
+    return {name: as_plain(getattr(group, name)) for name, as_plain in fields(type(group))}
+
+
+@functools.cache
+def fields(kind):
+    """(name, what makes a plain value of it) of every property of a group's type."""
+    return [(known.identifier, plainly(known)) for known in kind.bl_rna.properties
+            if known.identifier not in {"rna_type", "bl_rna"}]
+
+
+def plainly(known):
+    """What makes a plain value of a property's value."""
+    if known.type == "COLLECTION":
+        return lambda value: [plain(item) for item in value]
+    if known.type == "POINTER":
+        return lambda value: value and (plain(value) if isinstance(value, bpy.types.PropertyGroup) else value.name)
+    if getattr(known, "is_array", False):
+        return tuple
+    return sorted if known.type == "ENUM" and known.is_enum_flag else lambda value: value
 
 
 def press(operator, **arguments):
