@@ -377,5 +377,6 @@ def check_saved_in_the_middle_and_opened_again():
     bpy.ops.wm.save_as_mainfile(filepath=path)  # before the strips came in order
     moved = asked()
     bpy.ops.wm.open_mainfile(filepath=path)
-    yield 1.0
-    assert asked() == moved and strip_of("jogging dribble").scale == 1.0 and in_order()
+    yield from until(lambda: strip_of("jogging dribble").scale == 1.0)
+    yield from settled()
+    assert asked() == moved and in_order(), asked()
