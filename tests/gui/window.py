@@ -49,15 +49,15 @@ class Sent:
 
     def __init__(self, window, look, wanted):
         self.window, self.look, self.wanted = window, look, wanted
-        self.found, self.text, self.place, self.clicked, self.back = {}, "", None, "", False
+        self.found, self.text, self.place, self.clicked, self.back = {}, None, None, "", False
 
     def at(self, place):
-        """The pointer is moved here. Of two texts that differ the second was met right here; one that stays may be that of
-        the button that the pointer has left."""
+        """The pointer is moved here. Of two texts that differ the second was met right here; one that stays, as the first
+        does, may be that of a button that the pointer has left: Blender goes on to name it."""
         if place == self.place and (text := self.look()) != self.text:
-            self.text = text
-            if text:
+            if text and self.text is not None:
                 self.found.setdefault(text, place)
+            self.text = text
         self.place = place
 
     def end(self):
