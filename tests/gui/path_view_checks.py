@@ -17,6 +17,7 @@ def a_rider():
     bpy.ops.beyond_mocap.edit_path(kind="NURBS", count=8)
     for name in SWITCHES:
         setattr(bpy.context.scene.beyond_mocap.view, name, True)
+    yield 0.5
     yield from settled()
 
 
