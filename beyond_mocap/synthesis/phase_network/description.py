@@ -24,10 +24,10 @@ class Description:
     ground at the origin, +X from there to the impact.
 
     effectors: (T, 4, 3) m, places of left and right wrist, left and right toe. hands: (T, 2, 3, 3), rotations of the
-    hand joints in the world, or None. limb: which of `chains.EFFECTORS` throws or kicks. release: fractional frame at which
-    the ball leaves it. impact: (3,) m, what the ball is to hit. fps: frames per second. before (B, 4, 3), after (A,
-    4, 3): places of the effectors in the frames beyond both ends, where they are known; else they are taken to keep
-    still.
+    hand joints in the world, or None. limb: which of `chains.EFFECTORS` throws or kicks. release: fractional frame at
+    which the ball leaves it. impact: (3,) m, what the ball is to hit. fps: frames per second. before (B, 4, 3), after
+    (A, 4, 3): places of the effectors in the frames beyond both ends, where they are known; else they are taken to
+    keep still.
     """
 
     effectors: np.ndarray

@@ -8,7 +8,6 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.motion.adult import adult_skeleton
-from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.throws import throw
 from beyond_mocap.synthesis.phase_network.chains import chains_of
@@ -189,4 +188,3 @@ def test_what_does_not_fit_the_model_is_told(example, model):
         generate(model, replace(told, hands=None))
     with pytest.raises(InputError, match="share"):
         Options(share=1.5)
-    assert identify(model.skeleton).right.hand is not None
