@@ -8,18 +8,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from .ball.arcs import arcs
+from .ball.arcs import arcs, out_of_reach
 from .ball.flight import Flight, Launch, fly
 from .ball.impact import crossing
 from .ball.physics import BALLS, FASTEST, THROWN, Ball
-from .ball.released.correction import Corrected, Freedom, corrected
+from .ball.released.correction import FINE, LITTLE, Corrected, Freedom, corrected
 from .ball.released.letting_go import AtFoot, InHand, grip_point, leaving
 from .errors import InputError
 from .motion import quaternion
@@ -32,6 +32,7 @@ from .motion.retarget import Retargeter
 from .motion.skeleton import Skeleton
 from .motion.throws import FASTEST as FASTEST_HAND
 from .synthesis.phase_network.chains import EFFECTORS
+from .synthesis.phase_network.limb_limits import LimbLimits
 from .synthesis.phase_network.model import ThrowModel
 from .synthesis.phase_network.plan import Planned, Wish, planned, unlike
 from .take import BallPath
@@ -45,12 +46,18 @@ NEAREST = 1.5
 _HIGHEST = 0.25  # of the stature, m above the ground that a ball lies at most which is kicked
 STATURES = (0.1, 10.0)
 """Metres of a body that throws."""
+RATES = (10.0, 480.0)
+"""Frames per second in which a throw can be shown: the ball's velocity is that of the hand between them."""
 _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be asked for
 _MORE = 1.04  # times the slowest launch that reaches the target, at least
 _SUITS, _EASY = 1.6, 0.3  # times the slowest launch that suits, and by which logarithm another pace is an odd one
+_NEAR = 0.7  # of the fastest launch: what gets there without air at less is near enough to be looked at closely
+_STEEPER = np.radians(35.0)  # than the steepest example
 _TOLD_BEYOND = np.radians(2.0)
-_MOST_MOVED, _MOST_BEYOND, _MOST_MISSED = 0.15, np.radians(15.0), 1.0
-"""m of moved wrist or ankle, rad of a joint beyond the examples and m past the target with which nothing is made."""
+_MOST_MOVED, _MOST_MISSED = 0.15, 1.0
+"""m of moved wrist or ankle and m past the target with which nothing is made."""
+_PLANS = 3  # that are tried until one hits
+_ANOTHER = 0.08  # by which the logarithms of their speeds differ
 _ROUNDS = 6  # of finding where the body begins
 _GOES_ON = 1.0  # s that the ball is followed behind its target
 
@@ -98,10 +105,10 @@ class Order:
             raise InputError("throw", "several places", "one of start, over and ball_place")
         if any(len(value) not in (2, 3) or not np.all(np.isfinite(value)) for value in given):
             raise InputError("throw", f"a place {given[0]}"[:60], "x, y or x, y, z in metres")
-        if self.fps is not None and not 0.0 < self.fps < np.inf:
-            raise InputError("fps", f"{self.fps:g}", "more than 0 frames a second")
         if self.ball_place is not None and self.limb is not None and self.limb.endswith("hand"):
             raise InputError("throw", "a place where the ball lies", "a foot that kicks it")
+        if self.fps is not None and not RATES[0] <= self.fps <= RATES[1]:
+            raise InputError("fps", f"{self.fps:g}", f"{RATES[0]:g} to {RATES[1]:g} frames a second")
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,11 +215,33 @@ def throw_at(
 
     told(0.0, "Planning")
     work = _Work(model, order, skeleton or model.skeleton)
-    plan = work.plan()
-    told(0.1, "Generating")
-    motion, release, raw = work.generated(plan)
-    told(0.6, "Correcting")
-    return work.thrown(plan, motion, release, raw)
+    best = None
+    for number, plan in enumerate(work.plans()):
+        told(0.1 + 0.8 * number / _PLANS, "Generating")
+        made = work.generated(plan)
+        told(0.1 + 0.8 * (number + 0.6) / _PLANS, "Correcting")
+        found = work.corrected(made)
+        if best is None or _cost(found) < _cost(best[1]):
+            best = made, found
+        if found.missed < FINE and found.moved < LITTLE:
+            break
+    return work.thrown(*best)
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """A motion where it belongs, at the asked rate and on the asked skeleton. plan: what it was generated from. release:
+    s. raw: m that hands and feet are from their wanted ways before any correction. limits: of the limb."""
+
+    plan: Planned
+    motion: Motion
+    release: float
+    raw: float
+    limits: LimbLimits
+
+
+def _cost(found: Corrected) -> float:
+    return found.missed + 0.2 * found.moved
 
 
 def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None = None) -> InHand | AtFoot:
@@ -288,8 +317,14 @@ class _Work:
 
     # Planning: in the model's size, the target straight ahead.
 
-    def plan(self) -> Planned:
-        """What the motion is to be."""
+    def plans(self) -> Iterator[Planned]:
+        """What the motion is to be; where that does not hit, what else it may be: of another pace, or of other
+        weights."""
+        for wish, seed in self._wishes():
+            yield planned(self.model.examples, self.launches, wish, seed)
+
+    def _wishes(self) -> list[tuple[Wish, int]]:
+        """Launches that suit, the best first, and seeds."""
         examples = self.model.examples
         places, self.launches, spins = launches_of(self.model, self.own_limb, self.ball)
         own = [n for n, example in enumerate(examples) if example.limb == self.own_limb]
@@ -301,12 +336,14 @@ class _Work:
             raise InputError("target", found, f"{NEAREST:g} m or more", "move one of them away")
         place = np.median(places[own], axis=0)
         start, end = np.array([place[0], 0.0, place[2]]), np.array([ahead, 0.0, self.target[2]])
-        self._check_human(_slowest_without_air(start, end, self.ball.gravity))
-        self.arcs = arcs(start, end, self.ball, np.median(spins[own], axis=0))
+        spin, fastest = np.median(spins[own], axis=0), float(np.linalg.norm(self.launches[own], axis=1).max())
+        self._check_far(start, end, spin, fastest)
+        self.arcs = arcs(start, end, self.ball, spin)
         self._check_human(self.arcs.slowest)
-        self._check_reach(float(np.linalg.norm(self.launches[own], axis=1).max()))
-        wish = self._wish(own, ahead)
-        return planned(examples, self.launches, wish, self.order.seed)
+        self._check_reach(fastest)
+        self._check_steep(own, min(self.fastest, _BEYOND_EXAMPLES * fastest))
+        wishes, seed = self._by_pace(own, ahead), self.order.seed
+        return [(wish, seed) for wish in wishes] if len(wishes) > 1 else [(wishes[0], seed + n) for n in range(_PLANS)]
 
     def _anchor(self, example, place: np.ndarray) -> np.ndarray:
         """(2,) m in the normalised frame: the point of the example that the order puts somewhere."""
@@ -339,6 +376,25 @@ class _Work:
             begin = spot - quaternion.turned_level(anchor, np.array(turn))
         return begin, turn
 
+    def _check_far(self, start: np.ndarray, end: np.ndarray, spin: np.ndarray, own: float) -> None:
+        """InputError for a target that is plainly too far, before anything slow is done."""
+        for most, what in ((self.fastest, "what a human gives it"), (_BEYOND_EXAMPLES * own, f"the model's fastest example has {own:.0f}")):
+            slowest = _slowest_without_air(start, end, self.ball.gravity)
+            if slowest > most or slowest > _NEAR * most and out_of_reach(start, end, self.ball, most, spin):
+                far = float(np.linalg.norm(self.target[:2] - self._where()))
+                raise InputError("target", f"{far:.0f} m away: that takes more than {most:.0f} m/s",
+                                 f"at most {most:.0f} m/s: {what}", "choose a nearer or lower target")  # fmt: skip
+
+    def _check_steep(self, own: list[int], most: float) -> None:
+        """InputError for a target to which the ball has to leave far more steeply than in any of the examples."""
+        along, _, up = self.arcs.at(most)
+        steep, known = np.arctan2(up, along), self.launches[own]
+        steepest = float(np.arctan2(known[:, 2], np.hypot(known[:, 0], known[:, 1])).max())
+        if steep > steepest + _STEEPER:
+            found = f"the ball has to leave at {np.degrees(steep):.0f} degrees"
+            expected = f"at most {np.degrees(steepest + _STEEPER):.0f}: the steepest example has {np.degrees(steepest):.0f}"
+            raise InputError("target", found, expected, "move it further off or lower")
+
     def _check_human(self, slowest: float) -> None:
         """InputError for a target that takes a faster ball than a human gives."""
         far, most = np.linalg.norm(self.target[:2] - self._where()), self.fastest
@@ -360,16 +416,20 @@ class _Work:
             most = f"at most {_BEYOND_EXAMPLES * own:.0f} m/s: the model's fastest example has {own:.0f}"
             raise InputError(what, found, most, "ask for less, or train on faster ones")
 
-    def _wish(self, own: list[int], ahead: float) -> Wish:
-        """The launch asked for, or of those that reach the target the one most like the examples, and rather not faster
-        than the way asks."""
+    def _by_pace(self, own: list[int], ahead: float) -> list[Wish]:
+        """The launch asked for, or of those that reach the target the ones most like the examples, and rather not faster
+        than the way asks; the best first, each of another speed."""
         thrown = np.linalg.norm(self.launches[own], axis=1)
         speeds = np.array([self.order.speed]) if self.order.speed else np.maximum(thrown, _MORE * self.arcs.slowest)
         wishes = [self._wish_at(float(speed), ahead) for speed in speeds]
         impacts = np.array([self.model.examples[n].impact for n in own])
         away = [float(np.sort(unlike(self.launches[own], impacts, wish))[:3].mean()) for wish in wishes]
         suits = np.clip(_SUITS * self.arcs.slowest, thrown.min(), thrown.max())
-        return wishes[int(np.argmin(away + (np.log(speeds / suits) / _EASY) ** 2))]
+        chosen: list[Wish] = []
+        for number in np.argsort(away + (np.log(speeds / suits) / _EASY) ** 2, kind="stable"):
+            if all(abs(np.log(speeds[number] / wish.speed)) > _ANOTHER for wish in chosen) and len(chosen) < _PLANS:
+                chosen.append(wishes[number])
+        return chosen
 
     def _wish_at(self, speed: float, ahead: float) -> Wish:
         launch = self.arcs.at(speed)
@@ -377,12 +437,10 @@ class _Work:
 
     # Generating, and laying it where it is asked for.
 
-    def generated(self, plan: Planned) -> tuple[Motion, float, float]:
-        """The motion where it belongs, at the asked rate and on the asked skeleton; its release in seconds; how far
-        hands and feet are from their wanted ways before any correction, m."""
+    def generated(self, plan: Planned) -> _Made:
+        """The motion where it belongs, at the asked rate and on the asked skeleton."""
         from .synthesis.phase_network.frame_step import stepper
         from .synthesis.phase_network.generate import generate
-        from .synthesis.phase_network.limb_limits import LimbLimits
 
         found = generate(self.model, plan.description)
         motion, release = found.motion, plan.description.release / plan.description.fps
@@ -392,7 +450,7 @@ class _Work:
         if not motion.skeleton.same_bones(self.skeleton):
             motion = Retargeter(motion, self.skeleton).carry(motion)
         part = part_of(self.skeleton, self.limb, self.ball)
-        self.limits = LimbLimits.of(
+        limits = LimbLimits.of(
             stepper(self.model).limits, own, part_of(own.skeleton, self.own_limb, self.ball).chain(own), motion,
             part.chain(motion), self.mirrored,
         )
@@ -407,7 +465,7 @@ class _Work:
         elif self.order.over is not None:
             anchor = cubic_at(motion, np.array([frame]))[0][0, :2]
         begin, turn = self._laid(anchor)
-        return place(motion, turn, (*begin, 0.0)), release, float(np.mean(found.raw))
+        return _Made(plan, place(motion, turn, (*begin, 0.0)), release, float(np.mean(found.raw)), limits)
 
     def _at_rate(self, motion: Motion) -> Motion:
         fps = self.order.fps or motion.fps
@@ -418,18 +476,23 @@ class _Work:
 
     # Correcting, and letting the ball fly.
 
-    def thrown(self, plan: Planned, motion: Motion, release: float, raw: float) -> Thrown:
-        """What came of it."""
+    def _part(self) -> InHand | AtFoot:
         lies = None
         if self.order.ball_place is not None:
             lies = np.array([*self._where(), max(self._lies_high, self.ball.radius)])
-        part = part_of(self.skeleton, self.limb, self.ball, lies)
-        found = corrected(
-            motion, part, release * motion.fps, self.target, self.ball, self.order.freedom, self.order.speed,
-            self.limits.held,
-        )
-        beyond = float(self.limits.beyond(found.motion).max())
-        self._check_body(found, beyond)
+        return part_of(self.skeleton, self.limb, self.ball, lies)
+
+    def corrected(self, made: _Made) -> Corrected:
+        """The motion with which the ball hits, or as near as that comes."""
+        order, frame = self.order, made.release * made.motion.fps
+        return corrected(made.motion, self._part(), frame, self.target, self.ball, order.freedom, order.speed,
+                         made.limits.held)  # fmt: skip
+
+    def thrown(self, made: _Made, found: Corrected) -> Thrown:
+        """What came of it."""
+        part, motion = self._part(), made.motion
+        beyond = float(made.limits.beyond(found.motion).max())
+        self._check_body(found)
         left = found.frame / motion.fps
         start = 0.0 if self.order.release_time is None else self.order.release_time - left
         launch = Launch(start + left, found.position, found.velocity, found.spin)
@@ -440,19 +503,17 @@ class _Work:
             found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
             ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
             found.moved, found.shift, found.turned, found.pace, found.later, found.elsewhere, self.arcs.slowest,
-            self.order.speed or float(np.linalg.norm(found.velocity)), raw, beyond,
-            tuple(zip(plan.names, map(float, plan.weights))), tuple(self.warnings),
+            self.order.speed or float(np.linalg.norm(found.velocity)), made.raw, beyond,
+            tuple(zip(made.plan.names, map(float, made.plan.weights))), tuple(self.warnings),
         )  # fmt: skip
 
-    def _check_body(self, found: Corrected, beyond: float) -> None:
+    def _check_body(self, found: Corrected) -> None:
         """InputError for a target that the ball reaches only if the body is bent out of shape, or never."""
         action = "kick" if self.kicks else "throw"
         if found.seconds <= 0.0 or found.missed > _MOST_MISSED:
             what = "the ball does not get there"
         elif found.moved > _MOST_MOVED:
             what = f"it takes {'an ankle' if self.kicks else 'a wrist'} moved by {100 * found.moved:.0f} cm"
-        elif beyond > _MOST_BEYOND:
-            what = f"it takes a joint bent {np.degrees(beyond):.0f} degrees further than in any of the examples"
         else:
             return
         raise InputError("target", what, f"one that a {action} like the examples reaches",
@@ -469,6 +530,11 @@ class _Work:
             self.warnings.append(f"the {what} was moved by {100 * found.moved:.0f} cm so that the ball hits")
         if beyond > _TOLD_BEYOND:
             self.warnings.append(f"a joint bends {np.degrees(beyond):.0f} degrees further than in any of the examples")
+        if speed > self.fastest:
+            self.warnings.append(
+                f"the ball leaves at {speed:.0f} m/s, no human gives it more than {self.fastest:.0f}: a body of "
+                f"{stature(self.skeleton):.1f} m moves faster"
+            )
         if self.order.speed and abs(speed - self.order.speed) > 0.1 * self.order.speed:
             self.warnings.append(f"the ball leaves at {speed:.1f} m/s, {self.order.speed:.1f} were asked for")
 

@@ -34,6 +34,8 @@ CLOSE = 1e-3
 _TURN, _PACE, _LATER, _SPEED, _OWN_SPEED, _REST = 8.0, 1.5, 1.5, 30.0, 300.0, 10.0
 _ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41
 _LOOKS, _TRIED = 4, 2
+_LEAST_STEP = 0.05  # of what the slopes say, below which nothing more comes of it
+_FAR, _FAR_ROUNDS = 1.0, 4  # m of miss after which, and the rounds after which, little more than contortions comes of it
 _STEP = 1e-3  # of frames, metres, m/s and radians, in differences
 _LEAST = 3  # frames that a motion needs before and after the release
 
@@ -226,15 +228,15 @@ class _Search:
             better = best is None or found.missed < best.missed
             slow = best is not None and found.missed > 0.1 * best.missed
             if better:
-                best, base, step, there = found, change, 1.0, (points, velocities)
-            if best.missed < CLOSE:
+                best, base, there = found, change, (points, velocities)
+            step = 1.0 if better else 0.4 * step
+            if best.missed < CLOSE or step < _LEAST_STEP or number >= _FAR_ROUNDS and best.missed > _FAR:
                 break
             if slow and (better or not known):
                 follows, known = limb.follows(base.row[:6], frame, *there), True
             if better or slow:
                 costs = limb.shifts.cost, follows
                 rows, _ = self._best(*there, base, start, *costs, fixed=self._rigid, near=number >= _FREE_ROUNDS)
-            step = 1.0 if better else 0.4 * step
             change = _Change(base.row + step * (rows[0] - base.row))
         return best
 

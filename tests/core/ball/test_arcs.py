@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beyond_mocap.ball.arcs import arcs
+from beyond_mocap.ball.arcs import arcs, out_of_reach
 from beyond_mocap.ball.physics import THROWN, Ball
 
 
@@ -15,3 +15,11 @@ def test_without_air_the_slowest_launch_is_the_known_one():
 def test_far_targets_are_not_looked_for_up_in_the_sky():
     found = arcs(np.array([0.0, 0.0, 1.5]), np.array([160.0, 0.0, 1.0]), THROWN["baseball"])
     assert len(found.speeds) >= 10 and np.all(np.diff(found.speeds) > 0.0)
+
+
+def test_a_target_is_out_of_reach_just_below_the_slowest_launch():
+    ball, start = THROWN["baseball"], np.array([0.0, 0.0, 1.5])
+    for target in ((80.0, 0.0, 1.0), (30.0, 40.0, 6.0)):
+        slowest = arcs(start, np.array(target), ball).slowest
+        assert out_of_reach(start, np.array(target), ball, 0.93 * slowest)
+        assert not out_of_reach(start, np.array(target), ball, slowest)
