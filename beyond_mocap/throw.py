@@ -378,12 +378,14 @@ class _Work:
 
     def _check_far(self, start: np.ndarray, end: np.ndarray, spin: np.ndarray, own: float) -> None:
         """InputError for a target that is plainly too far, before anything slow is done."""
-        for most, what in ((self.fastest, "what a human gives it"), (_BEYOND_EXAMPLES * own, f"the model's fastest example has {own:.0f}")):
+        human = f"which is what a human gives a {'kick' if self.kicks else 'throw'}"
+        model = f"the model's fastest example has {own:.0f}"
+        for most, what in ((self.fastest, human), (_BEYOND_EXAMPLES * own, model)):
             slowest = _slowest_without_air(start, end, self.ball.gravity)
             if slowest > most or slowest > _NEAR * most and out_of_reach(start, end, self.ball, most, spin):
                 far = float(np.linalg.norm(self.target[:2] - self._where()))
                 raise InputError("target", f"{far:.0f} m away: that takes more than {most:.0f} m/s",
-                                 f"at most {most:.0f} m/s: {what}", "choose a nearer or lower target")  # fmt: skip
+                                 f"at most {most:.0f} m/s, {what}", "choose a nearer or lower target")  # fmt: skip
 
     def _check_steep(self, own: list[int], most: float) -> None:
         """InputError for a target to which the ball has to leave far more steeply than in any of the examples."""
