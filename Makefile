@@ -61,7 +61,7 @@ weights: training
 	@rm -rf build/examples
 	@set -ex; for action in throw kick; do \
 	  $(TRAINED) throw examples --out build/examples/$$action --action $$action --seed 0; \
-	  $(TRAINED) throw train build/examples/$$action --config training/$$action.json --action $$action --half --out build/examples/$$action.npz; \
+	  $(TRAINED) throw train build/examples/$$action --action $$action --half --out build/examples/$$action.npz; \
 	  mv build/examples/$$action.npz $(WEIGHTS)/$$action.npz; \
 	done
 

@@ -93,15 +93,15 @@ class Flight:
         return quaternion.continuous(quaternion.normalized(turned[np.searchsorted(knots, times)]))
 
 
-def fly(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0) -> Flight:
+def fly(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0, landing: bool = False) -> Flight:
     """The way of a ball for `seconds` after its launch over level ground at height `ground` m (eq. 6).
 
-    A ball launched lower than it can lie is set onto the ground. InputError: seconds that are no time.
+    landing: it ends where the ball first comes down, where that is before. A ball launched lower than it can lie is set onto the ground. InputError: seconds that are no time.
     """
     if not 0.0 <= seconds < np.inf:
         raise InputError("flight", f"{seconds} seconds", "a time of 0 s or more")
     flight = _Integrator(launch, ball, launch.time + max(float(seconds), 1e-9), ground + ball.radius)
-    return flight.whole()
+    return flight.whole(landing)
 
 
 class _Integrator:
@@ -117,11 +117,13 @@ class _Integrator:
         self.bounces: list[float] = []
         self.rolls_from = self.rests_from = None
 
-    def whole(self) -> Flight:
+    def whole(self, landing: bool) -> Flight:
         if self.position[2] <= self.low and self.velocity[2] <= LEAST_HOP:
             self._meet_ground()
         while self._flies() and self._left():
             self._air()
+            if landing and self._left():
+                self.end = self.time
         if self._left():
             self._slide()
         if self._left():

@@ -79,25 +79,25 @@ class _Aim:
 
     def __init__(self, style: KickStyle, neutral: Neutral, foot: str, ball: Ball):
         self.style, self.neutral, self.foot, self.ball = style, neutral, foot, ball
-        ends, _ = contact(style, neutral, foot)
-        steep = ends[0, 2] - ends[1, 2] > _STEEP * np.linalg.norm(ends[0] - ends[1])
-        self.ways = np.array([self._cleared(loft) if steep else (lift, 0.0) for loft, lift in zip(_LOFTS, _LIFTS)])
-        launches = [np.concatenate(self.launch(*way)) for way in self.ways]
-        rising = np.array([np.arctan2(launch[5], np.hypot(launch[3], launch[4])) for launch in launches])
+        steep = _slopes(contact(style, neutral, foot, [(0.0, 0.0)])[0])[0] > _STEEP
+        self.ways = self._cleared(_LOFTS) if steep else np.stack([_LIFTS, np.zeros_like(_LIFTS)], axis=-1)
+        launches = self.launches_of(self.ways)
+        rising = np.arctan2(launches[:, 5], np.hypot(launches[:, 3], launches[:, 4]))
         order = np.argsort(rising)
-        self.rising, self.ways, self.launches = rising[order], self.ways[order], np.array(launches)[order]
+        self.rising, self.ways, self.launches = rising[order], self.ways[order], launches[order]
 
-    def _cleared(self, loft: float) -> tuple[float, float]:
-        """(lift, loft) with the toes just over the ground."""
-        ends, _ = contact(self.style, self.neutral, self.foot, 0.0, loft)
-        return (_CLEAR - float(ends[1, 2])) / (self.neutral.leg / LEG), loft
+    def _cleared(self, lofts: np.ndarray) -> np.ndarray:
+        """Ways (N, 2) (lift, loft) with the toes just over the ground."""
+        ends, _ = contact(self.style, self.neutral, self.foot, [(0.0, loft) for loft in lofts])
+        return np.stack([(_CLEAR - ends[:, 1, 2]) / (self.neutral.leg / LEG), lofts], axis=-1)
 
-    def launch(self, lift: float, loft: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The ball's place (3,) m, velocity (3,) m/s and spin (3,) rad/s at the table's pace."""
-        ends, velocities = contact(self.style, self.neutral, self.foot, lift, loft)
-        centre = _touching(ends, velocities.mean(axis=0), self.ball.radius)
-        found = struck(ends[None], velocities[None], FOOT_RADIUS, centre[None], self.ball)
-        return centre, found.velocity[0], found.spin[0]
+    def launches_of(self, ways: np.ndarray) -> np.ndarray:
+        """The ball's place m, velocity m/s and spin rad/s (N, 9) at the table's pace, in ways (N, 2) of (lift, loft)."""
+        ends, velocities = contact(self.style, self.neutral, self.foot, ways)
+        middle = velocities.mean(axis=1)
+        centre = np.stack([_touching(*each, self.ball.radius) for each in zip(ends, middle)])
+        found = struck(ends, velocities, FOOT_RADIUS, centre, self.ball)
+        return np.concatenate([centre, found.velocity, found.spin], axis=-1)
 
     def at(self, target: np.ndarray, speed: float, fps: float) -> Kick:
         """The kick whose ball flies through the target, the ball at the origin."""
@@ -105,14 +105,17 @@ class _Aim:
         start = np.array([0.0, 0.0, self.ball.radius])
         fallen = 0.5 * self.ball.gravity * (away / speed) ** 2
         up, side = float(np.arctan2(target[2] - self.ball.radius + fallen, away)), 0.0
+        near = False
         for number in range(_ROUNDS + 2):
-            way = tuple(_between(up, self.rising, self.ways))
-            exact = number >= _ROUNDS
-            centre, velocity, spin = self.launch(*way) if exact else np.split(_between(up, self.rising, self.launches), 3)
+            way = _between(up, self.rising, self.ways)
+            exact = near or number >= _ROUNDS
+            launch = self.launches_of(way[None])[0] if exact else _between(up, self.rising, self.launches)
+            centre, velocity, spin = np.split(launch, 3)
             rate = speed / float(np.linalg.norm(velocity))
             turn = float(np.arctan2(target[1], target[0]) - np.arctan2(velocity[1], velocity[0])) + side
             spun = quaternion.rotate(quaternion.about_up(np.array(turn)), np.stack([rate * velocity, rate * spin]))
             met, _ = meets_wall(start, spun[0], self.ball, target[:2], target[:2], spin=spun[1])
+            near = near or np.linalg.norm(met - target) < _HIT
             if exact and np.linalg.norm(met - target) < _HIT:
                 break
             up += float(np.arctan2(target[2] - met[2], away))
@@ -125,6 +128,11 @@ class _Aim:
         motion = kicked(self.style, self.neutral, self.foot, *way, rate, turn, fps)
         back = start - quaternion.rotate(quaternion.about_up(np.array(turn)), centre)
         return Kick(place(motion, 0.0, back), BEFORE / rate, self.foot, start, *spun)
+
+
+def _slopes(ends: np.ndarray) -> np.ndarray:
+    """Sines (N,) of how steeply feet with ends (N, 2, 3) point down."""
+    return (ends[:, 0, 2] - ends[:, 1, 2]) / np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
 
 
 def _between(value: float, values: np.ndarray, rows: np.ndarray) -> np.ndarray:

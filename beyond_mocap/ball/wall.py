@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .flight import Launch, fly
+from .flight import LEAST_HOP, Launch, fly
 from .physics import Ball
 
 _LONGEST = 6.0  # s that a flight is followed
@@ -22,7 +22,8 @@ def meets_wall(
     (2,): from where it is thrown towards it, the wall's normal.
     """
     unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
-    flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST, 0.5 + 4.0 * unhindered))
+    free = position[2] > ball.radius or velocity[2] > LEAST_HOP  # else it bounces as it is launched
+    flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST, 0.5 + 4.0 * unhindered), landing=free)
     touches = [time for time in (*flight.bounces[:1], flight.rolls_from) if time is not None and time > _STEP]
     last = min(touches, default=flight.end)
     times = np.append(np.arange(0.0, last, _STEP), last)

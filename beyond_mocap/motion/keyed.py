@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
@@ -10,8 +12,15 @@ from .gait_tables import smooth_step
 
 def keyed(rows, times: np.ndarray) -> np.ndarray:
     """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the last."""
+    first, last, curve = _curve(tuple(map(tuple, rows)))
+    return curve(np.clip(times, first, last))
+
+
+@lru_cache(maxsize=256)
+def _curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
+    """First and last time and the curve of a table; kept, as a made movement is planned again and again."""
     table = np.array(rows, dtype=float)
-    return PchipInterpolator(table[:, 0], table[:, 1:], axis=0)(np.clip(times, table[0, 0], table[-1, 0]))
+    return table[0, 0], table[-1, 0], PchipInterpolator(table[:, 0], table[:, 1:], axis=0)
 
 
 def envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:

@@ -9,6 +9,7 @@ trunk inclined to the standing leg. Here is the body alone; what its foot gives 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,27 +146,33 @@ def kicked(
 
 
 def contact(
-    style: KickStyle, neutral: Neutral, foot: str = "right", lift: float = 0.0, loft: float = 0.0
+    style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Places (2, 3) m and velocities (2, 3) m/s of ankle and toe joint at the contact of `kicked` with the same."""
-    motion = _planned(style, neutral, foot, lift, loft, -_NEAR, _NEAR)
+    """Places (N, 2, 3) m and velocities (N, 2, 3) m/s of ankle and toe joint at the contact of `kicked` with the same, in
+    N ways of (lift, loft)."""
+    count = int(round(2.0 * _NEAR * _PLAN))
+    times = np.arange(count + 1) / _PLAN - _NEAR
+    before, curve = _upright(style, neutral, times)
+    around = slice(count // 2 - 1, count // 2 + 2)
+    each = [_swung(before, style, times, neutral, curve, lift, loft).frames(around) for lift, loft in ways]
+    motion = to_motion(Posture.joined(each), neutral)
+    motion = mirror(motion) if foot == "left" else motion
     limb = getattr(identify(motion.skeleton), foot)
-    middle = int(round(_NEAR * _PLAN))
-    frames = slice(middle - 1, middle + 2)
-    places, _ = pose_kinematics(motion.skeleton, motion.root_positions[frames], motion.rotations[frames])
-    line = places[:, [limb.foot, limb.toe_or_foot]]
-    return line[1], 0.5 * _PLAN * (line[2] - line[0])
+    places, _ = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    line = places[:, [limb.foot, limb.toe_or_foot]].reshape(len(each), 3, 2, 3)
+    return line[:, 1], 0.5 * _PLAN * (line[:, 2] - line[:, 0])
 
 
 def _planned(style, neutral: Neutral, foot: str, lift: float, loft: float, first: float, last: float) -> Motion:
     """The kick between two seconds, finely."""
     times = np.arange(int(round((last - first) * _PLAN)) + 1) / _PLAN + first
-    motion = to_motion(_posture(style, neutral, lift, loft, times), neutral)
+    posture, curve = _upright(style, neutral, times)
+    motion = to_motion(_swung(posture, style, times, neutral, curve, lift, loft), neutral)
     return mirror(motion) if foot == "left" else motion
 
 
-def _posture(style: KickStyle, neutral: Neutral, lift: float, loft: float, times: np.ndarray) -> Posture:
-    """The kick's posture at the planning rate."""
+def _upright(style: KickStyle, neutral: Neutral, times: np.ndarray) -> tuple[Posture, Callable]:
+    """The kick's posture at the planning rate, but for the way of the leg that swings; and how its tables are read."""
     scale = neutral.leg / tables.LEG
 
     def curve(rows) -> np.ndarray:
@@ -196,7 +203,7 @@ def _posture(style: KickStyle, neutral: Neutral, lift: float, loft: float, times
         toes=np.stack([foot[:, 6] for foot in feet], axis=-1),
         knees=np.zeros((len(times), 2)),
     )
-    return _swung(posture, style, times, neutral, curve, lift * scale, np.radians(loft))
+    return posture, curve
 
 
 _NOD = ((-1.5, 8), (-0.6, 16), (0.0, 26), (0.15, 20), (0.4, -4), (1.3, 0))
@@ -285,6 +292,7 @@ def _swung(
     posture: Posture, style: KickStyle, times: np.ndarray, neutral: Neutral, curve, lift: float, loft: float
 ) -> Posture:
     """The posture with its right leg swung as the style has it, from where it leaves the ground until it comes back."""
+    lift, loft = lift * neutral.leg / tables.LEG, np.radians(loft)
     thigh, knee = np.radians(curve(style.leg)).T
     turn, abduction = np.radians(curve(style.plane)).T
     bent, out = np.radians(curve(style.foot)).T

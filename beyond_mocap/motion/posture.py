@@ -6,6 +6,7 @@ stance."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -52,6 +53,12 @@ class Posture:
     def changed(self, **arrays: np.ndarray) -> "Posture":
         """The same posture with some arrays replaced."""
         return replace(self, **arrays)
+
+    @classmethod
+    def joined(cls, parts: Sequence["Posture"]) -> "Posture":
+        """The frames of several, one after the other, at the first one's rate."""
+        arrays = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls) if f.name != "fps"}
+        return cls(fps=parts[0].fps, **arrays)
 
     def frames(self, where: slice) -> "Posture":
         """A stretch of the frames."""

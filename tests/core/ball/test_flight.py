@@ -46,6 +46,15 @@ def test_bounces_come_when_and_where_the_closed_form_says():
     assert len(flight.bounces) < 15  # and then it stays on the ground: no endless row of ever lower hops
 
 
+def test_a_flight_up_to_its_landing_is_the_first_piece_of_the_whole():
+    launch = launched((8.0, 1.0, 4.0), spin=(0.0, 30.0, 5.0), height=1.3)
+    whole, first = fly(launch, FOOTBALL, 6.0), fly(launch, FOOTBALL, 6.0, landing=True)
+    assert first.end == whole.bounces[0] < whole.end and len(first.bounces) == 1
+    t = np.linspace(0.0, first.end, 40)
+    assert np.array_equal(first.at(t[:-1]), whole.at(t[:-1]))
+    assert fly(launch, FOOTBALL, 0.2, landing=True).end == 0.2
+
+
 def test_linear_drag_is_the_papers():
     t = np.linspace(0.0, 2.0, 30)
     fallen = 9.8 / 0.2 * (t - (1.0 - np.exp(-0.2 * t)) / 0.2)

@@ -25,13 +25,13 @@ def test_a_harder_kick_swings_further_back_and_faster():
     feet = []
     for speed in (13.0, 22.0):
         style = kick_style(who, KICKS["instep"], speed, np.random.default_rng(1))
-        feet.append(np.linalg.norm(contact(style, neutral_stance(who.skeleton))[1], axis=1).max())
+        feet.append(np.linalg.norm(contact(style, neutral_stance(who.skeleton), "right", [(0.0, 0.0)])[1][0], axis=1).max())
     assert feet[1] > feet[0]
 
 
 def test_the_contact_told_is_the_one_of_the_whole_kick():
     neutral = neutral_stance(kicker(2).skeleton)
-    ends, _ = contact(KICKS["instep"], neutral, "left", 0.03, 4.0)
+    ends = contact(KICKS["instep"], neutral, "left", [(0.0, 0.0), (0.03, 4.0)])[0][1]
     motion = kicked(KICKS["instep"], neutral, "left", 0.03, 4.0, fps=480.0)
     from beyond_mocap.motion.humanoid import identify
     from beyond_mocap.motion.motion import forward_kinematics
