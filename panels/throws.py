@@ -46,6 +46,7 @@ def shown(layout, wish) -> None:
     table(layout, wish.figures.splitlines())
     for line in wish.told.splitlines():
         paragraph(layout, line, "INFO")
+    layout.prop(wish, "live")
     row = layout.row(align=True)
     row.operator("beyond_mocap.keep_throw", text="Keep", icon="CHECKMARK")
     row.operator("beyond_mocap.leave_throw", text="Leave", icon="X")

@@ -55,6 +55,7 @@ from .ride.settings import BeyondMocapRide
 from .stream import follow as stream_follow
 from .stream import play, receiver
 from .stream import settings as stream
+from .throws import live as throws_live
 from .throws import settings as throws
 
 CLASSES = (
@@ -125,6 +126,7 @@ def register():
     ride_measure.register()
     hits_shown.register()
     aimed_live.register()
+    throws_live.register()
     receiver.register()
     stream_follow.register()
     play.register()
@@ -137,6 +139,7 @@ def unregister():
     stream_follow.unregister()
     receiver.unregister()
     passes_live.unregister()
+    throws_live.unregister()
     aimed_live.unregister()
     hits_shown.unregister()
     ride_measure.unregister()

@@ -5,6 +5,7 @@
 - `targets`    where the target is, and where it goes
 - `made`       the throw that an order asks for, worked out in any thread
 - `shown`      the throw laid on the armature, and taken away again
+- `live`       sees that target or settings have changed, and has it made again
 - `rigged`     the same on the controls of a rig
 - `earlier`    what the ball does before
 - `flown`      the ball: in the hand or lying, then its flight and its trajectory

@@ -5,6 +5,7 @@ Seconds are scene frames over the scene's rate, so the throw's frames are the sc
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ class Order:
     of one that stands. at: s of the release; begins: s of the scene's first frame; waits: whether the release may come
     later so that the throw does not begin before that. speed: m/s, 0 as usual. ball_place: (3,) m where a ball that is
     kicked lies, None where it suits. model: a file, "" for what comes with the extension. folder:
-    the library's, "" for none; build: how it is built.
+    the library's, "" for none; build: how it is built. digest: of the settings.
     """
 
     body: str
@@ -63,17 +64,31 @@ class Order:
     unit: float | None
     library: "Library | None"
     build: dict = field(default_factory=dict)
+    digest: str = ""
 
 
-def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> Order:
-    """What an armature's settings ask for; InputError where that makes no sense, or where it cannot be animated."""
+def digest(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> str:
+    """What an armature's settings ask for, to be compared. A target that moves by itself is told by its name alone."""
+    wish, common = body.beyond_mocap_throw, scene.beyond_mocap
+    folder = common.library_folder if wish.library else ""
+    model = wish.throw_model if act == "throw" else wish.kick_model
+    ball = wish.ball.name if wish.ball is not None else ""
+    plain = (act, wish.side, wish.frame, round(wish.speed, 3), ball, wish.kind, folder, model, wish.seed)
+    return json.dumps([*plain, targets.told_by(scene, wish)])
+
+
+def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: int = 0) -> Order:
+    """What an armature's settings ask for, on `frame`, 0 as they say; InputError where that makes no sense, or where it
+    cannot be animated."""
     wish, common = body.beyond_mocap_throw, scene.beyond_mocap
     check(scene, body)
     fps, rig = frames_per_second(scene), rigged.rig_of(scene, body)
     skeleton = armature.skeleton_of(body, scene) if rig is None else rig.skeleton
     own, first = _own(scene, body) if rig is None else rigged.own(scene, body)
     place, facing = _stands(scene, body, skeleton) if rig is None else rigged.stands(rig)
-    limb, frame = f"{wish.side}_{LIMBS[act]}", wish.frame or scene.frame_current
+    limb, frame = f"{wish.side}_{LIMBS[act]}", frame or wish.frame
+    waits = not frame and (act == "throw" or wish.ball is None or earlier.moves(wish.ball, wish) is None)
+    frame = frame or scene.frame_current
     model = wish.throw_model if act == "throw" else wish.kick_model
     folder = absolute(common.library_folder) if wish.library and common.library_folder else ""
     unit = common.library_unit or None
@@ -81,10 +96,11 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> Order:
         body=body.name, act=act, limb=limb, skeleton=skeleton, table=rig.table if rig is not None else {},
         lift=rigged.lift(rig) if rig is not None and act == "throw" else 0.0, fps=fps, own=own, first=first, place=place,
         facing=facing, targets=targets.places(scene, wish, frame), at=frame / fps, begins=scene.frame_start / fps,
-        waits=not wish.frame and (act == "throw" or wish.ball is None or earlier.moves(wish.ball, wish) is None), speed=wish.speed,
+        waits=waits, speed=wish.speed,
         kind=USUAL[act] if wish.kind == "usual" else wish.kind, ball_place=_lies(scene, wish, frame) if act == "kick" else None,
         model=absolute(model) if model else "", seed=wish.seed, folder=folder, unit=unit,
         library=session.library(folder, unit) if folder else None, build=preferences.for_build(folder) if folder else {},
+        digest=digest(scene, body, act),
     )
 
 

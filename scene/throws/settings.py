@@ -57,6 +57,12 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
         description="A trained model (.npz) of kicks; empty: the one that comes with the extension",
     )
     seed: IntProperty(name="Seed", default=0, min=0, description="Another number, another throw at the same target")
+    live: BoolProperty(
+        name="Follow", default=True,
+        description="Make what is shown again when the target is dragged or these settings are edited, until it is kept",
+    )
+    made_of: StringProperty(name="Made of", options={"HIDDEN"}, description="The settings that it was made of")
+    asked: IntProperty(name="Asked", options={"HIDDEN"}, description="The frame on which it was made to leave")
     made: StringProperty(name="Made", options={"HIDDEN"}, description="throw or kick; empty: none is shown")
     rigged: BoolProperty(name="Rigged", options={"HIDDEN"}, description="Whether it is shown on a rig's controls")
     release: FloatProperty(name="Released", options={"HIDDEN"}, description="Scene frame on which the ball leaves")

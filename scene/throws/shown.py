@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 MOST_LINES = 12
 BAKED = (rig_bake.MARK, rig_bake.BEFORE, rig_bake.KEYS)
 """What tells a bake that is taken away again."""
-RESULTS = ("made", "rigged", "release", "figures", "told")
+RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "told")
 
 
 def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> None:
@@ -42,6 +42,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
     last = joined.start + (len(joined.motion) - 1) / fps
     bake.lengthen(scene, fps * max(joined.release + result.seconds, last))
     wish.made, wish.release = result.order.act, joined.release * fps
+    wish.made_of, wish.asked = result.order.digest, round(result.order.at * fps)
     wish.figures = "\n".join(figures(result))
     told = [*result.thrown.warnings, *joined.warnings, *more]
     wish.told = "\n".join(list(dict.fromkeys(str(line) for line in told))[:MOST_LINES])

@@ -35,6 +35,15 @@ def places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.nda
     return found
 
 
+def told_by(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> list | str:
+    """Where the target is, units, or the name of one that may move by itself."""
+    target = wish.target
+    if target is not None and _may_move(target):
+        return target.name
+    place = scene.cursor.location if target is None else target.matrix_world.translation
+    return [round(value, 5) for value in place]
+
+
 def _may_move(thing: bpy.types.Object) -> bool:
     """Whether keys, drivers or constraints have a say in where an object is, or in where its parents are."""
     while thing is not None:

@@ -482,3 +482,117 @@ def test_a_target_that_moves_is_met_where_it_is_by_then():
 def curves_of(thing):
     channels = importlib.import_module(f"{EXTENSION}.scene.channels")
     return channels.curves(*channels.playing(thing)).values()
+
+
+def test_keeping_and_the_second_throw_are_one_step_of_undo_each():
+    body = a_body()
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert_one_step(bpy.ops.beyond_mocap.keep_throw)
+    body = bpy.context.object
+    wish = body.beyond_mocap_throw
+    wish.ball = next(thing for thing in bpy.data.objects if "Ball" in thing.name)
+    wish.frame = 260
+    assert_one_step(bpy.ops.beyond_mocap.throw_at_target)
+    assert_one_step(bpy.ops.beyond_mocap.leave_throw)
+
+
+def test_an_armature_that_is_scaled_and_hangs_on_something():
+    body = a_body(target=(20.0, 6.0, 1.2))
+    hangs = an_empty((2.0, 3.0, 0.0))
+    hangs.rotation_euler.z, hangs.scale = 0.8, (1.1, 1.1, 1.1)
+    body.parent, body.scale = hangs, tuple(value * 0.9 for value in body.scale)
+    bpy.context.view_layer.update()
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    wish = body.beyond_mocap_throw
+    first = int(np.floor(wish.release))
+    assert closest(wish.flown, np.array((20.0, 6.0, 1.2)), first + 1, first + 60) < 0.10
+    steps = [np.linalg.norm(ball_at(wish.flown, f + 1) - ball_at(wish.flown, f)) for f in range(first - 2, first + 4)]
+    assert max(steps) < 1.5 * min(steps[-2:])
+
+
+@pytest.mark.parametrize("how", ["hide_viewport", "hide_set", "hide_render"])
+def test_a_hidden_ball_flies_too(how):
+    body = a_body()
+    ball = body.beyond_mocap_throw.ball = a_ball((0.3, 0.2, 0.11))
+    if how == "hide_set":
+        ball.hide_set(True)
+    else:
+        setattr(ball, how, True)
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    ball.hide_viewport = False
+    ball.hide_set(False)
+    first = int(np.floor(body.beyond_mocap_throw.release))
+    assert closest(ball, np.array(TARGET), first + 1, first + 60) < 0.10
+
+
+def test_an_armature_of_another_file_throws_as_an_override_only(tmp_path):
+    body = a_body()
+    path = str(tmp_path / "body.blend")
+    bpy.data.libraries.write(path, {body})
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (there, here):
+        here.objects = [name for name in there.objects if name == "standing_1"]
+    linked = here.objects[0]
+    bpy.context.scene.collection.objects.link(linked)
+    worlds.choose(linked)
+    refused("linked from")
+    own = linked.override_create(remap_local_usages=True)
+    own.override_library.is_system_override = False
+    worlds.choose(own)
+    wish = own.beyond_mocap_throw
+    wish.target, wish.frame = an_empty(TARGET), 60
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    first = int(np.floor(wish.release))
+    assert closest(wish.flown, np.array(TARGET), first + 1, first + 60) < 0.10
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert not wish.made
+
+
+def test_a_ball_that_a_hand_has_put_down_is_kicked_there(room):
+    body = a_body(target=(16.0, 3.0, 0.8), frame=90)
+    wish, ball = body.beyond_mocap_throw, a_ball((0.3, 0.3, 0.9))
+    bone = room("passes.possession").bone_of(bpy.context.scene, body, "hand", "right")
+    room("passes.possession").take(bpy.context.scene, ball, body, bone, 5, 30)
+    wish.ball = ball
+    refused("m above the ground", bpy.ops.beyond_mocap.kick_at_target)  # he stands: it is let go beside the hip
+    wish.frame = 20
+    refused("carries it on frame 20", bpy.ops.beyond_mocap.kick_at_target)
+
+
+def test_what_is_shown_follows_its_target(room):
+    live, scene = room("throws.live"), bpy.context.scene
+    body = a_body()
+    assert live.due(scene) is None
+    press(bpy.ops.beyond_mocap.throw_at_target)
+    wish = body.beyond_mocap_throw
+    assert live.due(scene) is None
+    wish.target.location.y += 2.0
+    bpy.context.view_layer.update()
+    wish.live = False
+    assert live.due(scene) is None
+    wish.live = True
+    assert live.due(scene) == body and live.due(scene) is None  # once
+    job = live.begin(scene, body)
+    while not job.poll():
+        pass
+    live.finish(scene, job)
+    first = int(np.floor(wish.release))
+    assert closest(wish.flown, np.array(TARGET) + [0.0, 2.0, 0.0], first + 1, first + 60) < 0.10
+    assert live.due(scene) is None
+    wish.target.location.y += 1.0
+    bpy.context.view_layer.update()
+    late = live.begin(scene, body)
+    while not late.poll():
+        pass
+    wish.target.location.y -= 1.0  # and back before it was there
+    bpy.context.view_layer.update()
+    live.finish(scene, late)
+    assert closest(wish.flown, np.array(TARGET) + [0.0, 2.0, 0.0], first + 1, first + 60) < 0.10
+    wish.speed = 2.0
+    refused_job = live.begin(scene, body)
+    while not refused_job.poll():
+        pass
+    with pytest.raises(Exception, match="m/s or more"):
+        live.finish(scene, refused_job)
+    press(bpy.ops.beyond_mocap.leave_throw)
+    assert live.due(scene) is None
