@@ -83,8 +83,10 @@ def figures(result: "Result") -> list[str]:
     up = np.degrees(np.arctan2(velocity[2], level))
     limb = "Wrist" if result.order.act == "throw" else "Ankle"
     lines = [
-        f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up",
-        f"Passes the target by: {100.0 * thrown.impact_error:.1f} cm", f"Flight to the target: {result.seconds:.2f} s",
+        f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s",
+        f"Launch angle: {up:.0f}\N{DEGREE SIGN}",
+        f"Passes the target by: {100.0 * thrown.impact_error:.1f} cm",
+        f"Flight to the target: {result.seconds:.2f} s",
         f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm", f"Slowest that gets there: {thrown.slowest:.1f} m/s",
     ]
     if np.isfinite(result.usual_jerk):

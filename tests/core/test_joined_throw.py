@@ -189,3 +189,36 @@ def test_who_has_no_time_to_get_back_goes_on_from_there(library, made):
     assert same_where_kept(joined, motion) and any("no time to get back" in line for line in way.warnings)
     speed = np.linalg.norm(np.diff(joined.motion.root_positions[:, :2], axis=0), axis=1) * FPS
     assert speed.max() < 1.25 * 4.2
+
+
+def test_who_only_stands_does_not_wait_but_the_throw_is_the_same(made):
+    motion, release = made.motion, made.release
+    root, rotations = motion.root_positions, motion.rotations
+    still = Motion(
+        motion.skeleton, np.concatenate([root[:1].repeat(60, axis=0), root, root[-1:].repeat(45, axis=0)]),
+        np.concatenate([rotations[:1].repeat(60, axis=0), rotations, rotations[-1:].repeat(45, axis=0)]), motion.fps,
+    )
+    shown, at = joined_throw.without_waiting(still, release + 60 / FPS, keeps=0.1)
+    first = round((release + 60 / FPS - at) * FPS)
+    assert 57 <= first and len(shown) <= len(motion) + 6
+    assert np.array_equal(shown.rotations, still.rotations[first : first + len(shown)])
+    before, _ = joined_throw.without_waiting(still, release + 60 / FPS, keeps=1.0)
+    assert len(before) >= len(shown) + 45
+
+
+def test_who_stands_steps_into_a_throw_without_a_library():
+    one = throw((18.0, 0.0, 1.0), 25.0, fps=FPS)
+    own = joined_throw.standing(one.motion.skeleton, 12.0, FPS, one.motion.root_positions[0, :2] - [0.0, 0.15], 0.0)
+    slides = []
+    for goes_on in (False, True):  # faded; stepped
+        fade = joined_throw.EASED["throw"]
+        joined = joined_throw.laid_into(own, 0.0, one.motion, one.release, AT, goes_on=goes_on, fade=fade)
+        assert same_where_kept(joined, one.motion)
+        body = joined_throw.identify(own.skeleton)
+        toes = forward_kinematics(joined.motion)[0][joined.first - 3 : joined.kept[0] + 3, [body.left.toe_or_foot, body.right.toe_or_foot]]
+        speed = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1) * FPS
+        low = toes[1:, :, 2] < toes[..., 2].min() + 0.01
+        slides.append(float((speed * low).sum() / FPS))
+    assert slides[1] < 0.5 * slides[0]
+    usual = windowed(jerk(forward_kinematics(one.motion)[0], FPS)).max()
+    assert joined_throw.seam_jerk(joined).max() < usual
