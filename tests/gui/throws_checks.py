@@ -104,3 +104,37 @@ def check_panel_is_quick():
         yield 0.1
     panel.draw = drawn
     within("ms to draw Throws & Kicks", 1000.0 * float(np.median(took)), 2.0)
+
+
+def thrown():
+    """Throw, and wait until it is there."""
+    yield from press("throw_at_target")
+    yield from until(lambda: body().beyond_mocap_throw.made, what="a throw comes")
+    yield from settled()
+
+
+def check_it_follows_its_target():
+    """Moved, the target has the throw made again; one undo takes both back."""
+    yield from scene_of_one()
+    began = len(output.text())
+    yield from thrown()
+    first, area = body().beyond_mocap_throw.figures, window.area("VIEW_3D")
+    for thing in window.window.view_layer.objects:
+        thing.select_set(thing.name == "Target")
+    window.window.view_layer.objects.active = bpy.data.objects["Target"]
+    with bpy.context.temp_override(window=window.window, area=area, region=area.regions[-1]):
+        bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(2.0, 3.0, 0.5))
+    took = yield from until(lambda: body().beyond_mocap_throw.figures != first, what="it follows")
+    output.say(f"     followed after {took:.1f} s")
+    window.picture(PICTURES / "throw-followed.png")
+    there, most = np.array(bpy.data.objects["Target"].location), 1e9
+    for frame in range(71, 130):
+        window.window.scene.frame_set(frame)
+        ball = body().beyond_mocap_throw.flown
+        most = min(most, float(np.linalg.norm(np.array(ball.matrix_world.translation) - there)))
+    assert most < 0.5, f"the ball passes the target by {most:.2f} m"
+    bpy.ops.ed.undo()
+    yield from settled()
+    assert np.allclose(bpy.data.objects["Target"].location, (16.0, 2.0, 1.2), atol=1e-4)
+    assert body().beyond_mocap_throw.figures == first
+    assert_no_trouble_since(began)
