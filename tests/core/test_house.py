@@ -6,6 +6,7 @@ Every import of every file is written as one dotted name from the clone's top, s
 """
 
 import ast
+import functools
 import pathlib
 import re
 import sys
@@ -20,6 +21,7 @@ BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui"
            "addon_utils", "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}
 ARRAYS = {"numpy", "scipy"}
 FORBIDDEN = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve"}
+parsed = functools.cache(ast.parse)  # each file is looked at by several tests
 DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc"}
 
 # A room of the core -> the other rooms it may import. Every room may raise the core's own errors.
@@ -94,7 +96,7 @@ def imports_of(path, text):
         for child in ast.iter_child_nodes(node):
             visit(child, lazy)
 
-    visit(ast.parse(text), False)
+    visit(parsed(text), False)
     return found
 
 
@@ -223,7 +225,7 @@ def test_nothing_is_unpickled_or_evaluated():
     for path in sources(CORE, *EXTENSION, "training", "packaging", "sample_blend", "benchmarks"):
         text = (TOP / path).read_text("utf-8")
         offences += [i.where for i in imports_of(path, text) if i.name.split(".")[0] in FORBIDDEN]
-        for node in ast.walk(ast.parse(text)):
+        for node in ast.walk(parsed(text)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in {"eval", "exec"}:
                 offences.append(f"{path}:{node.lineno}")
             if isinstance(node, ast.keyword) and node.arg == "allow_pickle" and getattr(node.value, "value", None):

@@ -11,7 +11,6 @@ from beyond_mocap.ball.sample_scenes import SAMPLES
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.files.scene_json import parse_scene
-from beyond_mocap.library.library import build
 from beyond_mocap.live_passes import FADE, answer, begin
 from beyond_mocap.motion.motion import forward_kinematics
 
@@ -19,8 +18,8 @@ CLIPS = Path(__file__).resolve().parents[2] / "sample_blend" / "passes" / "libra
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    return build(CLIPS, cache_dir=tmp_path_factory.mktemp("cache"))
+def library(strikes_library):
+    return strikes_library
 
 
 @pytest.fixture(scope="module")
