@@ -204,28 +204,18 @@ class Window:
                 bpy.ops.ui.copy_data_path_button(full_path=True)
         return manager.clipboard
 
-    def find(self, area, region, wanted, what, limit=60.0):
-        """Where the first thing is that `wanted(text)` is true of, looked for from the top of the region, page by page,
-        again and again: what shows it may not be drawn yet. what(area, region): the text of what is under the pointer."""
-        found = yield from self.visit(area, region, lambda _: False, what, lambda found, _: any(map(wanted, found)), limit)
-        return next(place for text, place in found.items() if wanted(text))
-
     def click_first(self, area, region, wanted, what, limit=60.0):
-        """Click the first thing that `wanted(text)` is true of, looked for as `find` does."""
-        yield from self.visit(area, region, wanted, what, lambda _, clicked: clicked, limit)
-
-    def visit(self, area, region, wanted, what, done, limit):
-        """Scan from the top of the region, page by page, again and again, until done(found, clicked); return what was
-        found last."""
+        """Click the first thing that `wanted(text)` is true of, looked for from the top of the region, page by page, again
+        and again: what shows it may not be drawn yet. what(area, region): the text of what is under the pointer."""
         start = time.monotonic()
         while time.monotonic() - start < limit:
             area.tag_redraw()
             yield from self.to_the_top(area, region)
             more = True
             while more:
-                found, clicked = yield from self.scan(area, region, what, wanted)
-                if done(found, clicked):
-                    return found
+                _, clicked = yield from self.scan(area, region, what, wanted)
+                if clicked:
+                    return
                 more = yield from self.scroll(area, region)
         raise AssertionError("not found in the sidebar")
 
