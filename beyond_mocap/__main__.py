@@ -410,7 +410,8 @@ class _interrupts:
 
     def __exit__(self, *_):
         for kind, before in self._before.items():
-            signal.signal(kind, before)
+            # None: not set from Python, as by Blender for itself, and not to be had back from there
+            signal.signal(kind, signal.SIG_DFL if before is None else before)
 
     def _asked(self, *_):
         if self._told.cancelled():

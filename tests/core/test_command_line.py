@@ -482,6 +482,20 @@ def test_the_second_ctrl_c_breaks_off_what_does_not_listen():
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
+def test_signals_that_python_did_not_set_are_left_as_the_system_has_them(monkeypatch):
+    """Blender sets handlers of its own before Python: `signal.signal` then returns None, which it does not take back."""
+    before = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
+    put = signal.signal
+    with monkeypatch.context() as patched:
+        patched.setattr(signal, "signal", lambda kind, handler: put(kind, handler) and None)
+        with _interrupts(Told(False)):
+            assert signal.getsignal(signal.SIGTERM) not in before.values()
+    after = [signal.getsignal(kind) for kind in before]
+    for kind, handler in before.items():
+        put(kind, handler)
+    assert after == [signal.SIG_DFL, signal.SIG_DFL]
+
+
 needs_data = pytest.mark.skipif(
     not (DATA / "mocap" / "cmu10").is_dir(), reason="needs the recordings in ../shared/data"
 )
