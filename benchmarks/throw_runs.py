@@ -103,6 +103,7 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
         Variant("start", "as the shipped weights: limbs guided, linear by phase, the ridge chosen", shipped, True),
         Variant("start-raw", "as the shipped weights", shipped, False),
         Variant("start-everyone", "as the shipped weights, from all others retargeted (§10.2)", shipped, True, True),
+        Variant("start-warped", "as the shipped weights, phases warped in time (§9.3)", {**shipped, "phase": "warped"}, True),
         Variant("ours", "six networks trained in order, fed back (§9.4)", ours, True),
         Variant("ours-ik", "ours with inverse kinematics inside the loss (§9.4)", {**ours, "ik_layer": True}, True),
         Variant("ours-warped", "ours with phases warped in time (§9.3)", {**ours, "phase": "warped"}, True),

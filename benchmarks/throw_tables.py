@@ -36,7 +36,8 @@ PAIRS = (
     ("Trained in order and fed back (§9.4) or each alone", "ours", "hierarchy", ""),
     ("The shipped weights' start, trained on in order and fed back, or as it is", "ours", "start", ""),
     ("Inverse kinematics inside the loss or after the fact", "ours-ik", "ours", ""),
-    ("Phases warped in time (§9.3) or by travelled distance", "ours-warped", "ours", ""),
+    ("Phases warped in time (§9.3) or by travelled distance", "start-warped", "start", ""),
+    ("The same, trained on", "ours-warped", "ours", ""),
 )
 """Heading, the new way, the old way, and which of his experiments it repeats."""
 _HIS = {"first": (fredriksson.HIERARCHY_RAW, fredriksson.SINGLE, fredriksson.FIRST),
@@ -82,7 +83,7 @@ def deviations(one: Mapping) -> np.ndarray:
 def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
     """One experiment with one kind of data; nothing where one of the two is missing."""
     ours, against = subjects(found, data, new), subjects(found, data, old)
-    if ours is None or against is None:
+    if ours is None or against is None or len(set(ours.subjects) & set(against.subjects)) < 2:
         return []
     his_new, his_old, printed = his if data == "planted" else (None, None, None)
     lines = [f"**{WORDS[data]}**", ""]
