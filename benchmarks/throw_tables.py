@@ -59,7 +59,9 @@ def document(found: Found, scale: Scale) -> list[str]:
         part = [line for data in WORDS for line in pair(found, data, new, old, _HIS[his])]
         if part:
             lines += [f"### {title}", "", *part]
-    return lines + everyone(found)
+    lines += everyone(found)
+    return [*lines, "### Where his printed differences are not those of his figures", "",
+            *(f"- {line}" for line in fredriksson.disagreements()), ""]
 
 
 def of_variant(found: Found, data: str, variant: str) -> dict[str, Mapping]:
