@@ -1,8 +1,9 @@
 """A throw that is shown, and not kept yet, follows while its target is dragged and its settings are edited.
 
 Blender says after every change that something has changed; a timer then compares what each throw was made of with what
-is asked now, and has it made again in a thread once the hand rests. What comes is no undo step of its own: undo brings
-back the state before the drag, with the throw as it was then.
+is asked now, and has it made again in a thread once the hand rests. What comes is a step of undo of its own: actions
+and balls are made and removed for it, and Blender may keep pointers to them over an undo that does not know of that.
+What undo or redo brings back is not made again, or nobody would get further back.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from . import made, order, shown
 TICK, IDLE = 0.1, 0.4  # seconds between two looks: after a change or while something is made, and else
 SETTLED = 0.15  # seconds without a change after which the hand rests
 HOLDING = ("TRANSFORM_OT", "VIEW3D_OT_cursor3d", "BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
+MODES = ("OBJECT", "POSE")
 KIND = "throw again"
 MATTERS = (bpy.types.Object, bpy.types.Scene)
 
-_seen: dict = {"dirty": False, "changed": 0.0, "job": None, "begun": {}}
+_seen: dict = {"dirty": False, "changed": 0.0, "job": None, "begun": {}, "ended": set(), "restored": False}
 
 
 def mark() -> None:
@@ -32,16 +34,22 @@ def mark() -> None:
 
 
 def due(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """An armature whose throw is another than what is asked for; the same wish is begun once."""
+    """An armature whose throw is another than what is asked for; the same wish is begun once, and not anew where undo
+    or redo has brought it back."""
+    asked = {}
     for body in scene.objects:
         if body.type != "ARMATURE" or body.library is not None:
             continue
         wish = body.beyond_mocap_throw
-        if not (wish.made and wish.live and wish.made_of):
-            continue
-        asked = order.digest(scene, body, wish.made)
-        if asked != wish.made_of and _seen["begun"].get(body.name) != asked:
-            _seen["begun"][body.name] = asked
+        if wish.made and wish.live and wish.made_of:
+            asked[body.name] = order.digest(scene, body, wish.made)
+    if _seen["restored"]:
+        _seen["begun"].update(_seen["ended"] & asked.items())
+        _seen["restored"] = False
+    for name, digest in asked.items():
+        body = scene.objects[name]
+        if digest != body.beyond_mocap_throw.made_of and _seen["begun"].get(name) != digest:
+            _seen["begun"][name] = digest
             return body
     return None
 
@@ -54,7 +62,8 @@ def begin(scene: bpy.types.Scene, body: bpy.types.Object) -> background.Job:
 
 
 def finish(scene: bpy.types.Scene, job: background.Job) -> None:
-    """Show what a thread has made, where it is still asked for; BeyondMocapError where it cannot be made."""
+    """Show what a thread has made, as a step of undo, where it is still asked for; BeyondMocapError where it cannot be
+    made."""
     if background.cancelled(job):
         return
     if job.error is not None:
@@ -65,6 +74,10 @@ def finish(scene: bpy.types.Scene, job: background.Job) -> None:
         return
     if order.digest(scene, body, asked.act) == asked.digest:
         shown.show(scene, body, job.result)
+        _seen["ended"].add((body.name, asked.digest))
+        bpy.ops.ed.undo_push(message=f"{body.name} {asked.act}s again")
+    elif _seen["begun"].get(body.name) == asked.digest:  # it may be asked for again
+        del _seen["begun"][body.name]
 
 
 def tell(scene: bpy.types.Scene, name: str, text: str) -> None:
@@ -82,7 +95,13 @@ def _after_change(_scene, depsgraph):
 
 @persistent
 def _after_undo(*_):
-    _seen["begun"].clear()
+    _seen["restored"] = True
+    mark()
+
+
+@persistent
+def _after_load(*_):
+    _seen.update(begun={}, ended=set(), restored=False)
     mark()
 
 
@@ -90,7 +109,9 @@ def _tick():
     window = next(iter(bpy.context.window_manager.windows), None)
     if window is None or not (_seen["dirty"] or _seen["job"]):
         return IDLE
+    active = window.view_layer.objects.active
     holds = any(one.bl_idname.startswith(HOLDING) for one in window.modal_operators)
+    holds = holds or active is not None and active.mode not in MODES  # whose steps of undo know of the active object alone
     if holds or bpy.app.is_job_running("RENDER") or perf_counter() - _seen["changed"] < SETTLED:
         return TICK
     with bpy.context.temp_override(window=window):
@@ -109,6 +130,8 @@ def _look(scene: bpy.types.Scene) -> None:
             _seen["job"] = None
             if uid == scene.session_uid:
                 finish(scene, job)
+            else:
+                _seen["begun"].pop(name, None)
         body = due(scene)
         if body is None:
             _seen["dirty"] = False
@@ -122,7 +145,7 @@ def _look(scene: bpy.types.Scene) -> None:
         tell(scene, name, f"{name}: could not be made again here; see the system console")
 
 
-HANDLERS = (("undo_post", _after_undo), ("redo_post", _after_undo), ("load_post", _after_undo),
+HANDLERS = (("undo_post", _after_undo), ("redo_post", _after_undo), ("load_post", _after_load),
             ("depsgraph_update_post", _after_change))
 
 
@@ -143,4 +166,4 @@ def unregister():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     background.stop(KIND)
-    _seen.update(dirty=False, changed=0.0, job=None, begun={})
+    _seen.update(dirty=False, changed=0.0, job=None, begun={}, ended=set(), restored=False)

@@ -596,3 +596,40 @@ def test_what_is_shown_follows_its_target(room):
         live.finish(scene, refused_job)
     press(bpy.ops.beyond_mocap.leave_throw)
     assert live.due(scene) is None
+
+
+def followed(live, scene):
+    """What the timer does until there is nothing left to do."""
+    live.mark()
+    while live._seen["dirty"] or live._seen["job"]:
+        live._look(scene)
+
+
+@pytest.mark.parametrize("act", ["throw", "kick"])
+def test_undo_after_a_throw_has_followed(act, room):
+    live, scene = room("throws.live"), bpy.context.scene
+    live._after_load()
+    a_body()
+    press(getattr(bpy.ops.beyond_mocap, f"{act}_at_target"))
+    for message in ("deselected", "target selected"):  # nothing of the armature changes between two steps
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message=message)
+    thrown = state()
+    bpy.data.objects["Target"].location.y += 2.0
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="dragged")
+    dragged = state()
+    followed(live, scene)
+    after = state()
+    assert after["keys"] != dragged["keys"]
+    for expected in (dragged, thrown):
+        bpy.ops.ed.undo()
+        live._after_undo()  # without a window nobody listens
+        assert state() == expected
+        followed(live, bpy.context.scene)  # what undo has brought back stays
+        assert state() == expected
+    for expected in (dragged, after):
+        bpy.ops.ed.redo()
+        live._after_undo()
+        followed(live, bpy.context.scene)
+        assert state() == expected
