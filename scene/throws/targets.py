@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...beyond_mocap.errors import InputError
 from ..measure import frames_per_second, units_per_metre
@@ -28,7 +29,7 @@ def places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.nda
         if np.ptp(found, axis=0).max() < _STILL:
             found = found[:1]
     else:
-        found = np.array([target.matrix_world.translation]) * metres
+        found = np.array([_stands(target).translation]) * metres
     below = found[:, 2].min()
     if below < 0.0:
         raise InputError("target", f"{-below:.2f} m below the ground", "one on or above it, where balls get", "raise it")
@@ -40,7 +41,7 @@ def told_by(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> list | str:
     target = wish.target
     if target is not None and _may_move(target):
         return target.name
-    place = scene.cursor.location if target is None else target.matrix_world.translation
+    place = scene.cursor.location if target is None else _stands(target).translation
     return [round(value, 5) for value in place]
 
 
@@ -51,6 +52,17 @@ def _may_move(thing: bpy.types.Object) -> bool:
             return True
         thing = thing.parent
     return False
+
+
+def _stands(thing: bpy.types.Object) -> Matrix:
+    """Where an object is that nothing moves. Worked out, since Blender forgets the matrix_world of what is hidden with
+    the next undo or load."""
+    parent = thing.parent
+    if parent is None:
+        return thing.matrix_basis
+    if thing.parent_type != "OBJECT" or parent.type == "CURVE":
+        return thing.matrix_world
+    return _stands(parent) @ thing.matrix_parent_inverse @ thing.matrix_basis
 
 
 def _way(scene: bpy.types.Scene, target: bpy.types.Object, frame: int) -> np.ndarray:

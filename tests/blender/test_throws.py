@@ -633,3 +633,33 @@ def test_undo_after_a_throw_has_followed(act, room):
         live._after_undo()
         followed(live, bpy.context.scene)
         assert state() == expected
+
+
+@pytest.mark.parametrize("hidden", ["hide_viewport", "excluded"])
+def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
+    targets, scene, hangs = room("throws.targets"), bpy.context.scene, an_empty((1.0, 0.0, 0.5))
+    hangs.rotation_euler.z = 0.5
+    target = an_empty((4.0, 2.0, 0.3))
+    target.parent = hangs
+    bpy.context.view_layer.update()
+    place = tuple(target.matrix_world.translation)
+    if hidden == "excluded":
+        away = bpy.data.collections.new("Away")
+        scene.collection.children.link(away)
+        for thing in (hangs, target):
+            away.objects.link(thing)
+            scene.collection.objects.unlink(thing)
+        bpy.context.view_layer.layer_collection.children["Away"].exclude = True
+    else:
+        hangs.hide_viewport = target.hide_viewport = True
+    other = an_empty((0.0, 0.0, 0.0))
+    hangs.beyond_mocap_throw.target = target
+    bpy.ops.ed.undo_push(message="hidden")
+    told = targets.told_by(scene, hangs.beyond_mocap_throw)
+    other.location.x = 1.0
+    bpy.ops.ed.undo_push(message="moved another")
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    wish = next(thing.beyond_mocap_throw for thing in bpy.data.objects if thing.beyond_mocap_throw.target)
+    assert targets.places(scene, wish, 1)[0] == pytest.approx(place, abs=1e-5)
+    assert targets.told_by(scene, wish) == told
