@@ -37,7 +37,8 @@ def way(ball: bpy.types.Object, wish: BeyondMocapThrow, frames: np.ndarray) -> l
     found, ends = possession.way_of(curves, stance, frames), channels.keyed_range(curves)
     for hold in sorted(_others(ball, wish), key=lambda hold: hold.last):
         if ends is None or ends[1] <= hold.last:  # it stays where it was let go
-            shown = channels.curves(*channels.playing(ball))
+            action, slot = channels.playing(ball)
+            shown = channels.curves(action, slot) if action is not None else {}
             dropped = possession.way_of(shown, stance_of(ball)[""], np.array([hold.last]))[0]
             found = [dropped if frame >= hold.last else place for frame, place in zip(frames, found)]
     return found
@@ -58,10 +59,11 @@ def taken_from(ball: bpy.types.Object, wish: BeyondMocapThrow, first: int, last:
 
 
 def flies_for(ball: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Object | None:
-    """Another armature whose throw, not kept yet, this ball shows."""
+    """Another armature whose throw, not kept yet, this ball shows; one that was deleted counts no more, though its ball
+    keeps it in the file."""
     return next(
         (one for one in bpy.data.objects if one.type == "ARMATURE" and one != body and one.beyond_mocap_throw.made
-         and one.beyond_mocap_throw.flown == ball), None,
+         and one.beyond_mocap_throw.flown == ball and one.users_scene), None,
     )  # fmt: skip
 
 

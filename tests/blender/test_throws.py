@@ -663,3 +663,17 @@ def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
     wish = next(thing.beyond_mocap_throw for thing in bpy.data.objects if thing.beyond_mocap_throw.target)
     assert targets.places(scene, wish, 1)[0] == pytest.approx(place, abs=1e-5)
     assert targets.told_by(scene, wish) == told
+
+
+def test_a_deleted_thrower_does_not_keep_the_ball(room):
+    body, other, ball = a_body(), a_body(), a_ball((0.3, 0.2, 0.11))
+    wish, earlier = body.beyond_mocap_throw, room("throws.earlier")
+    wish.made, wish.flown = "throw", ball
+    bone = room("passes.possession").bone_of(bpy.context.scene, body, "hand", "right")
+    room("passes.possession").take(bpy.context.scene, ball, body, bone, 5, 30)
+    assert earlier.flies_for(ball, other) == body
+    with bpy.context.temp_override(selected_objects=[body], active_object=body):
+        bpy.ops.object.delete()
+    assert earlier.flies_for(ball, other) is None
+    ball.animation_data_clear()  # and by hand; its stretch is still there
+    assert earlier.way(ball, other.beyond_mocap_throw, np.array([40]))[0].to_translation().z < 2.0
