@@ -92,6 +92,8 @@ def unrest():
     busy += [f"scene.{name}.live" for name in ("ride", "aimed", "passes") if room(f"scene.{name}.live")._seen["dirty"]]
     live = room("scene.live")._seen
     busy += ["scene.live"] if settings().live and (live["dirty"] or live["quick"]) else []
+    thrown = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
+    busy += ["scene.throws.live"] if thrown and room("scene.throws.live")._seen["dirty"] else []
     waits = bpy.app.timers.is_registered(room("scene.strip_events")._later)
     return busy + ["scene.strip_events"] * waits
 
