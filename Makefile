@@ -63,6 +63,8 @@ demo: venv
 bench: venv
 	.venv/bin/python -m benchmarks
 
+# One thread: more add up in another order, and the files would differ in the signs of zeros.
+weights: export OPENBLAS_NUM_THREADS = 1
 weights: training
 	@rm -rf build/examples
 	@set -ex; for action in throw kick; do \
