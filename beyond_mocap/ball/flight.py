@@ -96,7 +96,8 @@ class Flight:
 def fly(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0, landing: bool = False) -> Flight:
     """The way of a ball for `seconds` after its launch over level ground at height `ground` m (eq. 6).
 
-    landing: it ends where the ball first comes down, where that is before. A ball launched lower than it can lie is set onto the ground. InputError: seconds that are no time.
+    landing: it ends where the ball first comes down, where that is before. A ball launched lower than it can lie is set
+    onto the ground. InputError: seconds that are no time.
     """
     if not 0.0 <= seconds < np.inf:
         raise InputError("flight", f"{seconds} seconds", "a time of 0 s or more")

@@ -15,6 +15,7 @@ from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import BeyondMocapError
 from .. import channels
+from ..handlers import put_on, take_off
 from . import shots
 from .settings import MARK, aimed
 
@@ -129,18 +130,10 @@ HANDLERS = (("undo_post", _after_undo), ("redo_post", _after_undo), ("load_post"
 
 def register():
     """Follow from now on; by itself only where there is a window."""
-    for name, handler in HANDLERS:
-        if name != "depsgraph_update_post" or not bpy.app.background:
-            getattr(bpy.app.handlers, name).append(handler)
-    if not bpy.app.background:
-        bpy.app.timers.register(_tick, first_interval=0.5, persistent=True)
+    put_on(HANDLERS, _tick, 0.5, with_window={"depsgraph_update_post"})
 
 
 def unregister():
     """Follow no more, and forget."""
-    for name, handler in HANDLERS:
-        if handler in getattr(bpy.app.handlers, name):
-            getattr(bpy.app.handlers, name).remove(handler)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
+    take_off(HANDLERS, _tick)
     shots.forget()

@@ -14,6 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import BeyondMocapError
+from ..handlers import put_on, take_off
 from . import riders as rides
 from . import source
 from .riders import shown  # noqa: F401  (what overlays draw)
@@ -91,18 +92,10 @@ WITH_WINDOW = {"depsgraph_update_post", "frame_change_post"}
 
 def register():
     """Follow from now on; by itself only where there is a window."""
-    for name, handler in HANDLERS:
-        if name not in WITH_WINDOW or not bpy.app.background:
-            getattr(bpy.app.handlers, name).append(handler)
-    if not bpy.app.background:
-        bpy.app.timers.register(_tick, first_interval=0.5, persistent=True)
+    put_on(HANDLERS, _tick, 0.5, WITH_WINDOW)
 
 
 def unregister():
     """Follow no more, and forget."""
-    for name, handler in HANDLERS:
-        if handler in getattr(bpy.app.handlers, name):
-            getattr(bpy.app.handlers, name).remove(handler)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
+    take_off(HANDLERS, _tick)
     rides.forget()

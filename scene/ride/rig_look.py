@@ -61,8 +61,8 @@ def turns(mode: str, values: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def alone(rig: bpy.types.Object, scene: bpy.types.Scene):
-    """A scene in which only the armature (or another object) is, and what it hangs on, at the rate of `scene`; gone afterwards. What is
-    switched off or shown at rest is posed meanwhile."""
+    """A scene in which only the armature (or another object) is, and what it hangs on, at the rate of `scene`; gone
+    afterwards. What is switched off or shown at rest is posed meanwhile."""
     side = bpy.data.scenes.new(f"{rig.name} alone")
     hidden, position = rig.hide_viewport, rig.data.pose_position if rig.type == "ARMATURE" else "POSE"
     try:

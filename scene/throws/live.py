@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import BeyondMocapError
 from .. import background
+from ..handlers import put_on, take_off
 from . import made, order, shown
 
 TICK, IDLE = 0.1, 0.4  # seconds between two looks: after a change or while something is made, and else
@@ -111,7 +112,8 @@ def _tick():
         return IDLE
     active = window.view_layer.objects.active
     holds = any(one.bl_idname.startswith(HOLDING) for one in window.modal_operators)
-    holds = holds or active is not None and active.mode not in MODES  # whose steps of undo know of the active object alone
+    # in other modes steps of undo know of the active object alone
+    holds = holds or active is not None and active.mode not in MODES
     if holds or bpy.app.is_job_running("RENDER") or perf_counter() - _seen["changed"] < SETTLED:
         return TICK
     with bpy.context.temp_override(window=window):
@@ -151,19 +153,12 @@ HANDLERS = (("undo_post", _after_undo), ("redo_post", _after_undo), ("load_post"
 
 def register():
     """Look from now on, where there is a window."""
-    if bpy.app.background:
-        return
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
-    bpy.app.timers.register(_tick, first_interval=1.0, persistent=True)
+    if not bpy.app.background:
+        put_on(HANDLERS, _tick, 1.0)
 
 
 def unregister():
     """Look no more."""
-    for name, handler in HANDLERS:
-        if handler in getattr(bpy.app.handlers, name):
-            getattr(bpy.app.handlers, name).remove(handler)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
+    take_off(HANDLERS, _tick)
     background.stop(KIND)
     _seen.update(dirty=False, changed=0.0, job=None, begun={}, ended=set(), restored=False)
