@@ -63,7 +63,7 @@ case ${1:-} in
     python=$(find_python 3.11 3.12 3.13) || fail "training needs Python 3.11, 3.12 or 3.13 (PYTHON=... names one)" ;;
   *) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac
-modules="bpy numpy scipy sklearn kloppy c3d pytest xdist hypothesis matplotlib"  # the first is imported, to see it works
+modules="bpy numpy scipy sklearn joblib distributed kloppy c3d pytest xdist hypothesis matplotlib"  # the first is imported, to see it works
 download="Blender as a module, about 350 MB"
 case $1-$(version_of "$python") in
   main-3.11) kind=blender-5.0 ;;
