@@ -27,6 +27,8 @@ _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"),
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
 ROOT_BONE = "root"
 _EVEN = 1e-4  # scale that is none
+HIDDEN = {"hide_viewport", "hide_render"}
+"""What is keyed on a mesh that is there for a part of the time only."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +53,13 @@ class _Shown:
     lies: np.ndarray
 
 
-def write(context: bpy.types.Context, rigs: list[bpy.types.Object], wanted: Wanted) -> list[str]:
-    """Write the rigs' motions; returns lines for the user. InputError where they or the file are no good."""
+def write(
+    context: bpy.types.Context, rigs: list[bpy.types.Object], wanted: Wanted, things: list[bpy.types.Object] = ()
+) -> list[str]:
+    """Write the rigs' motions; returns lines for the user. InputError where they or the file are no good.
+
+    things: meshes that no rig moves, such as a ball and a pitch, which are written beside them (not as BVH).
+    """
     check(wanted.format)
     if not rigs:
         raise InputError("export", "no armature", "an armature that moves", "select one, or choose players")
@@ -64,18 +71,21 @@ def write(context: bpy.types.Context, rigs: list[bpy.types.Object], wanted: Want
     rate = wanted.rate or frames_per_second(scene)
     times = first + np.arange(int(np.floor((last - first) * rate / frames_per_second(scene) + 1e-6)) + 1) * (
         frames_per_second(scene) / rate)
-    shown = _look(scene, rigs, times)
+    things = [] if wanted.format == "BVH" else list(things)
+    shown = _look(scene, rigs, times, things)
     worn = {rig.name: _dress(scene, rig) for rig in rigs} if wanted.meshes and wanted.format != "BVH" else {}
     told = []
     with _stage(context, rate, len(times)) as stage:
         copies = [_copy(stage, rig, shown[rig.name], wanted, told) for rig in rigs]
         meshes = [_worn(stage, thing, rig, copy) for rig, copy in zip(rigs, copies) for thing in worn.get(rig.name, ())]
+        free = [_free(stage, thing, shown[thing.name].lies) for thing in things]
         if wanted.format == "GLB" and not meshes:
             told.append("no mesh hangs on the armature: glTF knows its bones as plain nodes then")
-        with _names(rigs, copies):
-            _save(stage, copies, meshes, wanted)
+        with _names([*rigs, *things], [*copies, *free]):
+            _save(stage, copies, wanted)
     told.insert(0, f"{len(times)} frames at {rate:g} per second, {len(rigs)} armature{'s' * (len(rigs) > 1)}, "
-                   f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}")
+                   f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}"
+                   + (f", {len(things)} object{'s' * (len(things) > 1)} beside them" if things else ""))
     return told
 
 
@@ -111,21 +121,26 @@ def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
     return min(a for a, _ in ends), max(b for _, b in ends)
 
 
-def _look(scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray) -> dict[str, _Shown]:
-    """What Blender shows of the armatures at scene frames (F,), whole or not; the frame comes back."""
+def _look(
+    scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray, things: list[bpy.types.Object]
+) -> dict[str, _Shown]:
+    """What Blender shows of the armatures, and of things without bones, at scene frames (F,), whole or not; the frame
+    comes back."""
     now, subframe = scene.frame_current, scene.frame_subframe
     names = {rig.name: [bone.name for bone in rig.data.bones] for rig in rigs}
     poses = {rig.name: np.empty((len(times), len(names[rig.name]), 4, 4), np.float32) for rig in rigs}
-    lies = {rig.name: np.empty((len(times), 4, 4)) for rig in rigs}
+    lies = {one.name: np.empty((len(times), 4, 4)) for one in (*rigs, *things)}
     for number, time in enumerate(times):
         whole = int(np.floor(time + 1e-6))
         scene.frame_set(whole, subframe=float(np.clip(time - whole, 0.0, 0.999999)))
         for rig in rigs:
             poses[rig.name][number] = [bone.matrix for bone in rig.pose.bones]
-            lies[rig.name][number] = rig.matrix_world
+        for one in (*rigs, *things):
+            lies[one.name][number] = one.matrix_world
     scene.frame_set(now, subframe=subframe)
     ordered = {rig.name: [bone.name for bone in rig.pose.bones] for rig in rigs}
-    return {name: _Shown(ordered[name], poses[name].astype(float), lies[name]) for name in poses}
+    none = np.empty((len(times), 0, 4, 4), np.float32)
+    return {name: _Shown(ordered.get(name, []), poses.get(name, none).astype(float), lies[name]) for name in lies}
 
 
 @contextmanager
@@ -284,16 +299,36 @@ def _play(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], li
         path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
         copy.pose.bones[name].rotation_mode = "QUATERNION"
         curves |= {f"{path}.{channel}": (name, values) for channel, values in _channels(local).items()}
+    channels.animate(copy, copy.name, np.arange(len(lies)), curves | _lying(copy, lies))
+
+
+def _lying(copy: bpy.types.Object, lies: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
+    """Lays an object where it lies (F, 4, 4) at first; curves of its way, none where it stays there."""
     copy.rotation_mode = "QUATERNION"
     moves = _channels(lies)
     for channel, values in moves.items():
         setattr(copy, channel, values[0])
     if "scale" not in moves:
         copy.scale = (1, 1, 1)
-    if np.ptp(lies, axis=0).max() > 1e-6:
-        curves |= {channel: ("Object", values) for channel, values in moves.items()}
-    frames = np.arange(len(lies))
-    channels.animate(copy, copy.name, frames, curves)
+    if np.ptp(lies, axis=0).max() <= 1e-6:
+        return {}
+    return {channel: ("Object", values) for channel, values in moves.items()}
+
+
+def _free(stage: bpy.types.Scene, thing: bpy.types.Object, lies: np.ndarray) -> bpy.types.Object:
+    """A copy of a mesh that hangs on nothing and lies (F, 4, 4) in the world as the thing does."""
+    copy = thing.copy()
+    copy.animation_data_clear()
+    stage.collection.objects.link(copy)
+    copy.parent = None
+    copy.matrix_parent_inverse.identity()
+    copy.delta_location, copy.delta_scale = (0, 0, 0), (1, 1, 1)
+    copy.constraints.clear()
+    copy.hide_viewport = copy.hide_render = copy.hide_select = False
+    curves = _lying(copy, lies)
+    if curves:
+        channels.animate(copy, copy.name, np.arange(len(lies)), curves)
+    return copy
 
 
 def _channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
@@ -305,9 +340,15 @@ def _channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _dress(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
-    """The visible meshes that an armature moves."""
-    return [thing for thing in scene.objects if thing.type == "MESH" and thing.visible_get() and (
+    """The meshes that an armature moves, visible now or at some other time by their keys."""
+    return [thing for thing in scene.objects if thing.type == "MESH" and (thing.visible_get() or _keyed(thing, HIDDEN)) and (
         thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]
+
+
+def _keyed(thing: bpy.types.Object, paths: set[str]) -> bool:
+    """Whether an object has keys on all of these properties and on no other."""
+    playing, slot = channels.playing(thing)
+    return playing is not None and {path for path, _ in channels.curves(playing, slot)} == paths
 
 
 def _worn(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object, copy: bpy.types.Object):
@@ -323,6 +364,9 @@ def _worn(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object
     for modifier in twin.modifiers:
         if modifier.type == "ARMATURE" and modifier.object == rig:
             modifier.object = copy
+    if _keyed(thing, HIDDEN):  # the formats have no word for it
+        twin.animation_data_clear()
+        twin.hide_viewport = twin.hide_render = False
     return twin
 
 
@@ -343,7 +387,7 @@ def _names(rigs, copies):
             rig.name = name
 
 
-def _save(stage, copies, meshes, wanted: Wanted) -> None:
+def _save(stage, copies, wanted: Wanted) -> None:
     """Written beside, then renamed: no half-written file is left."""
     layer = stage.view_layers[0]
     layer.update()

@@ -46,6 +46,13 @@ def bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return [thing for one in found for thing in one.objects if thing.type == "ARMATURE" and thing.get(MARK)]
 
 
+def meshes(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
+    """The meshes of one of PARTS that is shown."""
+    whole = root(scene)
+    found = [one for one in whole.children if one.get(MARK) == name] if whole is not None else []
+    return [thing for one in found for thing in one.objects if thing.type == "MESH" and thing.get(MARK)]
+
+
 def clear(scene: bpy.types.Scene) -> None:
     """Take away all that is ours, with the actions and data that nothing else uses; emptied collections go too."""
     whole = root(scene)

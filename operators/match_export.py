@@ -1,0 +1,64 @@
+"""Export Match: everybody who is shown, ball and pitch, as one FBX, glTF or USD file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..beyond_mocap.errors import InputError
+from ..scene import export, rig
+from ..scene.match import ours
+from .verb import Verb
+
+FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
+
+
+class BEYOND_MOCAP_OT_match_export(Verb, bpy.types.Operator, ExportHelper):
+    """Write the match that is shown to one file: a skeleton and a mesh for everybody, the ball, and the pitch. The scene
+stays as it is"""
+
+    bl_idname = "beyond_mocap.match_export"
+    bl_label = "Export Match"
+    bl_options = {"REGISTER"}
+    filename_ext = ""
+    check_extension = None
+
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
+    format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="Form of the file")
+    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
+    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="What the root bone carries")
+    pitch: BoolProperty(name="Pitch", default=True, description="Grass, lines and goals, too")
+
+    @classmethod
+    def poll(cls, context):
+        """A match is shown."""
+        cls.poll_message_set("Show a match first")
+        return bool(ours.bodies(context.scene))
+
+    def check(self, _context):
+        """The name in the file browser ends as the file will, so that Blender warns of one that is there."""
+        named = Path(self.filepath)
+        if not named.name:
+            return False
+        before, self.filepath = self.filepath, str(export.with_ending(named, export.SUFFIXES[self.format]))
+        return self.filepath != before
+
+    def invoke(self, context, event):
+        """The file browser."""
+        self.filename_ext = export.SUFFIXES[self.format]
+        return ExportHelper.invoke(self, context, event)
+
+    def do(self, context):
+        """Write it."""
+        if not self.filepath:
+            raise InputError("export", "no file given", "where to write it", "choose a place")
+        path = export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
+        scene = context.scene
+        wanted = export.Wanted(path, self.format, self.engine, None, self.root)
+        things = ours.meshes(scene, "ball") + (ours.meshes(scene, "pitch") if self.pitch else [])
+        for line in export.write(context, ours.bodies(scene), wanted, things):
+            self.report({"INFO"}, line)
+        self.report({"INFO"}, f"Written: {path}")
