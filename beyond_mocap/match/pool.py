@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import signal
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -174,8 +176,9 @@ class _Processes:
             from joblib.externals.loky import get_reusable_executor
 
             self._executor = get_reusable_executor(
-                self._workers, timeout=_IDLE, reuse=True, initializer=_deaf, env={name: "1" for name in _THREADS}
-            )
+                self._workers, timeout=_IDLE, reuse=True, initializer=_follow, initargs=(os.getpid(),),
+                env={name: "1" for name in _THREADS},
+            )  # fmt: skip
         return self._executor
 
     def check(self, moved: bool) -> None:
@@ -199,9 +202,17 @@ class _Processes:
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
-def _deaf() -> None:
-    """Ctrl-C in a terminal goes to all processes of the command: only the first one is to answer it."""
+def _follow(parent: int) -> None:
+    """A worker answers no Ctrl-C, which a terminal sends to all processes of a command, and ends soon after the process
+    `parent` that started it, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
 
 
 def ended() -> None:
