@@ -1,0 +1,1 @@
+"""A whole match: everybody's motion from tracking."""
