@@ -80,7 +80,7 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     InputError where it cannot be made or written, holds results of another order or files that are none of a match, or
     somebody else works in it.
     """
-    _check(path)
+    check_folder(path)
     try:
         (path / _WORK).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -124,8 +124,8 @@ def file_names(ids: Iterable[str]) -> dict[str, str]:
     return out
 
 
-def _check(path: Path) -> None:
-    """Before work begins: the folder is a match's, empty, or can be made."""
+def check_folder(path: Path) -> None:
+    """Before work begins: the folder is a match's, empty, or can be made. InputError where it is not."""
     if path.exists() and not path.is_dir():
         raise InputError(path, "is a file", "a folder", "choose another name")
     if not path.exists() and not path.absolute().parent.is_dir():
