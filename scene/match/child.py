@@ -44,8 +44,8 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
         return notes
     if asked or process.returncode == Cancelled.exit_status:
         raise Cancelled("cancelled; what was finished is kept, and the next run goes on there")
-    text = last.removeprefix("beyond-mocap: ") or f"the process that makes the match ended with status {process.returncode}"
-    raise BeyondMocapError(text)
+    ended = f"the process that makes the match ended with status {process.returncode}"
+    raise BeyondMocapError(last.removeprefix("beyond-mocap: ") or ended)
 
 
 def end_all() -> None:

@@ -63,8 +63,8 @@ def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
     first, last = float(state["from_s"]), float(state["to_s"])
     start, end = max(wanted.start, first), min(wanted.end or last, last)
     if end - start < 0.2:
-        raise InputError(wanted.folder, f"{wanted.start:g} to {wanted.end:g} s", f"a time within {first:g} to {last:g} s",
-                         "press Make Match for another")
+        found, expected = f"{wanted.start:g} to {wanted.end:g} s", f"a time within {first:g} to {last:g} s"
+        raise InputError(wanted.folder, found, expected, "press Make Match for another")
     return start, end
 
 

@@ -51,8 +51,8 @@ def wanted(scene: bpy.types.Scene) -> Wanted:
 
 
 def folder_of(match: BeyondMocapMatch) -> str:
-    """Where the match is kept: the chosen folder, or one beside the tracking file, or with the file that is saved, named
-    after both ends of the stretch."""
+    """Where the match is kept: the chosen folder, or one beside the file that is saved, or else beside the tracking,
+    named after both ends of the stretch."""
     if match.folder:
         return absolute(match.folder)
     if not match.tracking_file:

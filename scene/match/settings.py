@@ -44,7 +44,7 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     provider: EnumProperty(name="Provider", items=GIVEN, description="Whose form the files have")
     folder: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="Where everybody's motion is kept, a few megabytes a match; a run that was broken off goes on there",
+        description="Where everybody's motion is kept, some megabytes a match; what was broken off goes on there",
     )
     start: FloatProperty(
         name="From", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1, description="Second of the match's clock"
@@ -81,7 +81,7 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     active: IntProperty(name="Player", min=0, description="The player that is chosen in the list")
     read_of: StringProperty(options={"HIDDEN"}, description="The tracking file that the list was read from")
     length_s: FloatProperty(options={"HIDDEN"}, description="Seconds that the match lasts on its clock")
-    report: StringProperty(options={"HIDDEN"}, description="Lines about the data: guessed, put right, who is there when")
+    report: StringProperty(options={"HIDDEN"}, description="Lines about the data: guessed, put right, who is there")
     told: StringProperty(options={"HIDDEN"}, description="Lines about what was made")
     shown_start: FloatProperty(options={"HIDDEN"}, description="Second of the match's clock at the first shown frame")
     shown_first: IntProperty(options={"HIDDEN"}, description="That frame")

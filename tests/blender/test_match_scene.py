@@ -93,7 +93,8 @@ def test_meshes_are_shared_and_wear_the_kit(room, scenery):
     scene = shown(room, scenery)
     bodies = {thing[room("ours").PLAYER]: thing for thing in room("ours").bodies(scene)}
     assert len({thing.data for thing in bodies.values()}) == 1
-    meshes = {who: next(one for one in thing.children if one.name.endswith("body")).data for who, thing in bodies.items()}
+    worn = {who: next(one for one in thing.children if one.name.endswith("body")) for who, thing in bodies.items()}
+    meshes = {who: thing.data for who, thing in worn.items()}
     assert len(set(meshes.values())) == 4  # home, home keeper, away, referee
 
     def shirt(mesh):
@@ -151,7 +152,8 @@ def test_shown_again_it_takes_its_own_place_and_leaves_the_users_things(room, sc
     scene = shown(room, scenery)
     own = bpy.data.objects.new("Mine", None)
     room("ours").part(scene, "home").objects.link(own)
-    before = {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "actions", "armatures", "collections")}
+    kinds = ("objects", "meshes", "actions", "armatures", "collections", "cameras", "lights", "curves")
+    before = {kind: len(getattr(bpy.data, kind)) for kind in kinds}
     shown(room, scenery)
     assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
     assert own.name in scene.objects
