@@ -74,7 +74,7 @@ def _role(match: Match, player: MatchPlayer, span: tuple[float, float], fps: flo
 
 def _on_frames(start: float, end: float, fps: float) -> tuple[float, float]:
     """The first frame of the match's clock not before `start` and the last not behind `end`, s."""
-    return np.ceil(start * fps - 1e-6) / fps, np.floor(end * fps + 1e-6) / fps
+    return float(np.ceil(start * fps - 1e-6) + 0.0) / fps, float(np.floor(end * fps + 1e-6)) / fps
 
 
 def _around(match: Match, start: float, end: float) -> tuple[float, float]:

@@ -15,7 +15,6 @@ from .player_edit import PlayerEdit
 def shown(
     library: Library,
     edit: PlayerEdit,
-    correction: Correction | None,
     ball: BallPath | None,
     start: float,
     end: float,
@@ -23,11 +22,11 @@ def shown(
 ) -> tuple[Take, ...]:
     """What a player does from `start` to `end` seconds, a take for each of his stretches there.
 
-    correction: what keeps him out of others; ball: the match's, which every take has as its own. InputError as of
+    ball: the match's, which every take has as its own. InputError as of
     `expanded`.
     """
     takes = expanded(library, edit, start, end, progress)
-    return tuple(_finished(take, correction, ball) for take in takes)
+    return tuple(_finished(take, edit.correction, ball) for take in takes)
 
 
 def _finished(take: Take, correction: Correction | None, ball: BallPath | None) -> Take:

@@ -13,7 +13,6 @@ import numpy as np
 from ..files import bvh
 from ..files.tables import Provenance, provenance_of, write_provenance
 from ..motion.track import Track
-from ..polish.crowd.correction import Correction
 from ..take import BallPath, Take
 from .crowd_window import CrowdPart, crowd_window
 from .figures import player_report
@@ -34,12 +33,11 @@ class PlayerFiles:
 
 @dataclass(frozen=True, eq=False)
 class Finish:
-    """What is needed to finish a player. edit: his edit list; correction: his in the crowd; measured: his tracks, one
+    """What is needed to finish a player. edit: his edit list, with its correction; measured: his tracks, one
     per stretch; ball: the match's; frames (K,) of the match's clock at which he is in somebody, depth (K,) m how deep.
     figures, bvh: whether report and provenance, and BVH, are asked for."""
 
     edit: PlayerEdit
-    correction: Correction
     measured: tuple[Track, ...]
     ball: BallPath
     frames: np.ndarray
@@ -66,7 +64,9 @@ def finish_player(source: LibrarySource, order: Finish) -> PlayerFiles:
 
     library = library_of(source)
     with threadpool_limits(limits=1):
-        takes = shown(library, order.edit, order.correction, order.ball, -np.inf, np.inf)
+        plans = [stretch.plan for stretch in order.edit.stretches]
+        span = float(plans[0].track.times[0]), float(plans[-1].track.times[-1])
+        takes = shown(library, order.edit, order.ball, *span)
         files = {}
         report = None
         if order.figures:
