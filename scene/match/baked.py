@@ -7,7 +7,7 @@ import numpy as np
 
 from ...beyond_mocap.take import BallPath
 from .. import action, ball, channels
-from ..measure import frames_per_second
+from ..measure import frames_per_second, units_per_metre
 from . import ours
 from .people import Person
 
@@ -25,7 +25,9 @@ def bake(
     """Let a person's armature (the first of `worn`) move as he does, and everything he wears be hidden outside his
     stretches; `start` s is scene frame `first`, and `last` the last frame that is shown."""
     who = worn[0]
-    parts = [action.keyed(who, motion, scene, frame_of(scene, start, first, begins)) for begins, motion in person.motions]
+    parts = [
+        action.keyed(who, motion, scene, frame_of(scene, start, first, begins)) for begins, motion in person.motions
+    ]
     frames = np.concatenate([frames for frames, _ in parts])
     kept = np.concatenate([[True], np.diff(frames) > 0])  # stretches may share a frame
     curves = {
@@ -62,8 +64,6 @@ def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: i
 
 def _course(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:
     """The ball's way as a thin line in the views, not in renders."""
-    from ..measure import units_per_metre
-
     data = bpy.data.curves.new("Match ball course", "CURVE")
     data.dimensions = "3D"
     line = data.splines.new("POLY")

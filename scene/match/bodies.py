@@ -27,6 +27,7 @@ class Wardrobe:
         example = person.motions[0][1]
         fits = _fits(example.skeleton)
         who = ours.mark(self._armature(example, label(person), collection, fits))
+        who[ours.PLAYER] = person.id
         kit = kit_of(person, self.colours)
         made = [self._on(who, "body", self._body(example, fits, kit), collection)]
         if person.number >= 0:

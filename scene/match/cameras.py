@@ -36,7 +36,8 @@ def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndar
     aim = ours.mark(bpy.data.objects.new("Match Broadcast aim", None))
     aim.empty_display_size = 0.5 * units
     home.objects.link(aim)
-    camera = ours.mark(bpy.data.objects.new(STAND, bpy.data.cameras.new(STAND)))
+    camera = bpy.data.objects.new(STAND, bpy.data.cameras.new(STAND))
+    camera[ours.MARK] = STAND
     home.objects.link(camera)
     stand = np.array([FROM[0], -size[1] / 2.0 - FROM[1], FROM[2]])
     camera.location = stand * units
@@ -52,6 +53,12 @@ def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndar
     ours.mark(channels.animate(aim, aim.name, frames, {"location": (group, places * units)}))
     ours.mark(channels.animate(camera.data, f"{STAND} lens", frames, {"lens": ("Lens", lens)}))
     return camera
+
+
+def stand_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The camera in the stand; None where there is none."""
+    home = ours.part(scene, "cameras")
+    return next((thing for thing in home.objects if thing.type == "CAMERA" and thing.get(ours.MARK) == STAND), None)
 
 
 def eyes(scene: bpy.types.Scene, who: bpy.types.Object, ball: bpy.types.Object | None) -> bpy.types.Object:

@@ -1,4 +1,5 @@
-"""What players wear: shirts in their team's colour, keepers and referees in others, numbers that can be read on them."""
+"""What players wear: shirts in their team's colour, keepers and referees in others, numbers that can be
+read on them."""
 
 from __future__ import annotations
 

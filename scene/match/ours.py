@@ -8,6 +8,9 @@ import bpy
 from .people import TEAMS
 
 MARK = "beyond_mocap_match"
+PLAYER = "beyond_mocap_match_player"
+"""Custom property of a player's armature: his id."""
+
 ROOT = "Match"
 PARTS = {"home": "Match Home", "away": "Match Away", "referee": "Match Referees", "ball": "Match Ball",
          "pitch": "Match Pitch", "cameras": "Match Cameras"}
@@ -62,8 +65,8 @@ def clear(scene: bpy.types.Scene) -> None:
     actions = {_action(owner) for thing in gone for owner in (thing, thing.data)} - {None}
     data = {thing.data for thing in gone} - {None}
     bpy.data.batch_remove(gone)
-    bpy.data.batch_remove([one for one in actions if one.get(MARK) and one.users - one.use_fake_user <= 0])
     bpy.data.batch_remove([one for one in data if not one.users])
+    bpy.data.batch_remove([one for one in actions if one.get(MARK) and one.users - one.use_fake_user <= 0])
     for one in [*whole.children, whole]:
         if not one.all_objects and not one.children:
             bpy.data.collections.remove(one)

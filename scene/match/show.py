@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from time import perf_counter
 
 import bpy
@@ -23,36 +24,37 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
     looked = scene.camera is None or bool(scene.camera.get(ours.MARK))
     ours.clear(scene)
     last = int(np.floor(baked.frame_of(scene, scenery.start, first, scenery.end) + 1e-4))
-    steps = (
-        ("pitch", lambda: _pitch(scene, scenery)),
-        ("bodies", lambda: _dressed(context, scenery)),
-    )
-    made = {}
-    for name, step in steps:
-        began = perf_counter()
-        made[name] = step()
-        took[name] = perf_counter() - began
-    began = perf_counter()
-    context.view_layer.update()
-    for person, worn in made["bodies"]:
-        baked.bake(scene, person, worn, scenery.start, first, last)
-    ball = scenery.ball
-    thing = baked.bake_ball(context, ball, scenery.start, first, last) if ball is not None else None
-    took["keys"] = perf_counter() - began
-    began = perf_counter()
-    frames = np.arange(first, last + 1)
-    camera = cameras.broadcast(scene, (scenery.length, scenery.width), frames, _followed(scene, scenery, frames, first))
-    took["cameras"] = perf_counter() - began
+    with _clock(took, "pitch"):
+        _pitch(scene, scenery)
+    with _clock(took, "bodies"):
+        dressed = _dressed(context, scenery)
+    with _clock(took, "keys"):
+        for person, worn in dressed:
+            baked.bake(scene, person, worn, scenery.start, first, last)
+        if scenery.ball is not None:
+            baked.bake_ball(context, scenery.ball, scenery.start, first, last)
+    with _clock(took, "cameras"):
+        frames, size = np.arange(first, last + 1), (scenery.length, scenery.width)
+        camera = cameras.broadcast(scene, size, frames, _followed(scene, scenery, frames, first))
     if looked:
         scene.camera = camera
     bake.lengthen(scene, last)
     return took
 
 
+@contextmanager
+def _clock(took: dict[str, float], name: str):
+    """Write down how many seconds a step takes."""
+    began = perf_counter()
+    yield
+    took[name] = perf_counter() - began
+
+
 def ball_shown(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The ball of the match that is shown; None where there is none."""
     home = ours.part(scene, "ball") if ours.root(scene) is not None else None
-    return next((thing for thing in home.objects if thing.type == "MESH" and thing.get(ours.MARK)), None) if home else None
+    found = [thing for thing in home.objects if thing.type == "MESH" and thing.get(ours.MARK)] if home else []
+    return found[0] if found else None
 
 
 def _pitch(scene: bpy.types.Scene, scenery: Scenery) -> None:

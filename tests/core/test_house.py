@@ -32,8 +32,8 @@ ROOMS = {
     "plan": ["motion", "annotation"],
     "take": ["motion", "annotation", "plan", "synthesis.edit_list"],
     "markers": ["motion", "polish.reach", "polish.foot_plant"],
-    "files": ["motion", "annotation", "take", "plan", "ball.pass_scene", "ball.contact", "markers",
-              "synthesis.phase_network"],
+    "files": ["motion", "annotation", "take", "plan", "match.named_edit", "match.player_edit", "polish.crowd.correction",
+              "ball.pass_scene", "ball.contact", "markers", "synthesis.phase_network"],
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "synthesis.phase_network": ["motion", "polish.reach"],
@@ -54,8 +54,8 @@ EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
     "panels": ["panels", "scene.settings", "scene.preferences", "scene.ride.settings", "scene.ride.figure_lines",
-               "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings", "scene.throws.settings",
-               "scene.markers.settings"],
+               "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings", "scene.match.settings",
+               "scene.throws.settings", "scene.markers.settings"],
 }
 
 
