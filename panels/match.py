@@ -102,5 +102,6 @@ def look(layout, match) -> None:
     chosen = active_of(match)
     name = f"Eyes of {chosen.name or chosen.feed_id}" if chosen is not None else "Eyes"
     row.operator("beyond_mocap.match_camera", text=name, icon="HIDE_OFF").which = "EYES"
+    layout.operator("beyond_mocap.match_export", icon="EXPORT")
     for line in match.told.splitlines()[:LINES]:
         paragraph(layout, line, "INFO")

@@ -377,6 +377,8 @@ def _names(rigs, copies):
     for rig, copy, name in local:
         rig.name = f"{name} (original)"
         copy.name = name
+        if copy.type == "ARMATURE" and name not in bpy.data.armatures:  # USD names the bones' part, and many may share one
+            copy.data.name = name
         if copy.animation_data and copy.animation_data.action:
             copy.animation_data.action.name = f"{name} motion"
     try:
