@@ -33,7 +33,8 @@ class MatchVerb(BackgroundVerb):
         first = match.first_frame
         took = show.show(bpy.context, scenery, first)
         match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
-        match.told = "\n".join(dict.fromkeys((*lines, *notes)))
+        known = match.report.splitlines()
+        match.told = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)
         order.keep_folder(match)
         for line in lines:
             self.report({"WARNING"}, line)

@@ -83,7 +83,7 @@ def _people(wanted, state, library, start, end, progress, cancelled) -> tuple[li
             lines.append(f"{player['id']} was not made: {player.get('reason') or player.get('status')}")
             continue
         edit = read_player(Path(wanted.folder) / f"{player['file']}.take.npz")
-        takes = shown(library, edit, edit.correction, None, start, end)
+        takes = shown(library, edit, None, start, end)
         if takes:
             people.append(_person(player, tuple((take.start_time, take.motion) for take in takes)))
     return people, lines

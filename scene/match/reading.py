@@ -11,6 +11,7 @@ from ...beyond_mocap.errors import InputError
 from .. import tracks
 from ..settings import absolute, as_setting
 from .kits import USUAL, linear
+from .people import TEAMS
 from .settings import AUTO, FIRST, BeyondMocapMatch
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def fill(match: BeyondMocapMatch, order: Read, read: "Match") -> None:
         match.active = 0
     match.read_of, match.length_s = order.tracking, float(read.times[-1])
     match.players.clear()
-    for player in read.players:
+    for player in sorted(read.players, key=lambda one: (TEAMS.index(one.team), one.number)):
         row = match.players.add()
         row.name, row.feed_id, row.number, row.team = player.name, player.id, player.number, player.team
         row.position, row.use = player.position, player.id not in left_out
