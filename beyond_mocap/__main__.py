@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -24,6 +24,10 @@ from .commands.outputs import Writer, check_outputs, writer_of
 from .commands.told import Told
 from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
 from .plan import HEIGHTS, LIMITS, METHODS, Plan, gait_choices
+
+
+Apart = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
+"""Runs arguments, tells its progress, and is asked whether somebody wants out."""
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -373,11 +377,20 @@ def _library(options, told: Told, rebuild: bool = False, seed: int = 0):
     )
 
 
-def main(argv: list[str] | None = None, writers: Mapping[str, Writer] | None = None, prog: str = "beyond-mocap") -> int:
-    """Runs one command and returns its exit status. `writers`: by suffix, further kinds of `--out` (Blender's)."""
+def main(
+    argv: list[str] | None = None, writers: Mapping[str, Writer] | None = None, prog: str = "beyond-mocap",
+    apart: Apart | None = None,
+) -> int:  # fmt: skip
+    """Runs one command and returns its exit status.
+
+    writers: by suffix, further kinds of `--out` (Blender's). apart: runs a command line in a process of its own, where
+    this one cannot send work to others, as within Blender.
+    """
     told = None
     try:
-        options = parser(prog).parse_args(sys.argv[1:] if argv is None else argv)
+        argv = sys.argv[1:] if argv is None else argv
+        options = parser(prog).parse_args(argv)
+        options.argv, options.apart = argv, apart
         told = Told(options.json)
         with _interrupts(told):
             options.run(options, told, writers or {})

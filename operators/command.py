@@ -13,8 +13,9 @@ def run(arguments: list[str]) -> int:
     """Run one command line; returns its exit status."""
     from ..beyond_mocap.__main__ import main
     from ..scene.deliver import WRITERS
+    from ..scene.match import child
 
-    return main(arguments, WRITERS, prog=f"blender --command {NAME}")
+    return main(arguments, WRITERS, f"blender --command {NAME}", child.run)
 
 
 def register():

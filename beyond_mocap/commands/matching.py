@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from ..errors import BeyondMocapError
+from ..errors import BeyondMocapError, InputError
 from .numbers import positive, rate, whole
-from .outputs import Writer
+from .outputs import Writer, check_outputs
 from .told import Told
 
 MOST_WORKERS = 256
@@ -50,6 +50,10 @@ def _add_results(verb) -> None:
     verb.add_argument("--no-solve-touches", action="store_true", help="the ball as the feed has it, and no touches of it")
     verb.add_argument("--annotations", type=Path, metavar="DIR", help="words of players as DIR/ID.txt, not found ones")
     verb.add_argument("--bvh", action="store_true", help="every player as BVH too")
+    verb.add_argument(
+        "--scene", type=Path, metavar="FILE",
+        help="everybody, ball and pitch in one file; inside Blender: .blend, .fbx, .glb, .usdc",
+    )
     verb.add_argument("--no-figures", action="store_true", help="no reports, no provenance, no page")
     verb.add_argument("--fps", type=rate, default=30.0)
     verb.add_argument("--seed", type=int, default=0)
@@ -62,9 +66,10 @@ def _add_results(verb) -> None:
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`match`: makes what is not there yet, and tells what came of it."""
-    from ..match.make import make_match
+    from ..match.make import make_match, result_of
     from ..match.order import MatchOrder
 
+    write = scene_writer(options.scene, writers) if options.scene else None
     order = MatchOrder(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
         provider=options.provider, cache=options.cache, skeleton=options.skeleton, unit=options.unit,
@@ -73,7 +78,11 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
         annotations=options.annotations, bvh=options.bvh, figures=not options.no_figures,
         workers=options.workers or len(_cores()), scheduler=options.scheduler,
     )  # fmt: skip
-    made = make_match(order, told.progress, told.cancelled)
+    if options.apart is None:
+        made = make_match(order, told.progress, told.cancelled)
+    else:
+        options.apart(without(options.argv, "--scene"), told.progress, told.cancelled)
+        made = result_of(order)
     told.end()
     for line in made.notes:
         told.note(line)
@@ -81,8 +90,30 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
         told.note(f"player {player.id} was left out: {player.reason}")
     if not made.done:
         raise BeyondMocapError(f"{options.out}: no player could be made; match.json there tells why of each")
+    if write is not None:
+        for line in write(made, options.scene) or ():
+            told.note(line)
     print(f"{options.out}: {len(made.done)} of {len(made.done) + len(made.failed)} players, "
           f"{made.span[1] - made.span[0]:.1f} s")  # fmt: skip
+
+
+def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
+    """Who writes a whole match to a file with the suffix of `scene`; InputError where nobody does, or it cannot be."""
+    check_outputs(scene)
+    if not writers:
+        raise InputError("--scene", f"{scene.name}, without Blender", "Blender, which writes scenes",
+                         "blender --command beyond_mocap match ...")  # fmt: skip
+    if scene.suffix.lower() not in writers:
+        raise InputError(scene, f"the ending {scene.suffix!r}", f"one of {', '.join(sorted(writers))}")
+    return writers[scene.suffix.lower()]
+
+
+def without(arguments: Sequence[str], option: str) -> list[str]:
+    """A command line without an option of one value, whichever way it is written."""
+    kept = list(arguments)
+    while option in kept:
+        del kept[(at := kept.index(option)) : at + 2]
+    return [one for one in kept if not one.startswith(f"{option}=")]
 
 
 def _cores() -> range | set[int]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ..errors import InputError
 
-Writer = Callable[[object, Path], None]
-"""Writes a take to a file."""
+Writer = Callable[[object, Path], Sequence[str] | None]
+"""Writes a take, or what the verb `match` has made, to a file; lines for the user, if any."""
 
 
 def writer_of(out: Path, writers: Mapping[str, Writer]) -> Writer:

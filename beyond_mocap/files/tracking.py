@@ -30,7 +30,7 @@ RATES = (5.0, 100.0)
 """Samples per second that a track may have."""
 
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
-_CACHE_VERSION = 2
+_CACHE_VERSION = 3
 _ARRAYS = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines")
 
 

@@ -25,7 +25,7 @@ from ..library.library import Library, build
 from ..solve_ball import solve_ball
 from ..take import BallPath
 from . import stages
-from .folder import MatchFolder, check_folder, file_names, opened
+from .folder import MatchFolder, check_folder, file_names, opened, read_state
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
 from .parts import parts_of
@@ -54,8 +54,9 @@ class MadePlayer:
 
 @dataclass(frozen=True)
 class MatchResult:
-    """span: (start, end) s. done, failed: who was made, and who was not. notes: lines for people."""
+    """order: what was asked. span: (start, end) s. done, failed: who was made, and who was not. notes: lines for people."""
 
+    order: MatchOrder
     span: tuple[float, float]
     done: tuple[MadePlayer, ...]
     failed: tuple[MadePlayer, ...]
@@ -97,7 +98,7 @@ def make_match(
         finally:
             if not order.scheduler:
                 ended()
-        return _result(state, span)
+    return result_of(order)
 
 
 def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, LibrarySource]:
@@ -193,11 +194,13 @@ def _close(job: stages.Job, crowd) -> None:
         atomic_write(job.folder.path / "report.html", page(job.folder.path))
 
 
-def _result(state: MatchState, span: tuple[float, float]) -> MatchResult:
-    rows = state.players.values()
-    done = tuple(MadePlayer(row["id"]) for row in rows if row["status"] == "done")
-    failed = tuple(MadePlayer(row["id"], row["reason"]) for row in state.failed)
-    return MatchResult(span, done, failed, tuple(dict.fromkeys((*state.told["data"], *state.told["notes"]))))
+def result_of(order: MatchOrder) -> MatchResult:
+    """What stands in the folder of an order that has been made; InputError as `folder.read_state`."""
+    told = read_state(order.out)
+    made = {status: tuple(MadePlayer(row["id"], row.get("reason", "")) for row in told["players"]
+                          if row["status"] == status) for status in ("done", "failed")}  # fmt: skip
+    notes = tuple(dict.fromkeys((*told["data"], *told["notes"])))
+    return MatchResult(order, (told["from_s"], told["to_s"]), made["done"], made["failed"], notes)
 
 
 def _part(report: Progress, stage: str) -> Progress:

@@ -45,7 +45,9 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
     if asked or process.returncode == Cancelled.exit_status:
         raise Cancelled("cancelled; what was finished is kept, and the next run goes on there")
     ended = f"the process that makes the match ended with status {process.returncode}"
-    raise BeyondMocapError(last.removeprefix("beyond-mocap: ") or ended)
+    trouble = BeyondMocapError(last.removeprefix("beyond-mocap: ") or ended)
+    trouble.exit_status = process.returncode if process.returncode > 0 else trouble.exit_status
+    raise trouble
 
 
 def end_all() -> None:
