@@ -77,7 +77,7 @@ def mended_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
     teams = np.array(teams)
     for first in range(0, len(periods) - 1, 2):
         parts = [slice(*np.searchsorted(times, [start - 1e-6, end + 1e-6])) for start, end in periods[first : first + 2]]
-        ends = [_end(positions[:, part], teams) for part in parts]
+        ends = [home_end(positions[:, part], teams) for part in parts]
         if 0.0 in ends:
             continue
         signs = np.ones(2)
@@ -102,7 +102,7 @@ _TOLD = {
 }
 
 
-def _end(positions: np.ndarray, teams: np.ndarray) -> float:
+def home_end(positions: np.ndarray, teams: np.ndarray) -> float:
     """Which end the home team keeps: -1 where x is negative, 1 the other, 0 where it cannot be told."""
     middles = []
     for ground in ("home", "away"):
