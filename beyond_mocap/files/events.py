@@ -94,7 +94,9 @@ def _through_kloppy(path: Path, provider: str, second: Path | None, match: Match
 def _who(record) -> Who | None:
     player = record.player
     if player is None:
-        return None
+        raw = record.raw_event.get("from") if isinstance(record.raw_event, dict) else None  # Metrica's, of whom its
+        name = raw.get("name") if isinstance(raw, dict) else None  # metadata knows nothing
+        return Who.spelled(str(name), str(record.team.ground) if record.team else "") if name else None
     shirt = -1 if player.jersey_no is None else int(player.jersey_no)
     return Who(str(player.player_id), str(player.team.ground), shirt, player.name or "")
 
@@ -129,8 +131,10 @@ def _ends(match: Match | None) -> dict[int, float]:
     if match is None:
         return {}
     teams = np.array([player.team for player in match.players])
-    parts = [slice(*np.searchsorted(match.times, [start - 1e-6, end + 1e-6])) for start, end in match.periods]
-    found = {number: home_end(match.positions[:, part], teams) for number, part in enumerate(parts, 1)}
+    found = {}
+    for half in match.halves:
+        part = slice(*np.searchsorted(match.times, [half.start - 1e-6, half.end + 1e-6]))
+        found[half.number] = home_end(match.positions[:, part], teams)
     return {number: end for number, end in found.items() if end}
 
 
@@ -143,8 +147,9 @@ def _plain(path: Path, match: Match | None):
         if row.get("period"):
             period = int(number(row["period"], "period", place))
         elif match is not None:
-            period = max((n for n, (start, _) in enumerate(match.periods, 1) if time >= start - 5.0), default=1)
-            time -= match.periods[period - 1][0]
+            half = max((half for half in match.halves if time >= half.start - 5.0), key=lambda half: half.start,
+                       default=match.halves[0])  # fmt: skip
+            time, period = time - half.zero, half.number
         said, detail = row["type"].lower(), row.get("detail", "").lower()
         kind = said if said in KINDS else _TABLE_KINDS.get(said, "other")
         words = detail.replace("/", " ").replace("_", " ")

@@ -132,7 +132,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     positions = metric(match_arrays.player_samples(records, players))
     positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
     ball, of_ball = mended_ball(ball, length, width)
-    positions, ball, turned = mended_sides(times, positions, ball, periods, [one[1] for one in who])
+    positions, ball, turned = mended_sides(times, positions, ball, [one[:2] for one in periods], [one[1] for one in who])
     return {
         "times": times,
         "positions": positions,
@@ -169,9 +169,10 @@ def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match
         width=width,
         fps=fps,
         provider=feed.provider,
-        periods=tuple(map(tuple, arrays["periods"].tolist())),
+        periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()),
         notes=tuple(notes),
         teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
+        passed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
     )
     return replace(match, report=(*notes, *arrays["lines"].tolist(), *presence_lines(match)))
 
@@ -200,8 +201,8 @@ def _cached(cache: Path) -> dict[str, np.ndarray] | None:
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
         return None
     count, who = len(arrays["times"]), arrays["players"].shape
-    fits = arrays["positions"].shape == (who[0], count, 2) and arrays["ball"].shape == (count, 3)
-    return arrays if fits and who[1:] == (5,) and arrays["pitch"].shape == (4,) else None
+    fits = arrays["pitch"].shape == (4,) and arrays["positions"].shape == (who[0], count, 2) and arrays["ball"].shape == (count, 3)
+    return arrays if fits and who[1:] == (5,) and arrays["periods"].shape[1:] == (4,) else None
 
 
 def _keep(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:

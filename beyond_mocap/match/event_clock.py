@@ -17,6 +17,7 @@ import numpy as np
 from ..ball.tracked.solve import SolvedTouch
 from ..errors import InputError
 from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..files.match_data import Half
 
 MOST_LAG = 300.0
 """Seconds by which clocks may differ."""
@@ -67,42 +68,47 @@ class AlignedEvents:
 
 
 def aligned(
-    events: MatchEvents, touches: Sequence[SolvedTouch], periods: Sequence[tuple[float, float]],
+    events: MatchEvents, touches: Sequence[SolvedTouch], halves: Sequence[Half],
     span: tuple[float, float] | None = None,
 ) -> AlignedEvents:
     """Events on the tracking's clock, each with its touch.
 
-    touches: solved, on the match's clock, in order; periods: (start, end) s of the match. span: seconds within which
+    touches: solved, on the match's clock, in order; halves: of the match. span: seconds within which
     touches were solved, by default all; events outside it keep their place and no touch. InputError where the events
     fit no better than by chance: they are of another match.
     """
-    low, high = span or (-np.inf, np.inf)
-    times = np.array([_on_match_clock(event, periods) for event in events.events])
-    clocks, notes = {}, []
-    for number, (start, end) in enumerate(periods, 1):
-        own = [touch for touch in touches if start <= touch.time <= end]
-        members = [i for i, event in enumerate(events.events) if event.period == number]
-        clock = _clock([events.events[i] for i in members], times[members] - start, own, start, (low, high))
-        if clock is None:
+    span = span or (-np.inf, np.inf)
+    times, clocks, notes = np.full(len(events.events), np.nan), {}, []
+    for half in halves:
+        members = [i for i, event in enumerate(events.events) if event.period == half.number]
+        own = [touch for touch in touches if half.start <= touch.time <= half.end]
+        found = _half_clock([events.events[i] for i in members], own, half, span)
+        if found is None:
+            times[members] = half.zero + np.array([events.events[i].time for i in members])
             if members and own:
-                notes.append(f"period {number}: too few events of players who touch the ball to set its clock")
+                notes.append(f"period {half.number}: too few events of players who touch the ball to set its clock")
             continue
-        clocks[number] = clock
-        since = times[members] - start
-        times[members] = start + (since - clock.lag) / (1.0 + clock.drift)
+        clocks[half.number], times[members] = found
     _check(events, clocks)
     usual = next(iter(clocks.values()), None)
-    for number, (start, _) in enumerate(periods, 1):
-        if number not in clocks and usual is not None:
-            times[[i for i, event in enumerate(events.events) if event.period == number]] -= usual.lag
+    for half in halves if usual else ():
+        if half.number not in clocks:
+            times[[i for i, event in enumerate(events.events) if event.period == half.number]] -= usual.lag
     pairs = _pairs(events.events, times, touches)
     notes += [_told(number, clock) for number, clock in clocks.items()]
     return AlignedEvents(events.events, times, pairs, clocks, tuple(notes))
 
 
-def _on_match_clock(event: MatchEvent, periods) -> float:
-    """The second of an event as it is written; NaN for periods that the match has not."""
-    return event.time + periods[event.period - 1][0] if 1 <= event.period <= len(periods) else np.nan
+def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndarray] | None:
+    """A half's clock, and its events' times (E,) s on the match's; None where nothing can be told. A clock that does
+    not count from the half's begin is tried from its first frame."""
+    since = np.array([event.time for event in events])
+    tried = []
+    for zero in dict.fromkeys((half.zero, half.start)):
+        clock = _clock(events, since, touches, zero, span)
+        if clock is not None:
+            tried.append((clock, zero + (since - clock.lag) / (1.0 + clock.drift)))
+    return max(tried, key=lambda one: one[0].matched, default=None)
 
 
 def _told(number: int, clock: PeriodClock) -> str:
@@ -114,7 +120,7 @@ def _told(number: int, clock: PeriodClock) -> str:
 
 
 def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
-    """The clock of one period: since (E,) s are the events' times from its start."""
+    """The clock of one period, that stands at 0 at `start` s: since (E,) s are its events' times on it."""
     when = np.array([touch.time - start for touch in touches])
     who = np.array([touch.player for touch in touches])
     sent = np.array([touch.kind in _SENT for touch in touches], bool)

@@ -96,7 +96,7 @@ def words_of(
     table = table or read_event_words()
     touches = solved.touches if solved else ()
     span = (float(solved.times[0]), float(solved.times[-1])) if solved else None
-    onto = aligned(events, touches, match.periods, span) if events and solved else None
+    onto = aligned(events, touches, match.halves, span) if events and solved else None
     told = {touch: event for event, touch in enumerate(onto.touches) if touch >= 0} if onto else {}
     heights, left_out, players = has_heights(match), Counter(), {}
     for player, path in zip(match.players, match.positions):
