@@ -22,6 +22,7 @@ from .match_checks import check_periods, check_players, check_same_match, whole_
 from .match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
 from .match_mending import mended_ball, mended_players, mended_sides
 from .providers import Feed, feed_of, load
+from .referees import described_referee, referee_samples
 from .tables import number, read_rows
 from .team_colours import team_colours
 from .whole import atomic_write
@@ -128,8 +129,9 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward)
     ball = match_arrays.ball_samples(records)
     ball = np.concatenate([metric(ball[:, :2]), ball[:, 2:] * match_arrays.height_unit(dataset)], axis=1)
-    who = [match_arrays.described(player) for player in players]
-    positions = metric(match_arrays.player_samples(records, players))
+    referees, places = referee_samples(feed, np.array([frame.frame_id for frame in records]))
+    who = [*map(match_arrays.described, players), *map(described_referee, referees)]
+    positions = metric(np.concatenate([match_arrays.player_samples(records, players), places]))
     positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
     ball, of_ball = mended_ball(ball, length, width)
     positions, ball, turned = mended_sides(times, positions, ball, [one[:2] for one in periods], [one[1] for one in who])

@@ -1,6 +1,8 @@
 """A match put right: who is there and when, sentinels, parked players, turned and mirrored halves, files that do not
 belong together or end too early."""
 
+import pathlib
+
 import numpy as np
 import pytest
 
@@ -208,3 +210,32 @@ def test_colours_of_shirts_are_found(tmp_path, said, expected):
     (tmp_path / "m").write_text(said)
     found = team_colours(Feed("x", (tmp_path / "m",), (tmp_path / "m",)))
     assert (found["home"], found["away"]) == expected
+
+
+# --- referees
+
+
+def test_tracab_s_referees_are_players_of_their_own_team(tmp_path):
+    file = tracab(tmp_path)
+    rows = file.read_text().replace(":0,1,1,", ":3,50,0,100,-200,1.00;0,1,1,").splitlines(keepends=True)
+    file.write_text("".join(rows[:40]) + "".join(row.replace(":3,50,0,100,-200,1.00;", ":") for row in rows[40:]))
+    match = read_match(file, cache_dir=tmp_path)
+    referee = match.players[-1]
+    assert (referee.id, referee.team) == ("referee_0", "referee") and match.teams[-1].ground == "referee"
+    np.testing.assert_allclose(match.positions[-1, :40], [[1.0, -2.0]] * 40)
+    assert np.isnan(match.positions[-1, 40:]).all() and len(match.players) == 23
+
+
+@pytest.mark.parametrize("raw, meta, ids", [
+    ("tracab_raw.dat", "tracab_meta.xml", ["referee_0", "referee_1", "referee_2"]),
+    ("sportec_positional_w_referee.xml", "sportec_meta.xml", ["DFL-OBJ-000123"]),
+    ("signality_p1_raw_data_subset.json", "signality_meta_data.json", ["referee_3", "referee_4", "referee_5"]),
+])
+def test_referees_of_other_providers(tmp_path, raw, meta, ids):
+    kloppy = pytest.importorskip("kloppy")
+    files = pathlib.Path(kloppy.__file__).parent / "tests" / "files"
+    if not (files / raw).is_file():
+        pytest.skip("this kloppy comes without its own test files")
+    match = read_match(files / raw, files / meta, cache_dir=tmp_path)
+    assert [player.id for player in match.players if player.team == "referee"][: len(ids)] == ids
+    assert np.isfinite(match.positions[-1]).any() and np.nanmax(np.abs(match.positions[-1])) < 60.0
