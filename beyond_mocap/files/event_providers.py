@@ -36,13 +36,18 @@ _OTHER = {  # parts of a name -> what the same part is in the name of the other 
     "statsperform": (("ma3", "ma1"), ("MA3", "MA1")),
     "impect": (("events", "lineups"), ("event", "lineup")),
 }
-_LARGEST_HEAD = 8192
+_SECOND = {  # what the other file begins with, where no name fits
+    "opta": rb"(?s)\s*(<\?xml[^>]*>\s*)?<SoccerFeed\b", "sportec": rb"(?s)\s*(<\?xml[^>]*>\s*)?<PutDataRequest\b.{0,900}<MatchInf",
+    "statsbomb": rb'(?s)\s*\[\s*\{.{0,300}"lineup"', "metrica": rb"(?s)\s*(<\?xml[^>]*>\s*)?<main\b.{0,900}<Metadata\b",
+    "statsperform": rb'(?s)\s*(<\?xml[^>]*>\s*)?(<match\b|\{.{0,9000}"(lineUp|liveData)")',
+    "impect": rb'(?s)\s*\{.{0,900}"squadHome"',
+}  # fmt: skip
+_HEAD = 8192  # bytes that tell a form
 
 
 def guessed_event_provider(path: Path) -> str:
     """Whose form a file has; InputError where it is none that is known."""
-    with open(path, "rb") as file:
-        head = file.read(_LARGEST_HEAD).removeprefix(b"\xef\xbb\xbf")
+    head = _head(path)
     for provider, form in _FORMS:
         if form.match(head):
             return provider
@@ -50,9 +55,17 @@ def guessed_event_provider(path: Path) -> str:
     raise InputError(path, found, f"events of one of {', '.join(EVENT_PROVIDERS)}", "name the provider")
 
 
+def _head(path: Path) -> bytes:
+    """What a file begins with; nothing of a folder."""
+    if not path.is_file():
+        return b""
+    with open(path, "rb") as file:
+        return file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
+
+
 def other_file(path: Path, provider: str, meta: str | os.PathLike | None) -> Path | None:
-    """The lineups or metadata that an events file needs: `meta`, else the one beside it whose name fits; None where it
-    needs none. InputError where there is none."""
+    """The lineups or metadata that an events file needs: `meta`, else the one beside it whose name, or else whose
+    form fits; None where it needs none. InputError where there is none."""
     if provider in _ALONE or provider == "metrica" and path.suffix.lower() == ".csv":
         return None
     if meta is not None:
@@ -65,6 +78,10 @@ def other_file(path: Path, provider: str, meta: str | os.PathLike | None) -> Pat
     for beside in (folder / name for folder in folders for name in names):
         if beside.is_file() and beside != path:
             return beside
+    form = re.compile(_SECOND[provider])
+    fitting = [one for one in sorted(path.parent.glob("*.[xj]*")) if one != path and form.match(_head(one))]
+    if len(fitting) == 1:
+        return fitting[0]
     expected = f"one as {names[0]}" if names[0] != path.name else "the provider's lineups or metadata"
     raise InputError(path, f"no second file beside it for {provider}", expected, "put it there, or name it")
 

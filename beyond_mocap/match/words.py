@@ -174,10 +174,12 @@ def moment_of(
 
 def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
     """The gait at a moment, from a player's path (N, 2) m at `times` (N,) s."""
-    near = np.flatnonzero((np.abs(times - time) <= 0.3) & np.isfinite(path).all(axis=1))
-    if len(near) < 2:
+    near = slice(*np.searchsorted(times, [time - 0.3, time + 0.3]))
+    there = np.isfinite(path[near]).all(axis=1)
+    seen, when = path[near][there], times[near][there]
+    if len(seen) < 2:
         return {}
-    away = np.linalg.norm(path[near[-1]] - path[near[0]]) / (times[near[-1]] - times[near[0]])
+    away = np.linalg.norm(seen[-1] - seen[0]) / (when[-1] - when[0])
     return {"gait": "running" if away > _RUNNING else "standing"}
 
 

@@ -8,6 +8,7 @@ import pytest
 from beyond_mocap.annotation.event_words import KINDS, PARTS
 from beyond_mocap.errors import InputError
 from beyond_mocap.files.event_players import Who, same_players
+from beyond_mocap.files.event_providers import guessed_event_provider, other_file
 from beyond_mocap.files.events import read_events
 from beyond_mocap.files.match_data import Match, MatchPlayer
 
@@ -68,6 +69,18 @@ def test_a_second_file_that_is_missing_is_asked_for(tmp_path):
     (tmp_path / "g_f24.xml").write_bytes((files() / "opta_f24.xml").read_bytes())
     with pytest.raises(InputError, match="no second file beside it for opta; expected one as g_f7.xml"):
         read_events(tmp_path / "g_f24.xml")
+
+
+@pytest.mark.parametrize("name, meta", [
+    ("opta_f24.xml", "opta_f7.xml"), ("sportec_events.xml", "sportec_meta.xml"),
+    ("metrica_events.json", "epts_metrica_metadata.xml"), ("statsperform_event_ma3.json", "statsperform_event_ma1.json"),
+    ("statsbomb_event.json", "statsbomb_lineup.json"), ("impect_events.json", "impect_lineups.json"),
+])
+def test_a_second_file_is_known_by_its_form_too(tmp_path, name, meta):
+    (tmp_path / f"one{name[-5:]}").write_bytes((files() / name).read_bytes()[:20000])
+    (tmp_path / f"two{meta[-5:]}").write_bytes((files() / meta).read_bytes())
+    found = other_file(tmp_path / f"one{name[-5:]}", guessed_event_provider(tmp_path / f"one{name[-5:]}"), None)
+    assert found == tmp_path / f"two{meta[-5:]}"
 
 
 def test_events_of_another_match_are_refused():
