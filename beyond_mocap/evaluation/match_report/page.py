@@ -135,7 +135,7 @@ def _teams(match: MatchResults, span: tuple[float, float], anchors: Mapping[str,
 
 def _legend() -> str:
     return ("<p class=quiet>Strips: the worst figure of every second; green far below its limit, amber at it, red "
-            "beyond, grey where the player has no motion. Figures in green or red: target met or missed.</p>")  # fmt: skip
+            "beyond, grey where the player has no motion. Green and red figures: target met or not.</p>")  # fmt: skip
 
 
 def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span: tuple[float, float], anchors) -> str:
