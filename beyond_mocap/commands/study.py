@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import base64
 import mimetypes
+import os
 import shutil
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -73,7 +75,8 @@ def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..study.order import ordered
     from ..study.study_file import read_clips, write_study
 
-    clips = read_clips(options.clips)
+    table = options.clips.parent
+    clips = [replace(clip, file=_from(options.out, table / clip.file)) for clip in read_clips(options.clips)]
     try:
         study = ordered(clips, options.raters, options.seed, options.pairs)
     except InputError as error:
@@ -86,16 +89,25 @@ def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
             (place / CLIPS).mkdir()
         for number, clip in enumerate(study.clips if options.copy else (), 1):
             told.check()
-            _copy(options.clips.parent / clip.file, place / CLIPS / clip.name)
-            told.progress(number / len(study.clips), clip.file)
+            _copy(options.out / clip.file, place / CLIPS / clip.name)
+            told.progress(number / len(study.clips), clip.name)
     told.end()
     shown = len(next(iter(study.orders.values())))
     print(f"{options.out}: study {study.id}, {len(study.clips)} clips of {len(study.systems)} systems, "
           f"{len(study.orders)} raters with {shown} pages each")  # fmt: skip
 
 
+def _from(folder: Path, path: Path) -> str:
+    """A path as it is called from a folder that need not be there yet, so that both can be moved together."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return path.resolve().as_posix()
+
+
 def _copy(source: Path, target: Path) -> None:
     """One movie, under its neutral name; neither time nor name of the file are kept."""
+    source = source.resolve()
     if not source.is_file():
         raise InputError(source, "no such file", "a movie", "correct the table, or leave --copy out")
     shutil.copyfile(source, target.with_suffix(source.suffix.lower()))
@@ -146,7 +158,7 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.whole import atomic_write
     from ..study.analysis import analysed
     from ..study.answers import read_answers
-    from ..study.page import study_page, study_report
+    from ..study.page import p_text, study_page, study_report
     from ..study.study_file import read_study
 
     answers = options.answers or [options.study / ANSWERS]
@@ -162,4 +174,4 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
         told.note(note)
     for one in found.findings:
         said = "more natural" if one.better else "not shown to be more natural"
-        print(f"{one.new} over {one.old}: {said}, difference {one.mean:+.2f}, one-sided p = {one.holm_p:.4f}")
+        print(f"{one.new} over {one.old}: {said}, difference {one.mean:+.2f}, one-sided {p_text(one.holm_p)}")

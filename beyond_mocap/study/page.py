@@ -65,13 +65,20 @@ def study_page(found: Analysis) -> str:
     return head + "\n".join(parts) + "\n</body></html>\n"
 
 
+def p_text(p: float) -> str:
+    """A p as it is told: "p = 0.0391", "p < 0.0001", "p cannot be had"."""
+    if not math.isfinite(p):
+        return "p cannot be had"
+    return "p < 0.0001" if p < 1e-4 else f"p = {p:.4f}"
+
+
 def _sentence(one: Finding, pairs: bool) -> str:
     new, old = escape(one.new), escape(one.old)
     if not math.isfinite(one.p):
         return f"<p>Whether {new} looks more natural than {old} cannot be tested: too few raters, or all alike.</p>"
     unit = "" if pairs else " points"
     told = (f"{one.mean:+.2f}{unit} (95 %: {one.low:+.2f} to {one.high:+.2f}), t({one.degrees}) = {one.t:.2f}, "
-            f"one-sided p = {one.holm_p:.4f}")  # fmt: skip
+            f"one-sided {p_text(one.holm_p)}")  # fmt: skip
     if one.better:
         return f"<p><span class=met>{new} looks more natural than {old}</span>: {told}.</p>"
     return f"<p>That {new} looks more natural than {old} is not shown: {told}.</p>"
@@ -113,7 +120,9 @@ def _shares(row: Shares) -> dict:
 
 
 def _cell(value: float, digits: int) -> str:
-    return f"<td class=n>{value:.{digits}f}" if math.isfinite(value) else "<td class=n>–"
+    if not math.isfinite(value):
+        return "<td class=n>–"
+    return "<td class=n>&lt; 0.0001" if digits == 4 and value < 1e-4 else f"<td class=n>{value:.{digits}f}"
 
 
 def _image(png: bytes, text: str) -> str:

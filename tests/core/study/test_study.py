@@ -294,6 +294,6 @@ def test_what_is_wrong_is_one_line(tmp_path, capfd, argv, words):
     study = ordered(CLIPS, 2)
     write_study(tmp_path / "made", study)
     planted(tmp_path / "a", study, {})
-    assert main(["study", *(word.replace("T/", f"{tmp_path}/") if word != "T" else str(tmp_path) for word in argv)]) == 2
+    assert main(["study", *(f"{word}/".replace("T/", f"{tmp_path}/").rstrip("/") for word in argv)]) == 2
     told = capfd.readouterr().err.strip().splitlines()
     assert len(told) == 1 and words in told[0] and not (tmp_path / "o").exists() and not (tmp_path / "r.json").exists()
