@@ -16,6 +16,8 @@ _APART = 5.0  # m between the teams' mean places along the pitch that tell their
 _SAMPLED = 25  # every how manieth sample is enough for means over a half
 _LEAST = 60.0  # s of frames that a half must have for its means to tell anything
 _LIKE = 0.5  # correlation of the players' places across the pitch from which halves are told apart
+_SIDES = ("left", "right")
+_WRONG_SIDE = 5.0  # m by which the left have to stand to the right of the right
 _FEWEST = 6  # players in both halves that tell of it
 
 
@@ -130,3 +132,18 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> float:
     a, b = one[both], other[both]
     size = np.sqrt((a**2).sum() * (b**2).sum())
     return float((a * b).sum() / size) if np.count_nonzero(both) >= _FEWEST and size > 1.0 else 0.0
+
+
+def side_lines(times, positions, periods, teams, called) -> list[str]:
+    """A line where players whom the lineup calls left stand to the right of those it calls right, over the first half,
+    looking where their team attacks. positions (P, N, 2) m put right; called: P position words."""
+    part = slice(*np.searchsorted(times, [periods[0][0] - 1e-6, periods[0][1] + 1e-6]))
+    end = home_end(positions[:, part], np.array(teams))
+    if not end or (part.stop - part.start) * float(np.median(np.diff(times))) < _LEAST:
+        return []
+    attack = np.where(np.array(teams) == "home", -end, end)
+    across = _across(positions[:, part]) * attack
+    sides = {side: [y for y, said in zip(across, called) if side in said.split() and np.isfinite(y)] for side in _SIDES}
+    if min(map(len, sides.values())) < 2 or np.mean(sides["left"]) - np.mean(sides["right"]) > -_WRONG_SIDE:
+        return []
+    return ["players called left stand on the right: the file may be mirrored side to side, or the lineup"]

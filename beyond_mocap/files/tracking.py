@@ -20,7 +20,7 @@ from ..motion.track import Track
 from . import match_arrays
 from .match_checks import check_periods, check_players, check_same_match, whole_lines
 from .match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
-from .match_mending import mended_ball, mended_players, mended_sides
+from .match_mending import mended_ball, mended_players, mended_sides, side_lines
 from .providers import Feed, feed_of, load
 from .referees import described_referee, referee_samples
 from .tables import number, read_rows
@@ -134,7 +134,9 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     positions = metric(np.concatenate([match_arrays.player_samples(records, players), places]))
     positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
     ball, of_ball = mended_ball(ball, length, width)
-    positions, ball, turned = mended_sides(times, positions, ball, [one[:2] for one in periods], [one[1] for one in who])
+    spans, teams = [one[:2] for one in periods], [one[1] for one in who]
+    positions, ball, turned = mended_sides(times, positions, ball, spans, teams)
+    turned += side_lines(times, positions, spans, teams, [one[4] for one in who])
     return {
         "times": times,
         "positions": positions,

@@ -4,6 +4,8 @@ import pathlib
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from beyond_mocap.annotation.event_words import KINDS, PARTS
 from beyond_mocap.errors import InputError
@@ -128,6 +130,20 @@ def test_mistakes_get_one_line(tmp_path, text, part):
         read_events(tmp_path / "none.csv")
     with pytest.raises(InputError, match="one of opta"):
         read_events(tmp_path / "e.csv", provider="fifa")
+
+
+NEARLY = st.text("0123456789.,-pas home_\n\"", max_size=120).map(str.encode)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.one_of(st.binary(max_size=120), NEARLY))
+def test_any_content_is_read_or_refused(tmp_path_factory, content):
+    file = tmp_path_factory.mktemp("fuzz") / "e.csv"
+    file.write_bytes(b"time_s,type,player\n" + content)
+    try:
+        read_events(file, match=made_match())
+    except InputError as error:
+        assert "\n" not in str(error)
 
 
 def test_metrica_s_table_of_events_is_read(tmp_path):

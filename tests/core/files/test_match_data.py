@@ -8,7 +8,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.files.match_data import Match, MatchPlayer, presence_lines
-from beyond_mocap.files.match_mending import mended_ball, mended_players, mended_sides
+from beyond_mocap.files.match_mending import mended_ball, mended_players, mended_sides, side_lines
 from beyond_mocap.files.team_colours import team_colours
 from beyond_mocap.files.providers import Feed
 from beyond_mocap.files.tracking import read_match
@@ -116,6 +116,15 @@ def test_one_half_and_few_players_are_left():
     few = [3, 4, 15, 16]
     found, _, lines = mended_sides(times, positions[few] * [1.0, -1.0], ball, PERIODS, [teams[i] for i in few])
     assert lines == []  # too few to tell that a half is mirrored
+
+
+def test_a_lineup_that_does_not_fit_the_sides_is_told():
+    times, positions, _, teams = two_halves()
+    middle = positions[:, times < 100, 1].mean(axis=1) * np.where(np.array(teams) == "home", 1.0, -1.0)
+    called = ["left back" if y > 8 else "right back" if y < -8 else "striker" for y in middle]
+    assert side_lines(times, positions, PERIODS, teams, called) == []
+    assert "players called left" in side_lines(times, positions * [1.0, -1.0], PERIODS, teams, called)[0]
+    assert side_lines(times, positions * [1.0, -1.0], PERIODS, teams, [""] * 22) == []
 
 
 # --- files
