@@ -17,6 +17,7 @@ from ..match.named_edit import NamedEdit, NamedKey
 from ..match.player_edit import PlayerEdit, Stretch, course_times
 from ..motion.track import Track
 from ..plan import METHODS, Pin, Plan, SolvedCourse, Touched
+from ..polish.crowd.correction import Correction
 from .content import content
 from .json_values import check_names, entries, number, numbers, object_of, shown, text, truth, whole_number
 from .plain_npz import HEADER, header_text, plain_arrays
@@ -49,9 +50,13 @@ def write_player(path: str | os.PathLike, edit: PlayerEdit) -> None:
     for index, stretch in enumerate(edit.stretches):
         stretches.append(_stretch_out(stretch))
         arrays |= {f"{index}/{name}": values for name, values in _stretch_arrays(stretch).items()}
+    apart = edit.correction
     header = {
         "format": FORMAT, "version": VERSION, "player": edit.player, "window": edit.window, "stretches": stretches,
+        "correction": None if apart is None else [apart.fps, apart.step],
     }  # fmt: skip
+    if apart is not None:
+        arrays |= {"knots": apart.knots, "values": apart.values}
     arrays[HEADER] = np.frombuffer(json.dumps(header, allow_nan=False).encode(), np.uint8)
     whole = io.BytesIO()
     np.savez_compressed(whole, **dict(sorted(arrays.items())))
@@ -121,12 +126,23 @@ def _player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
         raise InputError(HEADER, "no player of a match", _KIND, "choose another file")
     if header.get("version") != VERSION:
         raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
-    rows = ("format", "version", "player", "window", "stretches")
+    rows = ("format", "version", "player", "window", "stretches", "correction")
     check_names(header, HEADER, rows, rows)
     stretches = [_stretch(row, index, arrays) for index, row in enumerate(entries(header["stretches"], "stretches"))]
+    apart = _correction(header["correction"], arrays)
     if arrays:
         raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
-    return PlayerEdit(text(header["player"], "player"), number(header["window"], "window"), tuple(stretches))
+    return PlayerEdit(text(header["player"], "player"), number(header["window"], "window"), tuple(stretches), apart)
+
+
+def _correction(value, arrays: dict[str, np.ndarray]) -> Correction | None:
+    if value is None:
+        return None
+    fps, step = _row(value, "correction", 2)
+    knots, values = arrays.pop("knots", None), arrays.pop("values", None)
+    if knots is None or values is None or knots.dtype.kind != "i" or values.dtype != np.int16:
+        raise InputError("correction", "no knots, or no values of whole numbers", "both")
+    return Correction(knots, values, number(fps, "correction"), whole_number(step, "correction"))
 
 
 def _stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:

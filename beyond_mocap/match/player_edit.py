@@ -10,6 +10,7 @@ import numpy as np
 from ..known_touches import in_force
 from ..motion.track import Track
 from ..plan import Plan, SolvedCourse
+from ..polish.crowd.correction import Correction
 from .named_edit import NamedEdit
 
 COURSE_STEP = 0.02
@@ -33,11 +34,12 @@ class Stretch:
 @dataclass(frozen=True, eq=False)
 class PlayerEdit:
     """A player of a match. player: his id. window: s of the windows in which he is laid out. stretches: in the order of
-    time."""
+    time. correction: what keeps him out of others' bodies when he is shown, None where that is not known yet."""
 
     player: str
     window: float
     stretches: tuple[Stretch, ...]
+    correction: Correction | None = None
 
 
 def kept(plan: Plan) -> Plan:
