@@ -225,7 +225,7 @@ def angle_of(y: np.ndarray, x: np.ndarray) -> np.ndarray:
     numpy goes another way, to another last bit, where an input with gaps (such as a column) happens to lie beside the
     output in memory; without gaps the same values always give the same bits.
     """
-    return np.arctan2(np.ascontiguousarray(y), np.ascontiguousarray(x))
+    return np.arctan2(np.asarray(y, order="C"), np.asarray(x, order="C"))
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
