@@ -67,9 +67,9 @@ def head_angles(seen: np.ndarray) -> np.ndarray:
     unit = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
-    side = quaternion.bearing(np.maximum(unit[:, 0], back), unit[:, 1])
+    side = quaternion.angle_of(unit[:, 1], np.maximum(unit[:, 0], back))
     yaw = _limited(side, MOST_YAW) * _smooth(level / _OVERHEAD)
-    pitch = quaternion.bearing(level, unit[:, 2])
+    pitch = quaternion.angle_of(unit[:, 2], level)
     return np.column_stack([yaw, np.where(pitch > 0.0, _limited(pitch, MOST_UP), _limited(pitch, MOST_DOWN))])
 
 
