@@ -37,8 +37,10 @@ _OTHER = {  # parts of a name -> what the same part is in the name of the other 
     "impect": (("events", "lineups"), ("event", "lineup")),
 }
 _SECOND = {  # what the other file begins with, where no name fits
-    "opta": rb"(?s)\s*(<\?xml[^>]*>\s*)?<SoccerFeed\b", "sportec": rb"(?s)\s*(<\?xml[^>]*>\s*)?<PutDataRequest\b.{0,900}<MatchInf",
-    "statsbomb": rb'(?s)\s*\[\s*\{.{0,300}"lineup"', "metrica": rb"(?s)\s*(<\?xml[^>]*>\s*)?<main\b.{0,900}<Metadata\b",
+    "opta": rb"(?s)\s*(<\?xml[^>]*>\s*)?<SoccerFeed\b",
+    "sportec": rb"(?s)\s*(<\?xml[^>]*>\s*)?<PutDataRequest\b.{0,900}<MatchInf",
+    "statsbomb": rb'(?s)\s*\[\s*\{.{0,300}"lineup"',
+    "metrica": rb"(?s)\s*(<\?xml[^>]*>\s*)?<main\b.{0,900}<Metadata\b",
     "statsperform": rb'(?s)\s*(<\?xml[^>]*>\s*)?(<match\b|\{.{0,9000}"(lineUp|liveData)")',
     "impect": rb'(?s)\s*\{.{0,900}"squadHome"',
 }  # fmt: skip

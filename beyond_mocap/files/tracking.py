@@ -205,8 +205,9 @@ def _cached(cache: Path) -> dict[str, np.ndarray] | None:
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
         return None
     count, who = len(arrays["times"]), arrays["players"].shape
-    fits = arrays["pitch"].shape == (4,) and arrays["positions"].shape == (who[0], count, 2) and arrays["ball"].shape == (count, 3)
-    return arrays if fits and who[1:] == (5,) and arrays["periods"].shape[1:] == (4,) else None
+    shapes = {"positions": (who[0], count, 2), "ball": (count, 3), "pitch": (4,), "players": (who[0], 5)}
+    fits = all(arrays[name].shape == shape for name, shape in shapes.items())
+    return arrays if fits and arrays["periods"].shape[1:] == (4,) and arrays["teams"].shape[1:] == (3,) else None
 
 
 def _keep(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:

@@ -139,11 +139,13 @@ META = (
 
 def roster(side, shirts):
     one = (
-        "<Player><PlayerId>{side}{n}</PlayerId><FirstName>A</FirstName><LastName>B{n}</LastName><JerseyNo>{n}</JerseyNo>"
+        "<Player><PlayerId>{side}{n}</PlayerId><FirstName>A</FirstName><LastName>B{n}</LastName>"
+        "<JerseyNo>{n}</JerseyNo>"
         "<StartFrameCount>1</StartFrameCount><EndFrameCount>99</EndFrameCount></Player>"
     )
     players = "".join(one.format(side=side, n=n) for n in shirts)
-    return f"<{side}Team><LongName>{side}</LongName><ShortName>{side}</ShortName><TeamId>1</TeamId><Players>{players}</Players></{side}Team>"
+    names = f"<LongName>{side}</LongName><ShortName>{side}</ShortName><TeamId>1</TeamId>"
+    return f"<{side}Team>{names}<Players>{players}</Players></{side}Team>"
 
 
 def tracab(folder, frames=60, shirts=range(1, 12), start=1, end=60, second=0, last=0, named=None):
@@ -208,9 +210,10 @@ def test_two_teams_of_two_matches_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("said, expected", [
-    ('{"homeTeamKit":{"name":"x","primaryColor":"#ff00aa"},"awayTeamKit":{"primaryColor":"#003366"}}', ("#FF00AA", "#003366")),
+    ('{"homeTeamKit":{"name":"x","primaryColor":"#ff00aa"},"awayTeamKit":{"primaryColor":"#003366"}}',
+     ("#FF00AA", "#003366")),
     ('{"home_team_kit":{"id":1,"jersey_color":"#ffffff"}}', ("#FFFFFF", "")),
-    ('<Teams><Team Role="home" PlayerShirtMainColor="#DC0B21"/><Team PlayerShirtMainColor="8FBBF0" Role="guest"/></Teams>',
+    ('<Team Role="home" PlayerShirtMainColor="#DC0B21"/><Team PlayerShirtMainColor="8FBBF0" Role="guest"/>',
      ("#DC0B21", "#8FBBF0")),
     ('{"homeTeamKit":{"primaryColor":"red"}}', ("", "")),
     ("no colours", ("", "")),
