@@ -129,7 +129,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward)
     ball = match_arrays.ball_samples(records)
     ball = np.concatenate([metric(ball[:, :2]), ball[:, 2:] * match_arrays.height_unit(dataset)], axis=1)
-    referees, places = referee_samples(feed, np.array([frame.frame_id for frame in records]))
+    referees, places, of_referees = referee_samples(feed, np.array([frame.frame_id for frame in records]))
     who = [*map(match_arrays.described, players), *map(described_referee, referees)]
     positions = metric(np.concatenate([match_arrays.player_samples(records, players), places]))
     positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
@@ -145,7 +145,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
         "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]),
         "periods": np.array(periods),
         "teams": np.array(_teams(dataset, feed), dtype=str).reshape(-1, 3),
-        "lines": np.array([*lines, *turned, *of_ball, *more], dtype=str),
+        "lines": np.array([*lines, *turned, *of_ball, *more, *of_referees], dtype=str),
     }
 
 
