@@ -32,8 +32,8 @@ ROOMS = {
     "plan": ["motion", "annotation"],
     "take": ["motion", "annotation", "plan", "synthesis.edit_list"],
     "markers": ["motion", "polish.reach", "polish.foot_plant"],
-    "files": ["motion", "annotation", "take", "plan", "ball.pass_scene", "ball.contact", "markers",
-              "synthesis.phase_network"],
+    "files": ["motion", "annotation", "take", "plan", "match.named_edit", "match.player_edit", "polish.crowd.correction",
+              "ball.pass_scene", "ball.contact", "markers", "synthesis.phase_network"],
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "synthesis.phase_network": ["motion", "polish.reach"],
@@ -41,12 +41,14 @@ ROOMS = {
     "ball": ["motion", "annotation", "library", "polish", "markers.trial", "markers.frames"],
     "stream": ["motion", "files", "ball"],
     "evaluation": ["motion", "annotation", "plan", "take", "ball", "library", "markers", "synthesis.phase_network"],
+    "study": ["files", "evaluation"],
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
 LAZY = {
     "library": ["sklearn", "threadpoolctl"],
     "files": ["kloppy", "c3d"],
     "evaluation": ["matplotlib"],
+    "study": ["matplotlib"],
     "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn", "threadpoolctl", "jax", "optax", "training"],
 }
 # A room of the extension -> what it may import of ours.

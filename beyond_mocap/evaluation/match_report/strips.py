@@ -1,0 +1,50 @@
+"""A player's whole match as one strip: how bad it is from left to right, as a PNG that needs no library to draw."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+
+CELLS = 900
+"""Most cells of a strip; where a match has more seconds, each cell shows the worst of its own."""
+FULL = 3.0
+"""Times the limit at which the colour is at its end."""
+_GOOD, _LIMIT, _BAD = np.array([[226, 240, 229], [250, 205, 110], [170, 20, 20]], float)
+_NOBODY = np.array([236, 236, 236], float)
+
+
+def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height: int = 1) -> bytes:
+    """The strip of one player as a PNG. bad: (S,) times the limit, a row a second from second `start` on, NaN where he
+    has no motion. span: the first and last second that the strip shows."""
+    first, count = int(np.floor(span[0])), max(int(np.ceil(span[1]) - np.floor(span[0])), 1)
+    whole = np.full(count, np.nan)
+    rows = np.arange(len(bad)) + round(start) - first
+    inside = (rows >= 0) & (rows < count)
+    whole[rows[inside]] = bad[inside]
+    cells = min(count, CELLS)
+    edges = np.linspace(0, count, cells + 1).astype(int)[:-1]
+    return png(np.repeat(colours(np.fmax.reduceat(whole, edges))[None], height, axis=0))
+
+
+def colours(bad: np.ndarray) -> np.ndarray:
+    """(..., 3) uint8 for badness (...): pale green up to half the limit, amber at it, dark red from FULL on, grey for
+    NaN."""
+    known = np.clip(np.nan_to_num(np.asarray(bad, float))[..., None], 0.0, FULL)
+    below = _GOOD + (_LIMIT - _GOOD) * np.clip(2.0 * known - 1.0, 0.0, 1.0)
+    above = _LIMIT + (_BAD - _LIMIT) * (known - 1.0) / (FULL - 1.0)
+    out = np.where(np.isnan(bad)[..., None], _NOBODY, np.where(known <= 1.0, below, above))
+    return np.rint(out).astype(np.uint8)
+
+
+def png(pixels: np.ndarray) -> bytes:
+    """A picture (H, W, 3) or (H, W, 4) uint8, the upper row first, as a PNG (ISO/IEC 15948): one chunk of rows without
+    filter."""
+    high, wide, channels = pixels.shape
+    head = struct.pack(">IIBBBBB", wide, high, 8, 2 if channels == 3 else 6, 0, 0, 0)
+    rows = np.concatenate([np.zeros((high, 1), np.uint8), np.ascontiguousarray(pixels).reshape(high, -1)], axis=1)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
