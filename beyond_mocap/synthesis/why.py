@@ -43,6 +43,7 @@ PARTS = {
     "rate_change": "change of playing speed",
     "avoided": "a word that must not be",
     "style": "no clip of the style",
+    "variety": "out of step with this player's own lag",
 }
 """Name of a part of the costs -> what it is about."""
 
