@@ -125,7 +125,7 @@ def first(header) -> dict:
     (lambda h: h.update(version=99), "another Beyond Mocap"),
     (lambda h: h.pop("player"), "player"),
     (lambda h: h.update(correction=[25.0]), "2 values"),
-    (lambda h: h.update(correction=[-1.0, 3]), "above 0"),
+    (lambda h: h.update(correction=[-1.0, 2]), "above 0"),
     (lambda h: h.update(correction=[25.0, 99]), "rising"),
     (lambda h: h["stretches"].append(first(h)), "no such array"),
     (lambda h: h["stretches"].pop(), "belongs to nothing"),
