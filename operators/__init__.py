@@ -96,6 +96,7 @@ from . import (
     stream_start,
     stream_stop,
     stream_target,
+    study_render,
     synthesize,
     take_ball,
     throw_at_target,
@@ -231,6 +232,7 @@ CLASSES = (
     clean_markers.BEYOND_MOCAP_OT_clean_markers,
     reconstruct_markers.BEYOND_MOCAP_OT_reconstruct_markers,
     find_release.BEYOND_MOCAP_OT_find_release,
+    study_render.BEYOND_MOCAP_OT_study_render,
 )
 
 

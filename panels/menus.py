@@ -15,6 +15,7 @@ def draw_import(self, _context):
 def draw_export(self, _context):
     """File > Export."""
     self.layout.operator("beyond_mocap.export_bvh", text="Beyond Mocap Motion (.bvh)")
+    self.layout.operator("beyond_mocap.study_render", text="Beyond Mocap Study Clips (.mp4)")
 
 
 def draw_strip(self, _context):

@@ -5,6 +5,7 @@ well. A new operator without a row fails here.
 """
 
 import importlib
+import json
 import re
 import shutil
 import socket
@@ -287,6 +288,19 @@ def saved_map(places):
     return places.out / "map.json"
 
 
+def a_study(places):
+    """A study of four movies, none of them at its place yet."""
+    folder = places.out / "study"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    clips = [{"name": name, "file": "../still.mp4", "system": system, "scenario": "s"}
+             for name, system in (("bcdf", "training"), ("ghjk", "training"), ("mnpq", "ours"), ("rstv", "theirs"))]
+    (places.out / "still.mp4").write_bytes(b"a movie")
+    told = {"version": 1, "study": "12345678", "seed": 0, "pairs": False, "clips": clips, "orders": {"R01": [["bcdf"]]}}
+    (folder / "study.json").write_text(json.dumps(told), "utf-8")
+    return {"directory": f"{folder}/"}
+
+
 def moved(folder):
     """A second copy of a folder, beside it."""
     other = folder.with_name(f"{folder.name} moved")
@@ -404,6 +418,7 @@ ROWS = {
     "stream_start": Row("imported", changes=False),
     "stream_stop": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.stream_start(), changes=False),
     "stream_target": Row("imported", lambda places: {"number": 2}, play_live),
+    "study_render": Row("imported", a_study, changes=False),
     "synthesize": Row("imported"),
     "take_ball": Row("accepted", lambda places: {"first": 3, "last": 8}, a_ball),
     "throw_at_target": Row("accepted", prepare=a_target),

@@ -41,12 +41,14 @@ ROOMS = {
     "ball": ["motion", "annotation", "library", "polish", "markers.trial", "markers.frames"],
     "stream": ["motion", "files", "ball"],
     "evaluation": ["motion", "annotation", "plan", "take", "ball", "library", "markers", "synthesis.phase_network"],
+    "study": ["files", "evaluation"],
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
 LAZY = {
     "library": ["sklearn", "threadpoolctl"],
     "files": ["kloppy", "c3d"],
     "evaluation": ["matplotlib"],
+    "study": ["matplotlib"],
     "recipe": ["joblib", "dask", "distributed", "matplotlib", "sklearn", "threadpoolctl", "jax", "optax", "training"],
 }
 # A room of the extension -> what it may import of ours.

@@ -135,7 +135,7 @@ def _teams(match: MatchResults, span: tuple[float, float], anchors: Mapping[str,
 
 def _legend() -> str:
     return ("<p class=quiet>Strips: the worst figure of every second; green far below its limit, amber at it, red "
-            "beyond, grey where the player has no motion. Figures in green or red: target met or missed.</p>")  # fmt: skip
+            "beyond, grey where the player has no motion. Green and red figures: target met or not.</p>")  # fmt: skip
 
 
 def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span: tuple[float, float], anchors) -> str:
@@ -151,7 +151,8 @@ def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span: tuple[fl
         own = [one for one in worst if one.player is player]
         lines += [f'<p><a href="#{_moment_anchor(one, anchors)}">{_clock(one.time)}: one of the worst seconds</a></p>'
                   for one in own]  # fmt: skip
-        lines.append(_lines("", tuple(dict.fromkeys(map(str, player.report.get("warnings") or ())))))
+        warnings = map(str, player.report.get("warnings") or ())
+        lines.append(_lines("", tuple(dict.fromkeys((*warnings, *player.data)))))
         parts.append(f'<details id="{anchors[player.id]}"{" open" if own else ""}><summary>{escape(player.called)} '
                      f"<span class=quiet>{escape(player.team)}</span></summary>{''.join(lines)}</details>")  # fmt: skip
     return "\n".join(parts)

@@ -21,8 +21,8 @@ _LONGEST = 6 * 3600  # seconds of one match
 @dataclass(frozen=True, eq=False)
 class PlayerResult:
     """One player. id: in the feed, and in the names of his files. team: name of his team. status: "done", or how far he
-    came; reason: why he came no further, "" where that is not told. report: his report, {} where there is none. start:
-    seconds on the match clock of the first row of per_second, which has one array (S,) for each of FIGURES, NaN where
+    came; reason: why he came no further, "" where that is not told. data: lines on what was read of him. report: his
+    report, {} where there is none. start: seconds on the match clock of the first row of per_second, which has one array (S,) for each of FIGURES, NaN where
     nothing is known, empty where the report tells nothing by the second."""
 
     id: str
@@ -31,6 +31,7 @@ class PlayerResult:
     team: str
     status: str
     reason: str
+    data: tuple[str, ...]
     report: Mapping
     start: float = 0.0
     per_second: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -108,7 +109,7 @@ def _teams(told) -> dict[str, TeamResult]:
 def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> PlayerResult:
     name, (status, _, reason) = str(row["id"]), _text(row.get("status")).partition(":")
     report, trouble = {}, ""
-    path = folder / Path(_text(row.get("report")) or f"{name}.report.json").name
+    path = folder / f"{Path(_text(row.get('file')) or name).name}.report.json"
     if path.is_file():
         try:
             report = _object(path)
@@ -123,7 +124,7 @@ def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> Play
     return PlayerResult(
         name, _text(row.get("name") or report.get("name")), _text(row.get("number") or report.get("number")),
         teams[ground].name if ground in teams else ground, status.strip() or "not told",
-        trouble or _text(row.get("reason")) or reason.strip(), report, start, per_second,
+        trouble or _text(row.get("reason")) or reason.strip(), _lines(row), report, start, per_second,
     )  # fmt: skip
 
 
@@ -138,7 +139,7 @@ def _by_second(told) -> tuple[float, dict[str, np.ndarray]]:
 
 
 def _lines(told: Mapping) -> tuple[str, ...]:
-    """What match.json tells of data and work, in its order, each line once."""
+    """What is told of data and work, in its order, each line once."""
     lines = [line for key in ("data", "notes", "warnings") if isinstance(told.get(key), list) for line in told[key]]
     return tuple(dict.fromkeys(_text(line) for line in lines))
 

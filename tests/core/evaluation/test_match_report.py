@@ -37,7 +37,7 @@ def column(quiet, **bad):
 def written(folder, reports, **changed):
     """A folder with these reports by player id; None: he failed."""
     players = [
-        {"id": name, "name": f"Player <{name}>", "number": 7 + order, "team": "home" if order % 2 == 0 else "away",
+        {"id": name, "file": f"file-{name}", "name": f"Player <{name}>", "number": 7 + order, "team": "home" if order % 2 == 0 else "away",
          **({"status": "done"} if one else {"status": "failed", "reason": "no <bones> & no luck"})}
         for order, (name, one) in enumerate(reports.items())
     ]
@@ -50,7 +50,7 @@ def written(folder, reports, **changed):
     (folder / "match.json").write_text(json.dumps(match), "utf-8")
     for name, one in reports.items():
         if one:
-            (folder / f"{name}.report.json").write_text(json.dumps(one), "utf-8")
+            (folder / f"file-{name}.report.json").write_text(json.dumps(one), "utf-8")
     return folder
 
 
@@ -122,11 +122,11 @@ def test_nothing_is_loaded_all_is_escaped_and_links_lead_somewhere(tmp_path):
 
 def test_failed_and_unreadable_players_are_marked_and_the_rest_is_told(tmp_path):
     folder = written(tmp_path, {"a": report(), "b": None, "c": report(), "d": report()})
-    (folder / "c.report.json").write_text('{"fps": 30.0, "per_sec', "utf-8")
-    (folder / "d.report.json").unlink()
+    (folder / "file-c.report.json").write_text('{"fps": 30.0, "per_sec', "utf-8")
+    (folder / "file-d.report.json").unlink()
     text = page(folder)
     assert "1 of 4 players made" in text and "Partial: 3 not made" in text
-    assert "no &lt;bones&gt; &amp; no luck" in text and "cannot be read" in text and "d.report.json is missing" in text
+    assert "no &lt;bones&gt; &amp; no luck" in text and "cannot be read" in text and "file-d.report.json is missing" in text
 
 
 def test_a_player_who_comes_late_and_unknown_values(tmp_path):

@@ -1,0 +1,109 @@
+"""What came back from raters: files that the form saved, or tables that were typed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+from ..files.content import utf8
+from ..files.tables import read_rows
+from .form import ANSWER_COLUMNS
+from .order import Study
+from .questions import BACKGROUND, SAME, SCALE
+
+_LARGEST = 5_000_000
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The answers to a study. background: rater -> question -> key of the choice. ratings: rater -> neutral name -> 1
+    to 5. choices: rater -> (left, right) -> the chosen name, or SAME. missing: how many answers that count are not
+    there of the raters who answered at all."""
+
+    background: Mapping[str, Mapping[str, str]]
+    ratings: Mapping[str, Mapping[str, int]]
+    choices: Mapping[str, Mapping[tuple[str, str], str]]
+    missing: int
+
+    @property
+    def raters(self) -> tuple[str, ...]:
+        """Who answered, by name."""
+        return tuple(sorted(self.background))
+
+
+def read_answers(study: Study, paths: Sequence[Path]) -> Answers:
+    """The answers in files and folders of files (.csv, .json). Empty answers are left out.
+
+    InputError, with the line, for answers to another study, of a rater or to a question that it has not, or that are no
+    choice; where one rater answered a question in two ways; and where nobody answered.
+    """
+    found: dict[str, dict[str, tuple[str, str]]] = {}
+    for path in _files(paths):
+        for place, mark, rater, question, answer in _rows(path):
+            if not answer:
+                continue
+            answer = _checked(study, place, mark, rater, question, answer)
+            before = found.setdefault(rater, {}).setdefault(question, (answer, place))
+            if before[0] != answer:
+                told = f"{rater} says {answer} to {question} here and {before[0]} in {before[1]}"
+                raise InputError(place, told, "one answer", "remove one of the two")
+    if not found:
+        raise InputError(paths[0] if paths else "answers", "no answers", "files that the form saved", "add them")
+    return _sorted_out(study, found)
+
+
+def _sorted_out(study: Study, found: Mapping[str, Mapping[str, tuple[str, str]]]) -> Answers:
+    asked = {question.key for question in BACKGROUND}
+    background, ratings, choices = {}, {}, {}
+    missing = 0
+    for rater in sorted(found):
+        said = {question: answer for question, (answer, _) in found[rater].items()}
+        background[rater] = {key: answer for key, answer in said.items() if key in asked}
+        shown = [row for row in study.orders[rater] if study.counts(row)]
+        given = {row: said["/".join(row)] for row in shown if "/".join(row) in said}
+        missing += len(shown) - len(given)
+        ratings[rater] = {} if study.pairs else {row[0]: int(answer) for row, answer in given.items()}
+        choices[rater] = {row: answer for row, answer in given.items()} if study.pairs else {}
+    return Answers(background, ratings, choices, missing)
+
+
+def _checked(study: Study, place: str, mark: str, rater: str, question: str, answer: str) -> str:
+    """The answer, where it is one of this study."""
+    if mark != study.id:
+        raise InputError(place, f"answers to study {mark or 'without a name'}", study.id, "choose this study's answers")
+    if rater not in study.orders:
+        raise InputError(place, f"rater {rater!r}", f"one of {', '.join(list(study.orders)[:12])}", "correct the name")
+    possible = {one.key: [key for key, _ in one.choices] for one in BACKGROUND}
+    scale = [str(value) for value in range(1, len(SCALE) + 1)]
+    possible |= {"/".join(row): [*row, SAME] if study.pairs else scale for row in study.orders[rater]}
+    if question not in possible:
+        raise InputError(place, f"question {question!r}", f"one that {rater} was asked", "correct the name")
+    if answer not in possible[question]:
+        raise InputError(place, f"answer {answer!r}", f"one of {', '.join(possible[question])}", "correct it")
+    return answer
+
+
+def _files(paths: Sequence[Path]) -> list[Path]:
+    out = []
+    for path in map(Path, paths):
+        inside = sorted(path.iterdir()) if path.is_dir() else [path]
+        out += [one for one in inside if one == path or one.suffix.lower() in {".csv", ".json"}]
+    return out
+
+
+def _rows(path: Path) -> Iterable[tuple[str, str, str, str, str]]:
+    """(place, study, rater, question, answer) of one file."""
+    if path.suffix.lower() != ".json":
+        for place, row in read_rows(path, ANSWER_COLUMNS, separators=",;\t"):
+            yield place, *(row[column] for column in ANSWER_COLUMNS)
+        return
+    try:
+        told = json.loads(utf8(path, "answers in JSON", _LARGEST))
+        answers = told["answers"].items()
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise InputError(path, "no answers in JSON", "what the form saves", "save it again") from None
+    for question, answer in answers:
+        yield str(path), str(told.get("study", "")), str(told.get("rater", "")), str(question), str(answer).strip()

@@ -1,0 +1,135 @@
+"""Clips under neutral names, and in which order each rater sees them (Faustino §5.1.1).
+
+No rater can tell from a name which system made a clip; all see other orders, systems and scenarios mixed; two clips to
+get used to the task come first and do not count.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+
+TRAINING = "training"
+"""In place of a system: this clip comes first and does not count."""
+MOST_RATERS, MOST_CLIPS = 1000, 500
+_LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, no words; nothing that looks like something else
+_LONG = 4
+_TRIES = 200
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One clip of a study. file: a movie or a motion, as its maker named it. system: who made it, or TRAINING.
+    scenario: what it shows, the same for all systems. name: the neutral one."""
+
+    file: str
+    system: str
+    scenario: str
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study. id: eight letters that its answers carry. systems, scenarios: in the order of the table. pairs: whether
+    two clips of one scenario are compared instead of each being rated. orders: rater -> what he sees, one after the
+    other: names of clips, in a study of pairs two each; the training clips come first."""
+
+    id: str
+    seed: int
+    pairs: bool
+    clips: tuple[Clip, ...]
+    orders: dict[str, tuple[tuple[str, ...], ...]]
+
+    @property
+    def systems(self) -> tuple[str, ...]:
+        """Systems that are compared."""
+        return tuple(dict.fromkeys(clip.system for clip in self.clips if clip.system != TRAINING))
+
+    @property
+    def scenarios(self) -> tuple[str, ...]:
+        """Scenarios that count."""
+        return tuple(dict.fromkeys(clip.scenario for clip in self.clips if clip.system != TRAINING))
+
+    @property
+    def training(self) -> tuple[str, ...]:
+        """Names of the two clips that do not count."""
+        return tuple(clip.name for clip in self.clips if clip.system == TRAINING)
+
+    def clip(self, name: str) -> Clip:
+        """The clip of a neutral name; KeyError where there is none."""
+        return {clip.name: clip for clip in self.clips}[name]
+
+    def counts(self, shown: Sequence[str]) -> bool:
+        """Whether what is shown together counts."""
+        return not set(shown) & set(self.training)
+
+
+def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = False) -> Study:
+    """The study of these clips for so many raters; the same for the same clips and seed, and the first raters' orders
+    do not change with how many there are.
+
+    InputError where there are not exactly two training clips, fewer than two systems, a system without a scenario that
+    another has, a clip twice, or too few clips for so many different orders.
+    """
+    _check(clips)
+    named = _named(clips, seed)
+    mark = hashlib.sha256(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])).encode()).hexdigest()[:8]
+    taken: set[tuple] = set()
+    orders = {}
+    for number in range(raters):
+        for attempt in range(_TRIES):
+            order = _order(named, np.random.default_rng([seed, number, attempt]), pairs)
+            if order not in taken:
+                break
+        else:
+            raise InputError("raters", str(raters), "no more than there are orders", "add clips or ask fewer raters")
+        taken.add(order)
+        orders[f"R{number + 1:02d}"] = order
+    return Study(mark, seed, pairs, named, orders)
+
+
+def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tuple[tuple[str, ...], ...]:
+    """One rater's order."""
+    first = [clip.name for clip in clips if clip.system == TRAINING]
+    first = [first[place] for place in rng.permutation(len(first))]
+    real = [clip for clip in clips if clip.system != TRAINING]
+    if not pairs:
+        return tuple((name,) for name in (*first, *(real[place].name for place in rng.permutation(len(real)))))
+    couples = [couple for couple in itertools.combinations(real, 2) if couple[0].scenario == couple[1].scenario]
+    shown = [couples[place][:: 1 if rng.random() < 0.5 else -1] for place in rng.permutation(len(couples))]
+    return (tuple(first), *((left.name, right.name) for left, right in shown))
+
+
+def _named(clips: Sequence[Clip], seed: int) -> tuple[Clip, ...]:
+    """The clips with neutral names, which depend on the seed and on how many there are only."""
+    rng, names = np.random.default_rng([seed, len(clips)]), {}
+    while len(names) < len(clips):
+        names["".join(_LETTERS[letter] for letter in rng.integers(0, len(_LETTERS), _LONG))] = None
+    return tuple(Clip(clip.file, clip.system, clip.scenario, name) for clip, name in zip(clips, names))
+
+
+def _check(clips: Sequence[Clip]) -> None:
+    if len(clips) > MOST_CLIPS:
+        raise InputError("clips", str(len(clips)), f"{MOST_CLIPS} at most", "leave some out")
+    training = [clip for clip in clips if clip.system == TRAINING]
+    if len(training) != 2:
+        found = f"{len(training)} clips of the system {TRAINING!r}"
+        raise InputError("clips", found, "two, a good and a bad one", "add or remove rows")
+    real = [clip for clip in clips if clip.system != TRAINING]
+    systems = list(dict.fromkeys(clip.system for clip in real))
+    if len(systems) < 2:
+        raise InputError("clips", f"{len(systems)} systems", "two or more to compare", "add another one's clips")
+    have = [(clip.system, clip.scenario) for clip in real]
+    for system, scenario in itertools.product(systems, dict.fromkeys(clip.scenario for clip in real)):
+        if (count := have.count((system, scenario))) != 1:
+            found = f"{count} clips of scenario {scenario!r} by {system!r}"
+            raise InputError("clips", found, "one of each scenario by each system", "add or remove rows")
+    files = [clip.file for clip in clips]
+    if twice := next((file for file in files if files.count(file) > 1), None):
+        raise InputError("clips", f"{twice} twice", "a file for each row", "remove one of them")
