@@ -49,7 +49,7 @@ class BEYOND_MOCAP_OT_match_camera(Verb, bpy.types.Operator):
         scene.camera = camera
         area = None if bpy.app.background else areas.largest(context.window.screen, "VIEW_3D")
         if area is not None:
-            area.spaces.active.region_3d.view_perspective = "CAMERA"
+            _look_through(context, area)
 
     def who(self, context) -> bpy.types.Object:
         """The armature that is meant: named, selected, or chosen in the list."""
@@ -65,3 +65,11 @@ class BEYOND_MOCAP_OT_match_camera(Verb, bpy.types.Operator):
             raise InputError("match", f"{wanted} is not shown", f"one of {', '.join(map(str, shown))}",
                              "tick the player and press Show Match")
         return shown[wanted]
+
+
+def _look_through(context, area: bpy.types.Area) -> None:
+    """The scene's camera in the 3D view, its whole frame."""
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_center_camera()

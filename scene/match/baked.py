@@ -63,7 +63,7 @@ def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: i
 
 
 def _course(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:
-    """The ball's way as a thin line in the views, not in renders."""
+    """The ball's way as a thin line for the views, hidden at first: a minute of it is a tangle."""
     data = bpy.data.curves.new("Match ball course", "CURVE")
     data.dimensions = "3D"
     line = data.splines.new("POLY")
@@ -72,5 +72,5 @@ def _course(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:
     placed[:, :3] = path.positions * units_per_metre(scene)
     line.points.foreach_set("co", placed.ravel())
     thing = bpy.data.objects.new("Match ball course", data)
-    thing.hide_render = thing.hide_select = True
+    thing.hide_render = thing.hide_select = thing.hide_viewport = True
     return thing

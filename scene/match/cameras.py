@@ -24,9 +24,11 @@ SEEN, NEAREST = 33.0, 55.0  # metres across that the stand's camera shows; how n
 GLIDE = 0.9  # s, of the bell by which its aim is smoothed
 SENSOR = 36.0  # mm
 EYE = (0.115, 0.04)  # metres from the head joint's middle of the eyes, ahead and up, for 1.80 m
+NEAR = 0.1  # metres from the eyes that are not seen: brows and nose
 WIDE = 18.0  # mm of the player's lens: 90 degrees, as much as one notices
 EYES_TURN = np.radians(35.0)  # that eyes turn in a head, more than that is the head's own
 STEADY = 0.12  # s, of the bell by which the gaze is smoothed
+UP = np.tan(np.radians(18.0))  # how steeply a gaze rises at most: higher things are in the picture's upper half
 RESTS = np.radians(12.0)  # that a gaze without a ball looks below the face's axis
 
 
@@ -41,7 +43,7 @@ def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndar
     home.objects.link(camera)
     stand = np.array([FROM[0], -size[1] / 2.0 - FROM[1], FROM[2]])
     camera.location = stand * units
-    camera.data.clip_end, camera.data.sensor_width = 400.0 * units, SENSOR
+    camera.data.clip_start, camera.data.clip_end, camera.data.sensor_width = units, 400.0 * units, SENSOR
     look = camera.constraints.new("TRACK_TO")
     look.target, look.track_axis, look.up_axis = aim, "TRACK_NEGATIVE_Z", "UP_Y"
     middle = smooth(seen, GLIDE * frames_per_second(scene))
@@ -96,6 +98,7 @@ def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.n
     eye = places[:, head] + quaternion.rotate(face, np.array([EYE[0], 0.0, EYE[1]]) * scale)
     ahead = _unit(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
     gaze = smooth(_towards(ahead, eye, target), STEADY * motion.fps)
+    gaze[:, 2] = np.minimum(gaze[:, 2], UP * np.linalg.norm(gaze[:, :2], axis=1))
     return eye, _looking(_unit(gaze))
 
 
@@ -162,5 +165,5 @@ def _eyes_camera(scene: bpy.types.Scene) -> bpy.types.Object:
         home.objects.link(found)
         units = units_per_metre(scene)
         found.data.lens, found.data.sensor_width = WIDE, SENSOR
-        found.data.clip_start, found.data.clip_end = 0.06 * units, 400.0 * units
+        found.data.clip_start, found.data.clip_end = NEAR * units, 400.0 * units
     return found
