@@ -18,7 +18,9 @@ from functools import partial
 from pathlib import Path
 
 from . import __version__
-from .commands import passing, reconstructing, releasing, ride_path, stream, study, throwing, touches
+from .commands import (
+    matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches,
+)  # fmt: skip
 from .commands.numbers import between, positive, rate
 from .commands.outputs import Writer, check_outputs, writer_of
 from .commands.told import Told
@@ -44,7 +46,7 @@ def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"beyond-mocap {__version__}")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
     own = (ride_path.add, touches.add, stream.add, passing.add, reconstructing.add, releasing.add,
-           throwing.add, study.add)
+           throwing.add, matching.add, study.add)
     for add in (_add_library, _add_synthesize, *own, _add_mirror, _add_retarget, _add_evaluate):
         verb = add(verbs)
         verb.add_argument("--json", action="store_true", help="progress as JSON lines on stderr")

@@ -99,10 +99,37 @@ def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurr
     solving = {} if known.solved is None else {"solve": time.perf_counter() - begun}
     plan = in_library_size(known, size_of(asked, library.skeleton))
     recordings, library = library, with_made_gaits(library, plan, report)
-    clock = [time.perf_counter()]
+    begun = time.perf_counter()
     order = wanted(library, plan)
     found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry, used)
-    clock.append(time.perf_counter())
+    seconds = {"search": time.perf_counter() - begun}
+    take, laid = _laid_out(library, plan, order, found, report)
+    return finished(
+        replace(take, seconds={**seconds, **laid, **solving}), asked, known, recordings, order, found.hurried
+    )
+
+
+def constructed(library: Library, known: Plan, edit: EditList, progress: Progress | None = None) -> Take:
+    """The take of method "path" that shows `edit`: all that `synthesize` does behind its search.
+
+    known: the plan with its key moments and its ball as they are in force (`known_touches.in_force`). edit: at the
+    library's rate, from the track's first time on; its clips are those of `library`, which has made ones
+    (`Library.extended`) where it shows them. The same arguments and numpy give the same bits.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        plan = in_library_size(known, size_of(known, library.skeleton))
+        order = wanted(library, plan)
+        take, seconds = _laid_out(library, plan, order, Found(edit), progress or (lambda fraction, text: None))
+        return finished(replace(take, seconds=seconds), known, known, library, order, None)
+
+
+def _laid_out(
+    library: Library, plan: Plan, order: Wanted, found: Found, report: Progress
+) -> tuple[Take, dict[str, float]]:
+    """What was found, fetched and laid on the ground, in the library's size; and what that took, in seconds."""
+    clock = [time.perf_counter()]
     report(0.8, "Constructing")
     track = order.track if plan.fps == library.fps else plan.sampled(plan.fps)
     edit = exact_keys(library, found.edit, order)
@@ -120,8 +147,7 @@ def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurr
     take = _take(library, plan, order, track, edit, footage, keys, planted, taken)
     clock.append(time.perf_counter())
     report(1.0, "Done")
-    seconds = {**dict(zip(("search", "construct", "polish"), np.diff(clock).tolist())), **solving}
-    return finished(replace(take, seconds=seconds), asked, known, recordings, order, found.hurried)
+    return take, dict(zip(("construct", "polish"), np.diff(clock).tolist()))
 
 
 def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:

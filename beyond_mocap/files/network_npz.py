@@ -5,12 +5,7 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import os
-import struct
-import tokenize
-import zipfile
-import zlib
 from dataclasses import asdict, fields
 
 import numpy as np
@@ -24,6 +19,7 @@ from ..synthesis.phase_network.model import ModelSettings, ThrowModel
 from ..synthesis.phase_network.network import PhaseNetwork
 from .content import content
 from .json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
+from .plain_npz import HEADER, header_text, plain_arrays
 from .whole import atomic_write
 
 VERSION = 1
@@ -34,14 +30,10 @@ UNPACKED = 1_000_000_000
 """Bytes of all its arrays together above which it is no model."""
 _KIND = "a file of weights (.npz)"
 _PAGE = "docs/throws-training.md"
-_HEADER = "header"
 _SCALES = ("input_mean", "input_scale", "output_mean", "output_scale")
 _BEYOND = ("before", "after")
+_OTHERS = {"told": "the checkpoint of a training"}
 _FLOATS = tuple(np.dtype(name) for name in ("<f2", "<f4", "<f8"))
-_BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, IndexError, TypeError,
-           AttributeError, NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError,
-           tokenize.TokenError)  # fmt: skip
-"""What zipfile and numpy raise for files that are cut short, damaged or made to harm."""
 _ROWS = ("format", "version", "settings", "skeleton", "stature", "leg_reach", "trained_on", "notes", "examples")
 _EXAMPLE = ("name", "subject", "limb", "release", "impact", "launch", "stature")
 
@@ -54,7 +46,9 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
     """
     data = content(path, _KIND, LARGEST)
     try:
-        return _model(_arrays(data))
+        arrays = plain_arrays(data, _KIND, _FLOATS, UNPACKED, _OTHERS)
+        half = np.dtype("<f2")
+        return _model({name: one.astype(np.float32) if one.dtype == half else one for name, one in arrays.items()})
     except InputError as error:
         raise InputError(path, str(error)) from None
 
@@ -65,10 +59,10 @@ def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) 
     half: weights and the examples' rotations as float16 and all else as float32, a quarter of the size: for weights that
     are shipped. InputError where it cannot be written, or where a weight is too large for float16.
     """
-    arrays = {_HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
+    arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
     arrays |= _body_out(model) | _networks_out(model) | _examples_out(model)
     if half:
-        arrays = {name: one if name == _HEADER else _halved(name, one) for name, one in arrays.items()}
+        arrays = {name: one if name == HEADER else _halved(name, one) for name, one in arrays.items()}
     whole = io.BytesIO()
     np.savez_compressed(whole, **arrays)
     atomic_write(path, whole.getvalue())
@@ -133,53 +127,14 @@ def _halved(name: str, values: np.ndarray) -> np.ndarray:
 # -- reading
 
 
-def _arrays(data: bytes) -> dict[str, np.ndarray]:
-    """All arrays of a file by name. InputError where it is no zip of plain arrays."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = archive.infolist()
-            if sum(member.file_size for member in members) > UNPACKED:
-                raise InputError("the arrays", f"more than {UNPACKED:,} bytes", _KIND, "choose another file")
-            names = [member.filename.removesuffix(".npy") for member in members]
-            if _HEADER not in names:
-                checkpoint = "the checkpoint of a training" if "told" in names else "an .npz of something else"
-                raise InputError("the file", checkpoint, _KIND, "choose another file")
-            if len(set(names)) < len(names):
-                raise InputError("the arrays", "two of one name", _KIND, "choose another file")
-            return {name: _array(archive.read(member), name) for name, member in zip(names, members)}
-    except InputError:
-        raise
-    except _BROKEN:
-        raise InputError("the file", "damaged, cut short or of something else", _KIND,
-                         "copy it again or choose another file") from None  # fmt: skip
-
-
-def _array(data: bytes, name: str) -> np.ndarray:
-    """One array out of the bytes of a .npy: plain numbers of exactly the stated count, so that neither an object nor an
-    invented size is ever believed."""
-    handle = io.BytesIO(data)
-    version = np.lib.format.read_magic(handle)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, fortran, dtype = read(handle)
-    if dtype not in _FLOATS and not (name == _HEADER and dtype == np.uint8):
-        raise InputError(name[:80], f"values of type {str(dtype)[:40]}", "floating point numbers")
-    values = data[handle.tell() :]
-    if any(size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != len(values):
-        raise InputError(name[:80], f"{len(values)} bytes for shape {str(shape)[:40]}", "as many as the shape says")
-    array = np.frombuffer(values, dtype).reshape(shape, order="F" if fortran else "C")
-    if dtype in _FLOATS and not np.isfinite(array).all():
-        raise InputError(name[:80], "a value that is no number", "finite numbers", "train it again")
-    return array.astype(np.float32) if dtype == np.float16 else array
-
-
 def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     """The model that arrays make; every array is used once, none is left over."""
-    header = object_of(_header_text(arrays), _HEADER, _PAGE)
+    header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise InputError(_HEADER, "no throw model", _KIND, "choose another file")
+        raise InputError(HEADER, "no throw model", _KIND, "choose another file")
     if header.get("version") != VERSION:
         raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
-    check_names(header, _HEADER, _ROWS, _ROWS)
+    check_names(header, HEADER, _ROWS, _ROWS)
     settings = _settings(header["settings"])
     skeleton = _skeleton(header["skeleton"], arrays)
     networks = {name: _network(name, settings.layers + 1, arrays) for name in settings.networks}
@@ -194,16 +149,6 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     if arrays:
         raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
     return model
-
-
-def _header_text(arrays: dict[str, np.ndarray]) -> str:
-    header = arrays.pop(_HEADER)
-    if header.dtype != np.uint8:
-        raise InputError("the file", "an .npz of something else", _KIND, "choose another file")
-    try:
-        return header.tobytes().decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(_HEADER, "no text in UTF-8", "JSON", f"see {_PAGE}") from None
 
 
 def _settings(row) -> ModelSettings:

@@ -20,10 +20,10 @@ _LONGEST = 6 * 3600  # seconds of one match
 
 @dataclass(frozen=True, eq=False)
 class PlayerResult:
-    """One player. id: in the feed, and in the names of his files. team: name of his team. status: "done", or how far he
-    came; reason: why he came no further, "" where that is not told. data: lines on what was read of him. report: his
-    report, {} where there is none. start: seconds on the match clock of the first row of per_second, which has one array (S,) for each of FIGURES, NaN where
-    nothing is known, empty where the report tells nothing by the second."""
+    """One player. id: in the feed. team: name of his team. status: "done", or how far he came; reason: why he came no
+    further, "" where that is not told. data: lines on what was read of him. report: his report, {} where there is none.
+    start: seconds on the match clock of the first row of per_second, which has one array (S,) for each of FIGURES, NaN
+    where nothing is known, empty where the report tells nothing by the second."""
 
     id: str
     name: str

@@ -8,6 +8,7 @@
 from .cleaning import FASTEST, DataReport, clean
 from .data import BALL_RADIUS, SampledTrack, Track
 from .sampling import SMOOTHING_SECONDS, sample, smoothed, travel_direction, zero_phase_hann
+from .sentinels import at_sentinel
 
 __all__ = [
     "BALL_RADIUS",
@@ -16,6 +17,7 @@ __all__ = [
     "DataReport",
     "SampledTrack",
     "Track",
+    "at_sentinel",
     "clean",
     "sample",
     "smoothed",

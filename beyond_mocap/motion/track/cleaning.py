@@ -15,6 +15,7 @@ from ...errors import InputError, TimedLine
 from ..runs import runs
 from .data import Track
 from .sampling import GAP_INTERVALS, LONG_GAP
+from .sentinels import at_sentinel
 
 FASTEST = 12.0
 """m/s; nobody runs faster, so a sample that wants it is wrong."""
@@ -29,7 +30,6 @@ _STRAY = 2  # samples before a jump at the track's start, or after one at its en
 _SNAP_LIMIT = 3.0  # metres; a longer step is another player, or truth: told, not repaired
 _LEAN = 0.3  # seconds whose slope is the velocity next to a gap
 _LONGEST_GAP = 3600.0
-_PITCH = 200.0  # metres from the centre beyond which no ball is
 
 
 @dataclass(frozen=True)
@@ -106,23 +106,11 @@ def _mean_of_groups(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
 
 def _real_ball(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarray, list[str]]:
     """Ball rows (N, 3) with NaN in place of sentinels: z below the ground, far outside, or parked at the origin."""
-    seen = np.isfinite(ball[:, :2]).all(axis=1)
-    with np.errstate(invalid="ignore"):
-        wrong = seen & ((np.abs(ball) > _PITCH).any(axis=1) | (ball[:, 2] < -1.0) | _parked_at_origin(ball))
+    seen, wrong = np.isfinite(ball[:, :2]).all(axis=1), at_sentinel(ball)
     if wrong.any():
         notes = [*notes, f"{np.count_nonzero(wrong)} samples with the ball at a sentinel taken as unknown"]
     ball = np.where((seen & ~wrong)[:, None], ball, np.nan)
     return ball, notes
-
-
-def _parked_at_origin(ball: np.ndarray) -> np.ndarray:
-    """(N,) bool: in a run of three or more samples exactly at (0, 0) that the ball did not roll into or out of."""
-    zero = (ball[:, :2] == 0.0).all(axis=1)
-    out = np.zeros(len(ball), dtype=bool)
-    for start, stop in runs(zero):
-        beside = [i for i in (start - 1, stop) if 0 <= i < len(ball) and np.isfinite(ball[i, :2]).all()]
-        out[start:stop] = stop - start >= 3 and all(np.linalg.norm(ball[i, :2]) > 1.5 for i in beside)
-    return out
 
 
 def _with_missing_rows(times, positions, ball, name: str):

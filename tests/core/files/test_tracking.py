@@ -156,7 +156,7 @@ def test_tracab_becomes_metres_and_is_kept(tmp_path, monkeypatch):
     np.testing.assert_allclose(match.ball[:, 2], 1.5)
     assert match.times[0] == 0.0 and np.allclose(np.diff(match.times), 0.04)
 
-    monkeypatch.setattr(tracking, "_load", None)  # the second time nothing is parsed
+    monkeypatch.setattr(tracking, "load", None)  # the second time nothing is parsed
     again = read_match(file, cache_dir=tmp_path / "cache")
     assert again.players == match.players and again.periods == match.periods
     for name in ("times", "positions", "ball"):

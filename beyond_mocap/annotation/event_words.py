@@ -1,0 +1,127 @@
+"""From what happened on the pitch to words of the vocabulary: a small table that users may replace by their own."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+from .text import read_text
+from .timeline import checked_words
+from .vocabulary import similar_words, vocabulary_words
+
+KINDS = (
+    "pass", "shot", "clearance", "receive", "interception", "tackle", "aerial", "save", "catch", "punch", "pick-up",
+    "dribble", "take-on", "carry", "touch", "deflection", "miscontrol", "foul", "out", "other",
+)  # fmt: skip
+"""What events and touches are, whoever tells of them."""
+
+PARTS = ("foot", "head", "chest", "hand")
+
+FILLED_IN = {
+    "side": ("left", "right"), "height": ("low", "middle", "high"), "gait": ("standing", "running"), "jump": ("jump",),
+}  # fmt: skip
+"""What may stand in braces in a row's words, and the words that it becomes."""
+
+TABLE = Path(__file__).with_name("event_words.csv")
+"""The table that comes with us."""
+
+_COLUMNS = ("kind", "part", "detail", "words")
+_STEP = "see docs/match-input.md"
+
+
+@dataclass(frozen=True)
+class EventRow:
+    """A row of the table: kind of KINDS, part of PARTS or "" for any, detail or "" for any, words as written, with
+    braces."""
+
+    kind: str
+    part: str
+    detail: str
+    words: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EventWords:
+    """The table in the order of the file."""
+
+    rows: tuple[EventRow, ...]
+
+    def words(
+        self, kind: str, part: str = "", details: Collection[str] = (), filled_in: Mapping[str, str] | None = None
+    ) -> tuple[str, ...]:
+        """The words for something that happened, () where it makes no key moment.
+
+        kind: of KINDS. part: of PARTS, "" where unknown. details: what else is known. filled_in: what stands for the
+        names of FILLED_IN; those that are missing or "" are left out. Of the rows that fit, one that names the part
+        counts before one that does not, then one that names a detail, then the first.
+        """
+        fitting = [row for row in self.rows if row.kind == kind and row.part in ("", part)]
+        fitting = [row for row in fitting if not row.detail or row.detail in details]
+        if not fitting:
+            return ()
+        row = max(fitting, key=lambda row: (bool(row.detail), bool(row.part)))
+        known = {f"{{{name}}}": word for name, word in (filled_in or {}).items()}
+        words = (known.get(word, "") if word.startswith("{") else word for word in row.words)
+        return tuple(dict.fromkeys(word for word in words if word))
+
+
+def read_event_words(path: str | os.PathLike | None = None, known_words: Iterable[str] = ()) -> EventWords:
+    """The table in a CSV file of kind,part,detail,words; None: the one that comes with us.
+
+    known_words: beyond the vocabulary. Lines that begin with # are comments. InputError, with the line, for kinds,
+    parts or words that are not known, and rows that say the same twice.
+    """
+    path = TABLE if path is None else path
+    known, rows, seen = vocabulary_words(known_words), [], {}
+    lines = read_text(path).splitlines()
+    bare = "\n".join("" if line.lstrip().startswith("#") else line for line in lines)
+    reader = csv.reader(io.StringIO(bare, newline=""))
+    header = None
+    try:
+        for cells in reader:
+            cells, place = [cell.strip().lower() for cell in cells], f"{path}:{reader.line_num}"
+            if not any(cells):
+                continue
+            if header is None:
+                header = _checked_header(cells, place)
+                continue
+            row = _row(cells, known, place)
+            if (same := seen.setdefault(row[:3], place)) != place:
+                raise InputError(place, f"{', '.join(row[:3])} as in line {same.rpartition(':')[2]}", "each once", _STEP)
+            rows.append(EventRow(*row))
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
+    if not rows:
+        raise InputError(path, "no rows", ",".join(_COLUMNS), _STEP)
+    return EventWords(tuple(rows))
+
+
+def _checked_header(cells: list[str], place: str) -> list[str]:
+    if tuple(cells) != _COLUMNS:
+        raise InputError(place, f"columns {','.join(cells)[:60]!r}", ",".join(_COLUMNS), _STEP)
+    return cells
+
+
+def _row(cells: list[str], known: frozenset[str], place: str) -> tuple[str, str, str, tuple[str, ...]]:
+    if len(cells) != len(_COLUMNS):
+        raise InputError(place, f"{len(cells)} cells", f"{len(_COLUMNS)}: {','.join(_COLUMNS)}", _STEP)
+    kind, part, detail, said = cells
+    if kind not in KINDS:
+        raise InputError(place, f"kind {kind!r}", f"one of {', '.join(KINDS)}", _STEP)
+    if part and part not in PARTS:
+        raise InputError(place, f"part {part!r}", f"one of {', '.join(PARTS)}, or none", _STEP)
+    words = said.split()
+    for word in words:
+        if word.startswith("{"):
+            if word[1:-1] not in FILLED_IN or not word.endswith("}"):
+                raise InputError(place, f"{word}", "one of " + " ".join(f"{{{name}}}" for name in FILLED_IN), _STEP)
+        elif word not in known:
+            offers = ", ".join(similar_words(word, known)) or "a word of the vocabulary"
+            raise InputError(place, f"the word {word!r} is not in the vocabulary", f"one like {offers}", _STEP)
+    checked_words((word for word in words if not word.startswith("{")), place)
+    return kind, part, detail, tuple(words)

@@ -1,0 +1,122 @@
+"""Files that do not belong together, files that end too early, and halves that are missing."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+from ..errors import InputError
+from .providers import Feed
+
+MOST_PLAYERS = 60
+"""Two squads of 26 and the referees have fewer; more is two matches in one file."""
+
+_STRANGERS = 0.3  # share of the players whom the metadata does not know, from which it is another match's
+_OWN_ROSTER = {"secondspectrum"}  # whose names come in a further file that nothing else depends on
+_COMPARED = 200  # rows of two teams' files that must tell of one ball
+_LATE = 5.0  # seconds by which a half may begin late or end early untold
+_OTHER = "take the files of one match"
+
+
+def check_same_match(feed: Feed) -> None:
+    """InputError where the files name two matches: by its number, or by two teams' files with two balls."""
+    if feed.provider == "sportec":
+        _same_id(feed, rb'MatchId="([^"]{1,60})"', rb'MatchId="([^"]{1,60})"')
+    elif feed.provider == "pff":
+        _same_id(feed, rb'"gameRefId"\s*:\s*"?(\d+)', None)
+    elif feed.provider == "metrica" and not feed.meta:
+        balls = [_balls(path) for path in feed.tracking]
+        differing = sum(one != other for one, other in zip(*balls))
+        if differing > 0.1 * min(map(len, balls)):
+            found = f"another ball in {differing} of {min(map(len, balls))} rows than in {feed.tracking[1].name}"
+            raise InputError(feed.path, found, "two teams of one match", _OTHER)
+
+
+def _same_id(feed: Feed, in_tracking: bytes, in_meta: bytes | None) -> None:
+    with open(feed.path, "rb") as file:
+        tracked = re.search(in_tracking, file.read(65536))
+    said = feed.meta[0].read_bytes()[:262144]
+    if in_meta:
+        told = re.search(in_meta, said)
+        number = told and told[1].decode("utf-8", "replace")
+    else:
+        number = _number_of(said)
+    if tracked and number and tracked[1].decode("utf-8", "replace") != number:
+        found = f"match {tracked[1].decode('utf-8', 'replace')}, but {feed.meta[0].name} is of match {number}"
+        raise InputError(feed.path, found, "tracking and metadata of one match", _OTHER)
+
+
+def _number_of(said: bytes) -> str | None:
+    """The match's number in PFF's metadata."""
+    with contextlib.suppress(ValueError, TypeError, KeyError, IndexError):
+        value = json.loads(said)
+        return str((value[0] if isinstance(value, list) else value)["id"])
+    return None
+
+
+def _balls(path: Path) -> list[tuple[str, ...]]:
+    """Frame number and ball of the first rows of a team's CSV."""
+    with open(path, encoding="utf-8", errors="replace") as file:
+        rows = [line.strip().split(",") for line in islice(file, 3, 3 + _COMPARED)]
+    return [(*row[:2], *(cell for cell in row[-2:])) for row in rows]
+
+
+def check_players(players, dataset, feed: Feed) -> list[str]:
+    """Lines on players whom the metadata does not know. players: kloppy's, those who are tracked. InputError for more
+    than MOST_PLAYERS of them, and where so many are unknown that the metadata is another match's."""
+    if len(players) > MOST_PLAYERS:
+        found = f"{len(players)} players"
+        raise InputError(feed.path, found, f"at most {MOST_PLAYERS}, as one match has", "cut the file to one match")
+    roster = [player for team in dataset.metadata.teams for player in team.players if player.name]
+    strangers = [player for player in players if not player.name] if roster else []
+    tracked = {player.player_id for player in players}
+    away = [player for player in roster if player.player_id not in tracked]
+    if not strangers:
+        return []
+    names = ", ".join(f"{player.team.ground} {player.jersey_no}" for player in strangers[:6])
+    known = feed.meta and feed.provider not in _OWN_ROSTER
+    if known and len(strangers) > _STRANGERS * len(players) and len(away) >= len(strangers) // 2:
+        found = f"{len(strangers)} of {len(players)} tracked players ({names}) are not in {feed.meta[0].name}"
+        raise InputError(feed.path, found, "tracking and metadata of one match", _OTHER)
+    return [f"{len(strangers)} of {len(players)} players are not in the metadata: {names}"]
+
+
+def check_periods(records, dataset, feed: Feed) -> list[str]:
+    """Lines on halves that are missing or cut. InputError where the metadata's halves have none of the frames."""
+    if len(records) < 2:
+        found = f"{len(records)} frames with anybody in them"
+        if feed.meta:
+            raise InputError(feed.path, f"{found} within the halves that {feed.meta[0].name} names", "a match", _OTHER)
+        raise InputError(feed.path, found, "a match", "export it again")
+    lines = []
+    for period in dataset.metadata.periods:
+        clock = [frame.timestamp.total_seconds() for frame in records if frame.period.id == period.id]
+        try:
+            lasts = (period.end_timestamp - period.start_timestamp).total_seconds()
+        except TypeError:  # a half that has not ended
+            continue
+        if not clock:
+            lines.append(f"period {period.id} is in the metadata but has no frames")
+        elif lasts - (max(clock) - min(clock)) > _LATE:
+            lines.append(f"period {period.id} has {max(clock) - min(clock):.0f} s of frames of its {lasts:.0f} s")
+    return lines
+
+
+@contextlib.contextmanager
+def whole_lines(feed: Feed) -> Iterator[Feed]:
+    """The feed with copies of its tracking files that end with their last whole line, all after as many lines."""
+    with tempfile.TemporaryDirectory() as folder:
+        texts = [path.read_bytes() for path in feed.tracking]
+        lines = [text[: text.rfind(b"\n") + 1].splitlines(keepends=True) for text in texts]
+        count = min(map(len, lines)) if len(lines) > 1 else None
+        copies = []
+        for path, rows in zip(feed.tracking, lines):
+            copies.append(Path(folder) / path.name)
+            copies[-1].write_bytes(b"".join(rows[:count]))
+        yield replace(feed, tracking=tuple(copies))

@@ -1,0 +1,180 @@
+"""The motion of any span of a player, out of his edit list.
+
+He is laid out in windows of a fixed grid, each with some seconds around it, and one window hands over to the next at
+their edge. So a frame is made in the same way whatever span is asked for, and comes out bit for bit the same; only the
+signs of quaternions, which are continuous within a motion, may be the other ones. No more than two windows are in
+memory beside what comes out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..library.library import FPS, Library
+from ..library.made import MADE_FOLDER
+from ..plan import Plan
+from ..polish.hand_over import handed_over
+from ..polish.meeting import eased
+from ..synthesis.edit_list import EditList, at_times
+from ..synthesis.footage import shown
+from ..synthesize import constructed
+from ..take import BallPath, Take
+from .cut_plan import cut_plan
+from .joined_takes import one_take, own_part
+from .library_clips import bound
+from .named_edit import part
+from .player_edit import PlayerEdit, Stretch
+from .searched import searched_library
+from .units import frame_count, window_edges
+
+AROUND = 4.0
+"""Seconds on either side of a window that are laid out too."""
+
+HAND_OVER = 0.5
+"""Seconds behind an edge in which the motion of the window before goes over into the next one's."""
+
+SETTLED = 2.0
+"""Seconds behind an edge within which a foot that stands has come to where the next window has it."""
+
+_PINNED = 1e-9
+"""Share of a frame's own place that is as good as nothing, and holds it there."""
+
+Progress = Callable[[float, str], None]
+
+
+def expanded(
+    library: Library, edit: PlayerEdit, start: float, end: float, progress: Progress | None = None
+) -> tuple[Take, ...]:
+    """What a player does from `start` to `end` seconds of the match: one take for each of his stretches on the pitch
+    that reaches into it.
+
+    library: the recordings. A take's first frame is the stretch's first one that is not before `start`; its plan is the
+    order of that time, and it has no edit list. progress(fraction, text) is called now and then. InputError where the
+    library lacks a clip that is shown, and where `end` is not behind `start`.
+    """
+    if not end > start:
+        raise InputError("times", f"{start:g} to {end:g} s", "an end behind the start")
+    report = progress or (lambda fraction, text: None)
+    takes = []
+    for number, stretch in enumerate(edit.stretches):
+        def tell(fraction: float, number=number):
+            report((number + fraction) / len(edit.stretches), "Constructing")
+
+        take = _Layout(library, edit.window, stretch).take(start, end, tell)
+        takes += [] if take is None else [take]
+    report(1.0, "Done")
+    return tuple(takes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Window:
+    """Frames low .. high of a stretch at the output's rate, laid out with those around them as `take`, whose first frame
+    is frame `first` of the stretch. standing: (T, 2) bool of its feet, heel or toe."""
+
+    low: int
+    high: int
+    first: int
+    take: Take
+    standing: np.ndarray
+
+
+class _Layout:
+    """A stretch and the grid in which it is laid out."""
+
+    def __init__(self, library: Library, window: float, stretch: Stretch):
+        self.plan, self.edit = stretch.plan, stretch.edit
+        self.library = searched_library(library, self.plan) if any(path.startswith(MADE_FOLDER) for path, _ in self.edit.clips) else library
+        self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
+        self.count = frame_count(self.plan, self.fps)
+        edges = window_edges(self.begin, frame_count(self.plan), window)
+        self.edges = [*(round(edge * self.fps / FPS) for edge in edges[:-1]), self.count]
+
+    def take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
+        """Frames from `start` to `end` s; None where there are fewer than two."""
+        low = max(0, int(np.ceil((start - self.begin) * self.fps - 1e-6)))
+        high = min(self.count, int(np.floor((end - self.begin) * self.fps + 1e-6)) + 1)
+        if high - low < 2:
+            return None
+        parts = list(self._parts(low, high, tell))
+        return one_take(parts, cut_plan(self.plan, self._time(low), self._time(high - 1)))
+
+    def _parts(self, low: int, high: int, tell: Callable[[float], None]) -> Iterator[Take]:
+        """Frames low .. high, window by window."""
+        settled = int(round(SETTLED * self.fps))
+        numbers = [n for n, (a, b) in enumerate(zip(self.edges, self.edges[1:])) if a < high and b > low]
+        before = None
+        for done, number in enumerate(numbers):
+            tell(done / len(numbers))
+            window, handed = self._window(number), None
+            first, end = max(low, window.low), min(high, window.high)
+            if number and first < window.low + settled:
+                handed = _handed_over(before or self._window(number - 1), window, settled)
+            yield own_part(handed or window.take, first - window.first, end - window.first)
+            before = window
+
+    def _window(self, number: int) -> _Window:
+        """The window with what lies around it; its own key moments only count where they lie in it."""
+        low, high = self.edges[number : number + 2]
+        around = int(round(AROUND * self.fps))
+        first, end = max(0, low - around), min(self.count, high + around)
+        plan = cut_plan(self.plan, self._time(first), self._time(end - 1))
+        shown_here = self._shown(plan, first * FPS / self.fps)
+        take = constructed(self.library, plan, shown_here)
+        return _Window(low, high, first, take, self._standing(shown_here, take))
+
+    def _shown(self, plan: Plan, at: float) -> EditList:
+        """What is shown in the time of a plan that begins at frame `at` (fractional) of the stretch, at the library's
+        rate."""
+        count, whole = frame_count(plan), int(at)
+        edit = part(self.edit, whole, min(whole + count + 1, len(self.edit)))
+        edit = bound(self.library, edit, plan.timeline.keys)
+        clip, frame, piece = at_times(edit, np.minimum(np.arange(count) + (at - whole), len(edit) - 1))
+        return EditList(clip, frame, np.flatnonzero(np.diff(piece)) + 1, edit.keys)
+
+    def _standing(self, edit: EditList, take: Take) -> np.ndarray:
+        """(T, 2) bool: feet of which heel or toe stand."""
+        index = np.minimum(np.arange(len(take.motion)) * (FPS / self.fps), len(edit) - 1)
+        what = shown(self.library, edit, index)
+        frame, clips = np.round(what.clip_frame).astype(int), self.library.clips
+        stands = np.array([clips[clip].standing[at].any(axis=1) for clip, at in zip(what.clip, frame)])
+        return stands & ~take.stepped
+
+    def _time(self, frame: int) -> float:
+        return self.begin + frame / self.fps
+
+
+def _handed_over(before: _Window, window: _Window, settled: int) -> Take:
+    """The window's take, whose first `settled` own frames set out from where the window before ends."""
+    take, old, fps = window.take, before.take, window.take.motion.fps
+    hand = int(round(HAND_OVER * fps))
+    settled = min(settled, len(take.motion) - (window.low - window.first) - 1)
+    at = slice(window.low - window.first, window.low - window.first + settled + 1)
+    then = slice(window.low - before.first, window.low - before.first + hand)
+    ahead = np.arange(settled + 1)
+    share = eased(1.0 - (ahead + 1.0) / (hand + 1.0), np.ones(len(ahead)))
+    share[-1] = _PINNED
+    places, turns = take.motion.root_positions[at].copy(), take.motion.rotations[at].copy()
+    new = places.copy(), turns.copy()
+    places[:hand], turns[:hand] = old.motion.root_positions[then], old.motion.rotations[then]
+    standing = np.repeat(window.standing[at][:, :, None], 2, axis=2)
+    root, rotations = take.motion.root_positions.copy(), take.motion.rotations.copy()
+    root[at], rotations[at] = handed_over(take.motion.skeleton, new, (places, turns), share, standing, fps)
+    motion = replace(take.motion, root_positions=root, rotations=rotations)
+    return replace(take, motion=motion, ball=_ball_handed(old.ball, take.ball, then, at.start, share[:hand]))
+
+
+def _ball_handed(
+    old: BallPath | None, new: BallPath | None, then: slice, first: int, share: np.ndarray
+) -> BallPath | None:
+    """The new path of the ball, which sets out on the old one: a share (H,) of it at frames first ... of the new."""
+    if old is None or new is None:
+        return new
+    places, before = new.positions.copy(), old.positions[then]
+    here = places[first : first + len(share)]
+    both = np.isfinite(before) & np.isfinite(here)
+    places[first : first + len(share)] = np.where(both, here + share[:, None] * (before - here), here)
+    return replace(new, positions=places)

@@ -1,0 +1,207 @@
+"""The whole way of a match: files in, a folder out (docs/match.md).
+
+    made = make_match(MatchOrder(tracking=Path("match.dat"), library=Path("clips"), out=Path("made"), end=60.0))
+
+Read -> who is there when -> the ball solved -> words -> tracks pushed apart -> windows of everybody searched by workers
+-> joined into edit lists -> bodies kept apart -> the ball where it is met -> reports. Whatever ends a run, the same
+order goes on where it was, and comes to the same bits.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..ball.tracked.solve import SolvedBall
+from ..errors import BeyondMocapError, Cancelled, InputError
+from ..files.match_data import Match
+from ..files.tables import write_ball
+from ..files.tracking import read_match
+from ..files.whole import atomic_write
+from ..library.library import Library, build
+from ..solve_ball import solve_ball
+from ..take import BallPath
+from . import stages
+from .folder import MatchFolder, check_folder, file_names, opened
+from .match_ball import ball_plan, course, met
+from .order import MatchOrder, identity
+from .parts import parts_of
+from .pool import Workplace, ended
+from .roles import pushed_apart, roles_of, span_of
+from .state import MatchState, begun, row_of
+from .words import MatchWords, words_of
+from .workplace_library import LibrarySource, hold
+
+AROUND = 5.0
+"""Seconds before and behind the span in which the ball is solved too."""
+
+_SHARES = {"library": 0.05, "read": 0.07, "ball": 0.12, "search": 0.7, "crowd": 0.8, "figures": 0.98, "page": 1.0}
+"""Where the progress is when a stage is done."""
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class MadePlayer:
+    """id: of a player; reason: why he could not be made, ""."""
+
+    id: str
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class MatchResult:
+    """span: (start, end) s. done, failed: who was made, and who was not. notes: lines for people."""
+
+    span: tuple[float, float]
+    done: tuple[MadePlayer, ...]
+    failed: tuple[MadePlayer, ...]
+    notes: tuple[str, ...]
+
+
+def make_match(
+    order: MatchOrder, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
+) -> MatchResult:
+    """Makes what of `order` is not in its folder yet.
+
+    progress(fraction, text) is called now and then. A player who cannot be made does not stop the others; match.json
+    and the result say why. InputError for what is wrong with the order, its files or its cluster; Cancelled. What was
+    done till then is kept and found again by the next run.
+    """
+    report = progress or (lambda fraction, text: None)
+    check_folder(order.out)
+    clock = time.perf_counter()
+    library, source = _library(order, _part(report, "library"), cancelled)
+    known = identity(order, source.key)
+    with opened(order.out, known) as folder:
+        loaded = time.perf_counter() - clock
+        report(_SHARES["library"], f"Reading {order.tracking.name}")
+        match = read_match(order.tracking, order.meta, order.provider or None)
+        span = span_of(match, order)
+        state = begun(folder, order, known, match, span)
+        state.seconds["library"] = round(loaded, 3)
+        state.took("read", clock + loaded)
+        place = Workplace(order.workers, order.scheduler)
+        job = stages.Job(order, folder, state, source, library, place, report, cancelled)
+        try:
+            _make(job, match, span, report)
+        except Cancelled:
+            state.tell(status="cancelled")
+            raise
+        except BeyondMocapError as error:
+            state.tell(status="failed", reason=str(error))
+            raise
+        finally:
+            if not order.scheduler:
+                ended()
+        return _result(state, span)
+
+
+def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, LibrarySource]:
+    """The library, with all that it has to make kept beside its cache, and how workers find it."""
+    where = order.library, order.cache, order.skeleton, order.unit, order.seed
+    folder, cache, skeleton, unit, seed = where
+    library = build(
+        folder, cache_dir=cache, skeleton=skeleton, unit=unit, seed=seed, progress=report, cancelled=cancelled
+    )
+    library.extended  # worked out once, here, instead of by every worker  # noqa: B018
+    source = LibrarySource(*where, key=library.kept[1])
+    hold(source, library)
+    return library, source
+
+
+def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> None:
+    """All stages behind the reading."""
+    state, begin = job.state, time.perf_counter()
+    roles = roles_of(match, job.order, span)
+    solved = _solved(job, match, span, _part(report, "ball"))
+    state.took("ball", begin)
+    clock = time.perf_counter()
+    words = words_of(match, solved)
+    state.told["notes"] += words.notes
+    inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
+    roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
+    names = file_names(player.id for player in match.players)
+    parts = parts_of(roles, names, words, solved, job.order, job.folder, job.library.words)
+    state.players = {part.role.player.id: row_of(part) for part in parts}
+    state.took("words", clock)
+    state.write()
+    clock = time.perf_counter()
+    edits = stages.search(job.told(_part(report, "search")), parts)
+    state.took("search", clock)
+    clock = time.perf_counter()
+    crowd = stages.keep_apart(job.told(_part(report, "crowd")), edits, span)
+    ball = _ball(job, match, solved, span, crowd)
+    state.took("crowd", clock)
+    clock = time.perf_counter()
+    stages.finish(job.told(_part(report, "figures")), parts, edits, crowd, ball)
+    state.took("figures", clock)
+    state.took("total", begin)
+    _close(job, crowd)
+
+
+def _solved(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
+    """The ball around the span; None where it is not to be solved, or cannot be."""
+    if not job.order.solve_touches:
+        return None
+    try:
+        return solve_ball(match, report, job.cancelled, span[0] - AROUND, span[1] + AROUND)
+    except InputError as error:
+        job.state.told["notes"].append(f"the ball is not solved: {error}")
+        return None
+
+
+def _touches(words: MatchWords) -> dict[str, list[float]]:
+    """Seconds of everybody's key moments."""
+    return {player: [one.time for one in moments if one.end is None] for player, moments in words.players.items()}
+
+
+def _ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd) -> BallPath:
+    """The match's ball over the span, written out where it is known at all."""
+    fps = job.order.fps
+    first, last = int(np.ceil(span[0] * fps - 1e-6)), int(np.floor(span[1] * fps + 1e-6))
+    times = np.arange(first, last + 1) / fps
+    plan = ball_plan(match, solved, *span, fps)
+    if plan is None:
+        return BallPath(times, np.full((len(times), 3), np.nan), np.zeros(len(times), bool))
+    ball = met(course(plan, times), first, ((part.led_frames, part.led) for part in crowd.values()))
+    path = job.folder.path / "ball.csv"
+    write_ball(path, ball)
+    job.state.told["ball"] = {
+        "file": path.name, "touches": len(solved.touches) if solved else 0, "measured_share": ball.measured.mean(),
+        "notes": list(solved.notes) if solved else [],
+    }  # fmt: skip
+    return ball
+
+
+def _close(job: stages.Job, crowd) -> None:
+    """The last news, and the page."""
+    state = job.state
+    state.told["crowd"] = {
+        "overlap_before_m": max((part.before for part in crowd.values()), default=0.0),
+        "overlap_m": max((float(part.depth.max(initial=0.0)) for part in crowd.values()), default=0.0),
+        "players_corrected": sum(bool(len(part.correction.knots)) for part in crowd.values()),
+    }  # fmt: skip
+    made = len(state.players) - len(state.failed)
+    state.tell(status="failed" if not made else "partial" if state.failed else "done")
+    if job.order.figures:
+        from ..evaluation.match_report import page
+
+        atomic_write(job.folder.path / "report.html", page(job.folder.path))
+
+
+def _result(state: MatchState, span: tuple[float, float]) -> MatchResult:
+    rows = state.players.values()
+    done = tuple(MadePlayer(row["id"]) for row in rows if row["status"] == "done")
+    failed = tuple(MadePlayer(row["id"], row["reason"]) for row in state.failed)
+    return MatchResult(span, done, failed, tuple(dict.fromkeys((*state.told["data"], *state.told["notes"]))))
+
+
+def _part(report: Progress, stage: str) -> Progress:
+    """The progress of one stage as a part of the whole."""
+    names = list(_SHARES)
+    low, high = _SHARES[names[names.index(stage) - 1]] if stage != names[0] else 0.0, _SHARES[stage]
+    return lambda fraction, text: report(low + (high - low) * fraction, text)

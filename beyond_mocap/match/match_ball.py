@@ -1,0 +1,63 @@
+"""The one ball of a match: as it was solved, led in everybody's hands and to everybody's feet where he meets it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..ball.tracked.solve import SolvedBall
+from ..files.match_data import Match
+from ..known_touches import course_of
+from ..motion.track import Track, clean
+from ..plan import Plan
+from ..take import BallPath, Take
+
+_STEP = 1e-4  # m, to which places are rounded, as files have them
+
+
+def ball_plan(match: Match, solved: SolvedBall | None, start: float, end: float, fps: float) -> Plan | None:
+    """An order that has the ball from `start` to `end` s and nobody, for `course`; None where it is nowhere known."""
+    inside = (match.times >= start - 1.0 / match.fps) & (match.times <= end + 1.0 / match.fps)
+    times, ball = match.times[inside], match.ball[inside]
+    if not np.isfinite(ball[:, :2]).all(axis=1).any():
+        return None
+    track, _ = clean(Track(times, np.zeros((len(times), 2)), ball, name="ball"))
+    plan = Plan(track=track, fps=fps, solve_touches=solved is not None)
+    return plan if solved is None else Plan(**{**vars(plan), "solved": course_of(solved, "", plan)})
+
+
+def course(plan: Plan, times: np.ndarray) -> BallPath:
+    """The ball of a plan at `times` (T,) s as nobody has met it yet: solved where that is known, else as sampled."""
+    sampled = plan.sampled(plan.fps)
+    place = np.stack([np.interp(times, sampled.times, column, np.nan, np.nan) for column in sampled.ball.T], axis=1)
+    near = np.clip(np.searchsorted(sampled.times, times - 0.5 / plan.fps), 0, len(sampled) - 1)
+    measured = sampled.ball_measured[near]
+    if plan.solved is None:
+        return BallPath(times, place, measured)
+    solved, _ = plan.solved.at(times)
+    return BallPath(times, np.where(np.isfinite(solved), solved, place), measured)
+
+
+def led_by(take: Take) -> tuple[np.ndarray, np.ndarray]:
+    """Frames (K,) of the match's clock at which a player leads the ball elsewhere than it was, and by how much: (K, 3)
+    m."""
+    if take.ball is None:
+        return np.zeros(0, int), np.zeros((0, 3))
+    off = take.ball.positions - course(take.plan, take.ball.times).positions
+    off = np.where(np.isfinite(off), off, 0.0)
+    some = np.flatnonzero(np.abs(off).max(axis=1) > 0.5 * _STEP)
+    return some + round(take.start_time * take.motion.fps), off[some]
+
+
+def met(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]) -> BallPath:
+    """The ball (T frames from frame `first` of the match's clock on) where everybody's `led_by` has it.
+
+    One who touches the ball leads it between the touches before and after his own only, so that what several do adds
+    up without hurting anybody's touch.
+    """
+    places = np.array(ball.positions)
+    for frames, off in led:
+        inside = (frames >= first) & (frames < first + len(places))
+        np.add.at(places, frames[inside] - first, off[inside])
+    return BallPath(ball.times, np.round(places / _STEP) * _STEP, ball.measured)

@@ -1,0 +1,93 @@
+"""What is asked of a match: plain values, and the digest by which results of the same order are known again."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from .. import __version__
+from ..errors import InputError
+from .content_digest import digest_of, digest_of_file
+
+FORM = 1
+"""Raised whenever the same order would give other results, so that kept ones are not taken for them."""
+
+WINDOWS = (5.0, 600.0)
+"""Seconds that a window has at least and at most."""
+
+
+@dataclass(frozen=True)
+class MatchOrder:
+    """One match to make.
+
+    tracking, meta, events: the provider's files (None: looked for beside, none); provider: whose form, "" guessed.
+    library, cache, skeleton, unit: as `library.build` has them. out: the folder of the results. start, end: seconds on
+    the match's clock, None from its first to its last sample. players: ids, () everybody. fps: of what comes out. seed:
+    of every random choice. nearest: whether words that the library lacks give way to the nearest it has. solve_touches:
+    whether the ball is solved. annotations: folder with a text for players (ID.txt), instead of automatic words.
+    bvh: whether every player is written as BVH too; figures: whether reports, provenance and the page are made. window,
+    overlap: seconds that a piece of the search has, and on either side of it. workers, scheduler: `pool.Workplace`.
+    InputError for numbers outside their limits and a span that ends before it begins.
+    """
+
+    tracking: Path
+    library: Path
+    out: Path
+    meta: Path | None = None
+    events: Path | None = None
+    provider: str = ""
+    cache: Path | None = None
+    skeleton: Path | None = None
+    unit: float | None = None
+    start: float | None = None
+    end: float | None = None
+    players: tuple[str, ...] = ()
+    fps: float = 30.0
+    seed: int = 0
+    nearest: bool = True
+    solve_touches: bool = True
+    annotations: Path | None = None
+    bvh: bool = False
+    figures: bool = True
+    window: float = 60.0
+    overlap: float = 4.0
+    workers: int = 1
+    scheduler: str = ""
+
+    def __post_init__(self):
+        if self.start is not None and self.end is not None and self.end <= self.start:
+            raise InputError("--to", f"{self.end:g} s", f"later than --from {self.start:g} s")
+        if not WINDOWS[0] <= self.window <= WINDOWS[1]:
+            raise InputError("window", f"{self.window:g} s", f"{WINDOWS[0]:g} to {WINDOWS[1]:g} s")
+        if not 1.0 <= self.overlap <= self.window:
+            raise InputError("overlap", f"{self.overlap:g} s", f"1 s to the window's {self.window:g} s")
+
+    def told(self) -> dict:
+        """The order as plain values, for people."""
+        return {name: value.as_posix() if isinstance(value, Path) else value for name, value in asdict(self).items()}
+
+
+_RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "window", "overlap")
+_FILES = ("tracking", "meta", "events")
+
+
+def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
+    """What decides the results of an order, by name: settings, and the content of its files by their digests. The
+    words' texts are not among them: they may be edited between runs. library_key: of the library's content
+    (`Library.kept`). InputError for a file that cannot be read."""
+    out: dict[str, object] = {"form": FORM, "software": __version__, "library": library_key}
+    out |= {name: getattr(order, name) for name in _RESULTS}
+    for name in _FILES:
+        path = getattr(order, name)
+        try:
+            out[name] = None if path is None else digest_of_file(path)
+        except OSError as error:
+            raise InputError(path, error.strerror or str(error), "a file that can be read", "check the path") from None
+    return out
+
+
+def digest(known: dict[str, object]) -> str:
+    """The hex digits that stand for an `identity`."""
+    return digest_of(known)
+
+

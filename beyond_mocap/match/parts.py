@@ -1,0 +1,79 @@
+"""What everybody is asked to do: words from touches, events or texts, and the plan of every stretch of a player."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..annotation import Timeline
+from ..ball.tracked.solve import SolvedBall
+from ..errors import InputError
+from ..known_touches import course_of
+from ..plan import Plan
+from .folder import MatchFolder
+from .order import MatchOrder
+from .player_edit import kept
+from .roles import Role
+from .words import MatchWords, Moment, timeline_of
+from .words_text import edited, read_words, write_words
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A role with its orders. file: what the player's files are called; plans: one for each stretch, as files keep them;
+    () where he cannot be made (`role.reason`)."""
+
+    role: Role
+    file: str
+    plans: tuple[Plan, ...] = ()
+
+
+def parts_of(
+    roles: tuple[Role, ...], files: Mapping[str, str], words: MatchWords, solved: SolvedBall | None,
+    order: MatchOrder, folder: MatchFolder, known_words: frozenset[str],
+) -> list[Part]:
+    """Everybody's orders. Words are read from the texts of `order.annotations`, else from those in the folder that have
+    been edited, and else are the automatic ones, which are written there. What is wrong with a player's text is the
+    reason why he is not made."""
+    out = []
+    for role in roles:
+        file = files[role.player.id]
+        try:
+            moments = () if role.reason else _moments(file, role, words, order, folder, known_words)
+            plans = tuple(_plan(role, number, moments, solved, order) for number in range(len(role.asked)))
+            out.append(Part(role, file, () if role.reason else plans))
+        except InputError as error:
+            out.append(Part(replace(role, reason=str(error)), file))
+    return out
+
+
+def _moments(
+    file: str, role: Role, words: MatchWords, order: MatchOrder, folder: MatchFolder, known_words: frozenset[str]
+) -> tuple[Moment, ...]:
+    automatic = words.players.get(role.player.id, ())
+    text = _own_text(order.annotations, file)
+    if text is None:
+        text = folder.words_of(file)
+        if not edited(text):
+            text.parent.mkdir(exist_ok=True)
+            write_words(text, role.player.id, automatic)
+            return automatic
+    return read_words(text, automatic, known_words)
+
+
+def _own_text(annotations: Path | None, file: str) -> Path | None:
+    """The text that the user has for a player, None where he has none."""
+    text = None if annotations is None else annotations / f"{file}.txt"
+    return text if text is not None and text.is_file() else None
+
+
+def _plan(role: Role, number: int, moments, solved: SolvedBall | None, order: MatchOrder) -> Plan:
+    track = role.asked[number]
+    start, end = float(track.times[0]), float(track.times[-1])
+    timeline: Timeline = timeline_of(moments, start, end)
+    plan = Plan(
+        track=track, timeline=timeline, library=str(order.library), nearest=order.nearest, seed=order.seed,
+        fps=order.fps, solve_touches=solved is not None,
+    )
+    return kept(plan if solved is None else replace(plan, solved=course_of(solved, role.player.id, plan)))

@@ -1,0 +1,132 @@
+"""Who of a match is made, when he is there, and where he is asked to be: everybody's tracks, cleaned, on one clock of
+frames, and pushed apart where two would stand in each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..files.match_data import Match, MatchPlayer
+from ..motion.track import Track, clean
+from ..polish.crowd.spacing import keeping, spaced
+from .cut_plan import cut_track
+from .order import MatchOrder
+
+SHORTEST = 1.0
+"""Seconds; who is there for less is not made."""
+
+
+@dataclass(frozen=True, eq=False)
+class Role:
+    """A player who is to be made. player: who; measured: his cleaned tracks, one for each stretch in which he is there,
+    each from a frame of the match's clock (a whole number of 1 / fps seconds) to another; asked: the same, pushed out
+    of others' ways. notes: lines on what was put right. reason: why he cannot be made, else ""."""
+
+    player: MatchPlayer
+    measured: tuple[Track, ...] = ()
+    asked: tuple[Track, ...] = ()
+    notes: tuple[str, ...] = ()
+    reason: str = ""
+
+
+def span_of(match: Match, order: MatchOrder) -> tuple[float, float]:
+    """(start, end) s of what is asked for, within the match. InputError where it has nothing of it."""
+    first, last = float(match.times[0]), float(match.times[-1])
+    start = first if order.start is None else max(order.start, first)
+    end = last if order.end is None else min(order.end, last)
+    if end - start < SHORTEST:
+        low, high = (f"{value:g}" if value is not None else "" for value in (order.start, order.end))
+        raise InputError("--from, --to", f"{low} to {high} s", f"a second or more within {first:g} to {last:g} s")
+    return start, end
+
+
+def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tuple[Role, ...]:
+    """Everybody who is there in `span` s, or of the order's players; those whose tracks cannot be cleaned with the
+    reason. InputError for an unknown player, and where nobody is there."""
+    known = {player.id: player for player in match.players}
+    for wanted in order.players:
+        if wanted not in known:
+            raise InputError("--players", f"{wanted!r}", f"some of {', '.join(known)}")
+    asked = [player for player in match.players if not order.players or player.id in order.players]
+    roles = [role for player in asked if (role := _role(match, player, span, order.fps)) is not None]
+    if not roles:
+        raise InputError("--from, --to", f"nobody is there from {span[0]:g} to {span[1]:g} s", "a time of play")
+    return tuple(roles)
+
+
+def _role(match: Match, player: MatchPlayer, span: tuple[float, float], fps: float) -> Role | None:
+    """The role of a player; None where he is not there for SHORTEST."""
+    tracks, notes = [], []
+    try:
+        for begin, end in match.stretches(player.id):
+            begin, end = _on_frames(max(begin, span[0]), min(end, span[1]), fps)
+            if end - begin >= SHORTEST:
+                track, found = clean(match.track(player.id, *_around(match, begin, end)))
+                tracks.append(_cut(track, begin, end, fps))
+                notes += found.lines
+    except InputError as error:
+        return Role(player, reason=str(error))
+    return Role(player, tuple(tracks), tuple(tracks), tuple(notes)) if tracks else None
+
+
+def _on_frames(start: float, end: float, fps: float) -> tuple[float, float]:
+    """The first frame of the match's clock not before `start` and the last not behind `end`, s."""
+    return float(np.ceil(start * fps - 1e-6) + 0.0) / fps, float(np.floor(end * fps + 1e-6)) / fps
+
+
+def _around(match: Match, start: float, end: float) -> tuple[float, float]:
+    """`start` and `end`, widened to the feed's samples around them."""
+    step = 1.0 / match.fps
+    return start - step, end + step
+
+
+def _cut(track: Track, start: float, end: float, fps: float) -> Track:
+    """The track from `start` to `end`, as far as it goes, on frames."""
+    return cut_track(track, *_on_frames(max(start, track.times[0]), min(end, track.times[-1]), fps))
+
+
+def pushed_apart(
+    roles: Sequence[Role], times: np.ndarray, touches: Mapping[str, Sequence[float]]
+) -> tuple[tuple[Role, ...], dict[str, float]]:
+    """The roles with tracks that keep out of each other (`polish.crowd.spacing`), and what that took: `longest_m`,
+    `mean_m` where somebody is moved, `seconds` in which somebody is, all players' summed.
+
+    times (N,) s: of the feed's samples; touches: by id, seconds at which somebody touches the ball, who then keeps his
+    way.
+    """
+    places = np.stack([_on_times(role.measured, times) for role in roles])
+    step = float(np.median(np.diff(times)))
+    keep = [
+        keeping(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)
+        for role in roles
+    ]
+    shifts = spaced(times, places, np.stack(keep))
+    moved = np.linalg.norm(shifts, axis=2)
+    some = moved > 1e-3
+    figures = {"longest_m": float(moved.max()), "mean_m": float(moved[some].mean()) if some.any() else 0.0,
+               "seconds": float(some.sum() * step)}  # fmt: skip
+    return tuple(_shifted(role, times, shift) for role, shift in zip(roles, shifts)), figures
+
+
+def _on_times(tracks: Sequence[Track], times: np.ndarray) -> np.ndarray:
+    """(N, 2) m where a player is at `times` (N,) s, NaN where he is away."""
+    out = np.full((len(times), 2), np.nan)
+    for track in tracks:
+        there = (times >= track.times[0] - 1e-9) & (times <= track.times[-1] + 1e-9)
+        for axis in (0, 1):
+            out[there, axis] = np.interp(times[there], track.times, track.positions[:, axis])
+    return out
+
+
+def _shifted(role: Role, times: np.ndarray, shift: np.ndarray) -> Role:
+    """The role asked to be `shift` (N, 2) m beside what was measured; the very same where it is nothing."""
+    if not shift.any():
+        return role
+    asked = []
+    for track in role.measured:
+        own = np.stack([np.interp(track.times, times, shift[:, axis]) for axis in (0, 1)], axis=1)
+        asked.append(replace(track, positions=track.positions + own))
+    return replace(role, asked=tuple(asked))

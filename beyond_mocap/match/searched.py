@@ -1,0 +1,63 @@
+"""What the search finds for one window: no motion yet, only which clip is shown when."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..library.chosen import with_chosen_gaits
+from ..library.library import Library
+from ..own_size import in_library_size, size_of
+from ..plan import Plan
+from ..synthesis.balance import balanced
+from ..synthesis.distance import exact_keys
+from ..synthesis.path_search import PathSearch
+from ..synthesis.wanted import wanted
+from .library_clips import named
+from .named_edit import NamedEdit
+from .units import Unit
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """What was found for a window. player, stretch, number, first, own: the unit's (`units.Unit`). edit: at the
+    library's rate, from the unit's first frame on. seconds: of processor time that it took. warnings: what the library
+    lacks of what is asked. hurried: frame of `edit` from which on it was searched in a hurry, or None."""
+
+    player: str
+    stretch: int
+    number: int
+    first: int
+    own: tuple[int, int]
+    edit: NamedEdit
+    seconds: float = 0.0
+    warnings: tuple[str, ...] = ()
+    hurried: int | None = None
+
+
+def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None = None,
+             hurry: Callable[[], bool] | None = None) -> Piece:  # fmt: skip
+    """The edit list of one window of a player.
+
+    library: the recordings; where the plan allows made clips, all windows are offered them, so that neighbours choose
+    from the same. Raises what `synthesize` raises. The same library, unit and numpy give the same bits.
+    """
+    from threadpoolctl import threadpool_limits
+
+    begun = time.process_time()
+    with threadpool_limits(limits=1):
+        library = searched_library(library, unit.plan)
+        plan = in_library_size(unit.plan, size_of(unit.plan, library.skeleton))
+        order = wanted(library, plan)
+        search = PathSearch(library, order, balanced(plan.alpha), cancelled=cancelled, hurry=hurry)
+        edit = exact_keys(library, search.run(), order)
+    return Piece(
+        unit.player, unit.stretch, unit.number, unit.first, unit.own, named(library, edit, plan.timeline.keys),
+        time.process_time() - begun, order.warnings, search.hurried,
+    )  # fmt: skip
+
+
+def searched_library(library: Library, plan: Plan) -> Library:
+    """The library that all windows of a plan are searched in."""
+    return with_chosen_gaits(library.extended if plan.made else library, dict(plan.gaits))

@@ -1,0 +1,98 @@
+"""What match.json says: the order, who is made and how far he is, what was told, and what it took (docs/match.md)."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .. import __version__
+from ..files.match_data import Match
+from .folder import MatchFolder
+from .order import MatchOrder
+from .parts import Part
+
+EVERY = 1.0
+"""Seconds between two writings of a state in which only the number of done windows has changed."""
+
+
+@dataclass(eq=False)
+class MatchState:
+    """The state while the match is made. players: by id, their rows, in the order of the feed."""
+
+    folder: MatchFolder
+    told: dict
+    players: dict[str, dict] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    _written: float = 0.0
+
+    def player(self, player: str, **news) -> None:
+        """News of a player."""
+        self.players[player].update(news)
+        self.write()
+
+    def counted(self, player: str) -> None:
+        """One more of a player's windows is searched."""
+        self.players[player]["units_done"] += 1
+        if time.monotonic() - self._written > EVERY:
+            self.write()
+
+    def tell(self, **news) -> None:
+        """News of the match."""
+        self.told.update(news)
+        self.write()
+
+    def write(self) -> None:
+        """Writes match.json."""
+        rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
+        told = {**self.told, "players": rows, "seconds": self.seconds, "peak_memory_mb": peak_memory()}
+        self.folder.tell(told)
+        self._written = time.monotonic()
+
+    def took(self, stage: str, begun: float) -> None:
+        """A stage that began at `begun` (time.perf_counter) is done."""
+        self.seconds[stage] = round(time.perf_counter() - begun, 3)
+
+    @property
+    def failed(self) -> list[dict]:
+        """The rows of those who could not be made."""
+        return [row for row in self.players.values() if row["status"] == "failed"]
+
+
+def begun(
+    folder: MatchFolder, order: MatchOrder, identity: Mapping, match: Match, span: tuple[float, float]
+) -> MatchState:
+    """The state of a match that is about to be made."""
+    sides = [team.name for team in match.teams if team.name and team.ground != "referee"]
+    return MatchState(folder, {
+        "software": __version__, "status": "running", "title": " - ".join(sides[:2]) or order.tracking.stem,
+        "identity": dict(identity), "order": order.told(), "from_s": span[0], "to_s": span[1], "fps": order.fps,
+        "pitch_m": [match.length, match.width], "provider": match.provider,
+        "periods_s": [list(period) for period in match.periods], "teams": [vars(team) for team in match.teams],
+        "ball": None, "events": None, "crowd": None, "data": list(dict.fromkeys((*match.notes, *match.report))),
+        "notes": [], "workers": order.scheduler or order.workers,
+    })  # fmt: skip
+
+
+def row_of(part: Part) -> dict:
+    """A player's row when work begins."""
+    player, role = part.role.player, part.role
+    return {
+        "id": player.id, "file": part.file, "team": player.team, "name": player.name, "number": player.number,
+        "position": player.position, "status": "failed" if role.reason else "waiting", "reason": role.reason,
+        "stretches_s": [[float(track.times[0]), float(track.times[-1])] for track in role.measured],
+        "units": 0, "units_done": 0, "data": list(role.notes),
+    }  # fmt: skip
+
+
+def peak_memory() -> dict[str, float]:
+    """MB that this process, and the largest of those it has started and seen the end of, have needed at most; nothing
+    where the system does not tell (Windows)."""
+    try:
+        import resource
+    except ImportError:
+        return {}
+    unit = 1e6 if sys.platform == "darwin" else 1024.0
+    who = {"main": resource.RUSAGE_SELF, "worker": resource.RUSAGE_CHILDREN}
+    return {name: round(resource.getrusage(kind).ru_maxrss / unit, 1) for name, kind in who.items()}

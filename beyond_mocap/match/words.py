@@ -1,0 +1,184 @@
+"""What everybody does with the ball and when, as words: from solved touches, and from a provider's events.
+
+    words = words_of(match, solve_ball(match), None)
+    timeline = words.timeline("home_7", 0.0, 60.0)
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..annotation import KeyMoment, Span, Timeline
+from ..annotation.event_words import EventWords, read_event_words
+from ..ball.tracked.solve import SolvedBall, SolvedTouch
+from ..files.match_data import Match
+
+LEAST_CONFIDENCE = 0.3
+"""Touches of less make no key moment."""
+
+NEAREST = 0.5
+"""Seconds; a player who touches the ball twice within them shows one of both."""
+
+TOUCHES, EVENTS, BOTH, USER = "touches", "events", "touches and events", "user"
+"""Where a moment comes from."""
+
+_RUNNING = 2.0  # m/s, from which a touch is made running
+_HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.5, 1.5, 0.7  # m of the ball's centre
+_JUMP = 2.05  # m of the ball's centre, which nobody heads standing
+_CAUGHT = 3.0  # m/s of the ball after a save that held it
+_CHAIN = 3.0  # s between touches of one dribble
+_SHORTEST = 0.8  # s of a dribble
+_SENT = {"pass", "shot", "clearance"}
+_LIKE_EVENT = {  # kind of a touch -> kind, details of an event like it
+    "kick": ("pass", ()), "receive": ("receive", ()), "dribble": ("dribble", ()), "header": ("pass", ()),
+    "chest": ("receive", ()), "throw-in": ("pass", ("throw-in",)), "hand": ("catch", ()), "save": ("save", ()),
+    "deflection": ("deflection", ()),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a player does: time s on the match's clock; words; source: TOUCHES, EVENTS, BOTH or USER; confidence 0 to 1.
+    end: s, of a stretch that begins at `time`, None for a key moment."""
+
+    time: float
+    words: tuple[str, ...]
+    source: str
+    confidence: float
+    end: float | None = None
+
+
+@dataclass(frozen=True)
+class MatchWords:
+    """players: id -> moments in order of time, for everybody, () for who never touches the ball. notes: lines for
+    people. figures: of the events' clock and how they fit, {} without events."""
+
+    players: Mapping[str, tuple[Moment, ...]]
+    notes: tuple[str, ...] = ()
+    figures: Mapping[str, object] = field(default_factory=dict)
+
+    def timeline(self, player: str, start: float = -np.inf, end: float = np.inf) -> Timeline:
+        """One player's words between two times (s), stretches cut there."""
+        return timeline_of(self.players.get(player, ()), start, end)
+
+
+def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
+    """Moments between two times (s) as a timeline, stretches cut there."""
+    spans, keys = [], []
+    for moment in moments:
+        if moment.end is None:
+            keys += [KeyMoment(moment.time, moment.words)] * (start <= moment.time <= end)
+        elif min(moment.end, end) > max(moment.time, start):
+            spans.append(Span(max(moment.time, start), min(moment.end, end), moment.words))
+    return Timeline(tuple(spans), tuple(keys))
+
+
+def words_of(match: Match, solved: SolvedBall | None, table: EventWords | None = None) -> MatchWords:
+    """Everybody's moments. solved: the ball, on the match's clock; None where it cannot be solved. table: from what
+    happened to words, by default the one that comes with us.
+
+    A touch becomes a key moment with the words that the table has for it, touches of one player in a row a stretch of
+    dribble. Of two within NEAREST the surer one stays. What is not known (the foot, a height without heights in the
+    feed) is left out of the words.
+    """
+    table = table or read_event_words()
+    touches = solved.touches if solved else ()
+    heights = has_heights(match)
+    left_out: Counter[str] = Counter()
+    players = {}
+    for player, path in zip(match.players, match.positions):
+        own = [touch for touch in touches if touch.player == player.id]
+        found = [moment_of(touch, match.times, path, heights, table) for touch in own]
+        sure = [moment for moment in found if moment and moment.confidence >= LEAST_CONFIDENCE]
+        left_out["doubtful"] += sum(moment is not None for moment in found) - len(sure)
+        kept = apart(sure)
+        left_out["close"] += len(sure) - len(kept)
+        players[player.id] = ordered([*kept, *dribbles(own)])
+    return MatchWords(players, tuple(_notes(touches, left_out)))
+
+
+def has_heights(match: Match) -> bool:
+    """Whether the feed has heights of the ball."""
+    seen = np.isfinite(match.ball[:, :2]).all(axis=1)
+    return bool(seen.any() and np.isfinite(match.ball[seen, 2]).mean() > 0.8)
+
+
+def moment_of(
+    touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventWords
+) -> Moment | None:
+    """The key moment of a touch, None where it makes none. times (N,) s and path (N, 2) m of its player; heights:
+    whether the touch's is known."""
+    kind, details = _LIKE_EVENT[touch.kind]
+    if touch.kind == "save" and np.linalg.norm(touch.after) > _CAUGHT:
+        details = (*details, "parried")
+    filled_in = {**seen_words(touch.time, times, path), **height_words(touch.part, touch.position[2], heights)}
+    words = table.words(kind, touch.part, details, filled_in)
+    return Moment(round(touch.time, 3), words, TOUCHES, round(touch.confidence, 3)) if words else None
+
+
+def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
+    """The gait at a moment, from a player's path (N, 2) m at `times` (N,) s."""
+    near = np.flatnonzero((np.abs(times - time) <= 0.3) & np.isfinite(path).all(axis=1))
+    if len(near) < 2:
+        return {}
+    away = np.linalg.norm(path[near[-1]] - path[near[0]]) / (times[near[-1]] - times[near[0]])
+    return {"gait": "running" if away > _RUNNING else "standing"}
+
+
+def height_words(part: str, height: float, known: bool) -> dict[str, str]:
+    """The height word of a touch with the ball's centre at `height` m, and jump."""
+    if not known:
+        return {}
+    if part == "hand":
+        return {"height": "high" if height > _HIGH_HAND else "low" if height < _LOW_HAND else "middle"}
+    return {"height": "high" if height > _HIGH_FOOT else "low", "jump": "jump" if height > _JUMP else ""}
+
+
+def apart(moments: Iterable[Moment]) -> list[Moment]:
+    """Of key moments (of one player) within NEAREST the surest: events before touches, sent before taken balls."""
+    kept: list[Moment] = []
+    for moment in sorted(moments, key=_weight, reverse=True):
+        if all(abs(moment.time - other.time) >= NEAREST for other in kept):
+            kept.append(moment)
+    return kept
+
+
+def _weight(moment: Moment) -> tuple[float, float]:
+    told = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * ("receive" not in moment.words)
+    return moment.confidence + told, -moment.time
+
+
+def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
+    """The stretches in which one player drives the ball: touches in a row, one of them a dribble's."""
+    out, first = [], 0
+    for index in range(1, len(touches) + 1):
+        if index < len(touches) and touches[index].time - touches[index - 1].time < _CHAIN:
+            if touches[index - 1].kind in ("dribble", "receive"):
+                continue
+        chain, first = touches[first:index], index
+        lasts = chain[-1].time - chain[0].time
+        if lasts >= _SHORTEST and any(touch.kind == "dribble" for touch in chain):
+            sure = float(np.mean([touch.confidence for touch in chain]))
+            out.append(
+                Moment(round(chain[0].time, 3), ("dribble",), TOUCHES, round(sure, 3), round(chain[-1].time, 3))
+            )
+    return out
+
+
+def ordered(moments: Iterable[Moment]) -> tuple[Moment, ...]:
+    """Moments by time, stretches before key moments."""
+    return tuple(sorted(moments, key=lambda moment: (moment.time, moment.end is None)))
+
+
+def _notes(touches, left_out: Counter) -> list[str]:
+    strangers = sum(not touch.player for touch in touches)
+    told = [
+        (strangers, "touches of the ball by nobody who is tracked"),
+        (left_out["doubtful"], f"touches of less than {LEAST_CONFIDENCE:g} confidence make no key moment"),
+        (left_out["close"], f"touches within {NEAREST:g} s of a surer one of the same player make no key moment"),
+    ]
+    return [f"{count} {what}" for count, what in told if count]

@@ -1,0 +1,59 @@
+"""The report of a player over several stretches: nothing is counted twice, and every second has its own figures."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.evaluation.played import played_from_take
+from beyond_mocap.evaluation.report import evaluate
+from beyond_mocap.match.figures import combined, per_second, player_report, time_lost
+from beyond_mocap.take import BallPath
+
+
+def test_time_lost_counts_every_second_once():
+    assert time_lost([[[1.0, 3.0], [2.0, 4.0]], [[3.5, 3.75]], [], [[10.0, 10.5]]]) == pytest.approx(3.5)
+    assert time_lost([]) == 0.0
+
+
+def test_reports_of_stretches_are_joined_by_what_their_figures_mean():
+    one = {"version": 1, "frames": 30, "root_error_m": {"mean": 1.0, "max": 2.0}, "keys": [1], "loop_share": None,
+           "warp_rate": {"min": 0.9, "max": 1.1}}  # fmt: skip
+    two = {"version": 1, "frames": 90, "root_error_m": {"mean": 2.0, "max": 9.0}, "keys": [2, 3], "loop_share": 0.5,
+           "warp_rate": {"min": 0.8, "max": 1.0}}  # fmt: skip
+    joined = combined([one, two], [30, 90])
+    assert joined == {"version": 1, "frames": 120, "root_error_m": {"mean": 1.75, "max": 9.0}, "keys": [1, 2, 3],
+                      "loop_share": 0.5, "warp_rate": {"min": 0.8, "max": 1.1}}  # fmt: skip
+    assert type(joined["frames"]) is int
+    assert combined([one], [30]) == one
+
+
+def test_every_second_has_its_own_figures(take, library):
+    played, track = played_from_take(take), take.plan.track
+    count = len(take.motion)
+    times = take.start_time + np.arange(count) / take.motion.fps
+    ball = np.column_stack([played.pelvis + [3.0, 4.0], np.full(count, 0.11)])
+    ball[30:60] += [30.0, 0.0, 0.0]
+    overlap = np.zeros(count)
+    overlap[45] = 0.25
+    report = player_report(library, [take], [track], [overlap], BallPath(times, ball, np.ones(count, bool)))
+    alone = evaluate(take, track, library)
+    assert {name: report[name] for name in alone} == alone
+    rows = report["per_second"]
+    assert rows["start_s"] == 0 and len(rows["overlap_m"]) == int(times[-1] + 1e-6) + 1
+    assert rows["overlap_m"][:3] == [0.0, 0.25, 0.0]
+    assert rows["ball_m"][0] == pytest.approx(5.0) and rows["ball_m"][1] > 20.0
+    known = [value for value in rows["root_error_m"] if value is not None]
+    assert np.mean(known[: len(known) - 1]) == pytest.approx(alone["root_error_m"]["mean"], rel=0.3)
+
+
+def test_seconds_between_stretches_are_empty(take):
+    from dataclasses import replace
+
+    later = replace(take, start_time=take.start_time + 40.0)
+    count = len(take.motion)
+    ball = BallPath(np.arange(2.0), np.full((2, 3), np.nan), np.zeros(2, bool))
+    rows = per_second(
+        [played_from_take(take), played_from_take(later)], [take.plan.track] * 2, [np.zeros(count)] * 2, ball
+    )
+    there = [value is not None for value in rows["overlap_m"]]
+    assert there[0] and there[40] and not there[30]
+    assert rows["ball_m"] == [None] * len(there)

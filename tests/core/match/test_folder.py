@@ -1,0 +1,151 @@
+"""The folder of a match: one run at a time, one order, names that every system takes; and the digests behind it."""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.match.content_digest import digest_of
+from beyond_mocap.match.folder import file_names, opened, read_state
+from beyond_mocap.match.order import MatchOrder, digest, identity
+
+TOP = Path(__file__).resolve().parents[3]
+
+
+@dataclass(frozen=True, eq=False)
+class Planted:
+    name: str
+    values: np.ndarray
+
+
+def test_the_same_content_has_the_same_digest_and_no_other_has():
+    one = Planted("a", np.arange(6.0))
+    assert digest_of(one) == digest_of(Planted("a", np.arange(6.0)[::1]))
+    others = [Planted("b", np.arange(6.0)), Planted("a", np.arange(6)), Planted("a", np.arange(6.0).reshape(2, 3)),
+              Planted("a", np.arange(5.0)), (1, 2), (1, (2,)), ((1,), 2), (12,), ("1", 2), (1.0, 2), (True, 2), None,
+              {"a": 1}, {"a": 2}, frozenset("ab"), ("a", "b"), ("ab",), b"ab", Path("ab")]  # fmt: skip
+    assert len({digest_of(value) for value in [one, *others]}) == len(others) + 1
+    with pytest.raises(TypeError, match="function"):
+        digest_of(test_the_same_content_has_the_same_digest_and_no_other_has)
+
+
+@pytest.fixture
+def order(tmp_path):
+    (tmp_path / "t.dat").write_text("tracking")
+    return MatchOrder(tmp_path / "t.dat", tmp_path / "clips", tmp_path / "out", players=("a", "b"))
+
+
+def changed(order, **more):
+    return MatchOrder(**{**vars(order), **more})
+
+
+def test_what_decides_the_results_is_in_the_identity_and_nothing_else(order, tmp_path):
+    own = digest(identity(order, "key"))
+    (tmp_path / "same.dat").write_text("tracking")
+    same = [{"workers": 7}, {"scheduler": "tcp://x"}, {"bvh": True}, {"figures": False}, {"out": tmp_path / "o"},
+            {"tracking": tmp_path / "same.dat"}, {"annotations": tmp_path}]  # fmt: skip
+    assert {digest(identity(changed(order, **more), "key")) for more in same} == {own}
+    other = [{"seed": 1}, {"start": 0.0}, {"end": 9.0}, {"fps": 25.0}, {"players": ("a",)}, {"nearest": False},
+             {"solve_touches": False}, {"window": 30.0}, {"events": tmp_path / "same.dat"}]  # fmt: skip
+    found = [digest(identity(changed(order, **more), "key")) for more in other]
+    (tmp_path / "t.dat").write_text("other tracking")
+    assert len({own, *found, digest(identity(order, "other")), digest(identity(order, "key"))}) == len(other) + 3
+
+
+@pytest.mark.parametrize("more, told", [
+    ({"start": 5.0, "end": 5.0}, "--to: 5 s; expected later than --from 5 s"), ({"window": 1.0}, "window: 1 s"),
+    ({"overlap": 90.0}, "overlap: 90 s"),
+])  # fmt: skip
+def test_an_order_without_sense_is_told(order, more, told):
+    with pytest.raises(InputError, match=told):
+        changed(order, **more)
+
+
+def test_a_file_that_is_not_there_is_told(order):
+    with pytest.raises(InputError, match="nothing.dat: No such file"):
+        identity(changed(order, tracking=Path("nothing.dat")), "key")
+
+
+STATE = {"state": "running", "players": [{"id": "a"}], "figure": np.float64("nan")}
+
+
+def test_a_folder_is_gone_on_with_by_the_same_order_only(order, tmp_path):
+    known = identity(order, "key")
+    with opened(order.out, known) as folder:
+        assert folder.before == {}
+        folder.tell({"identity": known, **STATE})
+    with opened(order.out, known) as folder:
+        assert folder.before["players"] == [{"id": "a"}] and folder.before["figure"] is None
+    with pytest.raises(InputError, match=r"out: holds the results of another order \(its --from differs\)"):
+        with opened(order.out, identity(changed(order, start=1.0), "key")):
+            pass
+
+
+def test_pieces_are_kept_till_they_are_forgotten(order):
+    with opened(order.out, identity(order, "key")) as folder:
+        for name in "abc":
+            folder.place("search", name).write_text(name)
+        folder.forget("search", ["b"])
+        assert [path.name for path in folder.place("search", "b").parent.iterdir()] == ["b.npz"]
+        folder.clear("search")
+        assert not folder.place("search", "b").exists()
+
+
+def test_two_runs_at_once_are_told_and_a_dead_one_holds_nothing(order):
+    known = identity(order, "key")
+    text = f"""
+import sys, os; sys.path.insert(0, {str(TOP)!r})
+from pathlib import Path
+from beyond_mocap.match.folder import opened
+with opened(Path({str(order.out)!r}), {known!r}):
+    print("in", flush=True)
+    sys.stdin.read()
+"""
+    other = subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert other.stdout.readline() == b"in\n"
+    with pytest.raises(InputError, match=rf"another run \(process {other.pid}\) works in it"):
+        with opened(order.out, known):
+            pass
+    other.kill()
+    other.wait()
+    with opened(order.out, known) as folder:
+        assert folder.before == {}
+
+
+def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
+    known = identity(order, "key")
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.txt").write_text("x")
+    for path, told in ((tmp_path / "file", "is a file"), (tmp_path / "full", r"holds other files \(thesis.txt\)"),
+                       (tmp_path / "no" / "where", "the folder above it does not exist")):  # fmt: skip
+        with pytest.raises(InputError, match=told):
+            with opened(path, known):
+                pass
+    assert not (tmp_path / "no").exists() and [p.name for p in (tmp_path / "full").iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize("text, told", [
+    ("{", "no JSON"), ("[]", "no list of players"), ('{"players": [3]}', "no list of players"),
+    ('{"players": [], "version": 99}', "version 99"), ("[" * 100000, "no JSON"), ("\0\0", "no JSON"),
+])  # fmt: skip
+def test_a_state_that_cannot_be_read_is_told(tmp_path, text, told):
+    (tmp_path / "match.json").write_text(text)
+    with pytest.raises(InputError, match=f"match.json: {told}"):
+        read_state(tmp_path)
+
+
+def test_files_of_players_have_names_that_every_system_takes():
+    ids = ["home_1", "DFL-OBJ-0001", "a/b", "a_b", "A_B", "../..", "", "con", "COM1.x", "é", "x" * 300, "a b"]
+    names = file_names(ids)
+    assert set(names) == set(ids) and names["home_1"] == "home_1"
+    assert len({name.lower() for name in names.values()}) == len(ids)
+    for name in names.values():
+        assert name and not set(name) - set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.-")
+        assert len(name) < 120 and not name.startswith(".") and name.lower() not in ("con", "com1.x")
+    assert json.dumps(names)

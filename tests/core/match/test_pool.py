@@ -1,0 +1,161 @@
+"""Work spread over processes and over a cluster: all of it is done, once, whatever becomes of the workers."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from beyond_mocap.errors import Cancelled, InputError
+from beyond_mocap.match import pool
+from beyond_mocap.match.pool import Failed, Workplace, run
+
+TOP = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(scope="session")
+def chores(tmp_path_factory):
+    """A module of work to do that other processes can import: its functions."""
+    folder = tmp_path_factory.mktemp("chores")
+    (folder / "planted_chores.py").write_text('''
+import os, signal, time
+from pathlib import Path
+
+def square(number):
+    return number * number
+
+def odd(number):
+    if number % 2:
+        raise ValueError(f"{number} is odd")
+    return number
+
+def deadly(number, folder, times):
+    """Ends its own process while fewer than `times` marks lie in the folder."""
+    if number == 3 and len(list(Path(folder).iterdir())) < times:
+        (Path(folder) / str(time.time_ns())).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number, os.getpid()
+
+def slow(seconds):
+    time.sleep(seconds)
+    return os.getpid()
+''')
+    sys.path.insert(0, str(folder))
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(folder), str(TOP), *([before] if before else [])])
+    import planted_chores
+
+    yield planted_chores
+    pool.ended()
+    sys.path.remove(str(folder))
+    os.environ.pop("PYTHONPATH") if before is None else os.environ.update(PYTHONPATH=before)
+
+
+def numbers(count, *more):
+    return [(number, (number, *more)) for number in range(count)]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_everything_is_done_once(chores, workers):
+    assert sorted(run(numbers(9), chores.square, Workplace(workers))) == [(n, n * n) for n in range(9)]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_fails_fails_alone_and_says_why(chores, workers):
+    found = dict(run(numbers(5), chores.odd, Workplace(workers)))
+    assert found == {0: 0, 2: 2, 4: 4, 1: Failed("ValueError: 1 is odd"), 3: Failed("ValueError: 3 is odd")}
+
+
+def test_tasks_are_taken_only_as_far_as_there_are_workers(chores):
+    taken = []
+
+    def watched():
+        for task in numbers(40):
+            taken.append(task)
+            yield task
+
+    going = run(watched(), chores.square, Workplace(2))
+    next(going)
+    assert len(taken) <= 2 * pool.AHEAD + 1
+    assert len(list(going)) == 39
+
+
+def test_a_worker_that_is_killed_costs_nothing(chores, tmp_path):
+    found = dict(run(numbers(8, tmp_path, 1), chores.deadly, Workplace(2)))
+    assert {key: value[0] for key, value in found.items()} == {n: n for n in range(8)}
+
+
+def test_a_piece_that_kills_every_worker_fails_alone(chores, tmp_path):
+    found = dict(run(numbers(8, tmp_path, 99), chores.deadly, Workplace(2)))
+    assert "worker process ended" in found.pop(3).reason
+    assert {key: value[0] for key, value in found.items()} == {n: n for n in range(8) if n != 3}
+
+
+def test_cancelling_does_not_wait_for_the_work(chores):
+    begun = time.monotonic()
+    with pytest.raises(Cancelled):
+        list(run([(n, (60.0,)) for n in range(4)], chores.slow, Workplace(2), lambda: time.monotonic() > begun + 1.0))
+    assert time.monotonic() - begun < 10.0
+
+
+def test_fewer_than_one_worker_is_told():
+    with pytest.raises(InputError, match="--workers: 0; expected 1 or more"):
+        Workplace(0)
+
+
+def test_a_scheduler_that_does_not_answer_is_told(chores, monkeypatch):
+    monkeypatch.setattr(pool, "_ANSWERS", "500ms")
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        with pytest.raises(InputError, match="--scheduler: .* does not answer"):
+            list(run(numbers(1), chores.square, Workplace(1, address)))
+
+
+@pytest.fixture
+def cluster(chores, tmp_path):
+    """A scheduler and two workers as processes of their own: (address, processes)."""
+    pytest.importorskip("distributed")
+    where = tmp_path / "scheduler.json"
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1",
+               "--no-dashboard", "--scheduler-file", str(where)]  # fmt: skip
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    processes = [subprocess.Popen(command, **quiet)]
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(where), "--nthreads", "1",
+               "--no-dashboard", "--no-nanny"]  # fmt: skip
+    processes += [subprocess.Popen(command, **quiet) for _ in range(2)]
+    deadline = time.monotonic() + 60.0
+    while not (where.is_file() and where.stat().st_size):
+        assert time.monotonic() < deadline, "no scheduler came up"
+        time.sleep(0.05)
+    import json
+
+    yield json.loads(where.read_text())["address"], processes
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def test_a_cluster_does_the_same_though_a_worker_is_killed_midway(chores, cluster):
+    address, processes = cluster
+    tasks = [(n, (0.1,)) for n in range(30)]
+    found, killed = {}, False
+    for key, pid in run(tasks, chores.slow, Workplace(1, address)):
+        found[key] = pid
+        if len(set(found.values())) == 2 and not killed:
+            killed = True
+            os.kill(processes[1].pid, signal.SIGKILL)
+    assert killed and set(found) == set(range(30))
+    assert all(isinstance(pid, int) for pid in found.values())
+    assert sorted(run(numbers(9), chores.square, Workplace(1, address))) == [(n, n * n) for n in range(9)]
+
+
+@pytest.mark.parametrize("gone, told", [([0, 1, 2], "the scheduler went away"), ([1, 2], "no worker for 1 s")])
+def test_a_cluster_that_goes_away_is_told(chores, cluster, monkeypatch, gone, told):
+    address, processes = cluster
+    monkeypatch.setattr(pool, "PATIENCE", 1.0)
+    threading.Timer(2.0, lambda: [processes[number].kill() for number in gone]).start()
+    with pytest.raises(InputError, match=f"--scheduler: {told}"):
+        list(run([(n, (60.0,)) for n in range(4)], chores.slow, Workplace(1, address)))

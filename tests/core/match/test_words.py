@@ -1,0 +1,177 @@
+"""Words of everybody: from touches of a made match, and their text form."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation import validate
+from beyond_mocap.annotation.event_words import TABLE, read_event_words
+from beyond_mocap.ball.tracked.planted import planted_match
+from beyond_mocap.ball.tracked.planted_feed import sampled
+from beyond_mocap.ball.tracked.solve import SolvedTouch
+from beyond_mocap.errors import InputError
+from beyond_mocap.files.match_data import Match, MatchPlayer, Team
+from beyond_mocap.match.words import (
+    LEAST_CONFIDENCE, NEAREST, TOUCHES, USER, Moment, apart, dribbles, moment_of, timeline_of, words_of,
+)  # fmt: skip
+from beyond_mocap.match.words_text import edited, read_words, write_words
+from beyond_mocap.solve_ball import solve_ball
+
+
+def match_of(feed):
+    """A planted feed as `read_match` would give it."""
+    players = tuple(MatchPlayer(id_, team, id_, i % 11 + 1) for i, (id_, team) in enumerate(zip(feed.ids, feed.teams)))
+    return Match(
+        feed.times, players, feed.positions, feed.ball, feed.length, feed.width, feed.fps, "planted",
+        ((float(feed.times[0]), float(feed.times[-1])),), teams=(Team("home"), Team("away")),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def planted():
+    """A made match of 40 s, what was made of it, and the words."""
+    truth = planted_match(40.0, seed=3)
+    match = match_of(sampled(truth, noise=0.03))
+    solved = solve_ball(match)
+    return truth, match, solved, words_of(match, solved)
+
+
+def touch(kind="kick", part="foot", height=0.11, time=1.0, after=(10.0, 0.0, 0.0), sure=0.9):
+    return SolvedTouch(time, 0.01, "a", part, kind, [0.0, 0.0, height], [0.0, 0.0, 0.0], after, sure)
+
+
+def running(speed):
+    times = np.arange(50) / 25
+    return times, np.column_stack([times * speed, np.zeros(50)])
+
+
+@pytest.mark.parametrize("kind, part, height, speed, known, expected", [
+    ("kick", "foot", 0.11, 0.5, True, "kick standing low"),
+    ("kick", "foot", 0.9, 5.0, True, "kick running high"),
+    ("kick", "foot", 0.9, 5.0, False, "kick running"),
+    ("receive", "foot", 0.2, 5.0, True, "receive foot low"),
+    ("receive", "foot", 0.2, 5.0, False, "receive foot"),
+    ("header", "head", 1.8, 0.0, True, "header standing"),
+    ("header", "head", 2.3, 4.0, True, "header running jump"),
+    ("chest", "chest", 1.2, 0.0, True, "receive body"),
+    ("throw-in", "hand", 2.0, 0.0, False, "throwb high"),
+    ("hand", "hand", 1.0, 0.0, True, "catchb middle"),
+    ("save", "hand", 1.8, 0.0, True, "stomp high"),
+    ("dribble", "foot", 0.1, 3.0, True, None),
+    ("deflection", "foot", 0.1, 3.0, True, None),
+])
+def test_a_touch_gets_the_words_of_the_table(kind, part, height, speed, known, expected):
+    found = moment_of(touch(kind, part, height), *running(speed), known, read_event_words())
+    assert (found and " ".join(found.words)) == expected
+
+
+def test_a_save_that_holds_the_ball_is_a_catch():
+    found = moment_of(touch("save", "hand", 0.3, after=(0.5, 0, 0)), *running(0.0), True, read_event_words())
+    assert found.words == ("catchb", "low")
+
+
+def test_most_planted_touches_come_back_as_words_of_their_player(planted):
+    truth, match, solved, words = planted
+    wanted = [one for one in truth.touches if one.word in ("kick", "receive", "header", "throw-in")]
+    named = {"kick": "kick", "receive": "receive", "header": "header", "throw-in": "throwb"}
+    found = sum(
+        any(named[one.word] in m.words and abs(m.time - one.time) < 0.15 for m in words.players[one.player])
+        for one in wanted
+    )
+    assert len(wanted) >= 15 and found >= 0.6 * len(wanted)
+    assert set(words.players) == set(truth.ids) and all(
+        m.source == TOUCHES and LEAST_CONFIDENCE <= m.confidence <= 1.0 for ms in words.players.values() for m in ms
+    )
+    for player in match.players:
+        validate(words.timeline(player.id), start=0.0, end=40.0)
+
+
+def test_without_a_ball_nobody_has_words(planted):
+    assert not any(words_of(planted[1], None).players.values())
+
+
+def test_key_moments_of_one_player_keep_apart_and_the_surer_one_stays():
+    sure, unsure = Moment(1.0, ("kick",), TOUCHES, 0.9), Moment(1.3, ("kick",), TOUCHES, 0.5)
+    other = Moment(1.0 + NEAREST, ("receive", "foot"), TOUCHES, 0.4)
+    assert apart([unsure, other, sure]) == [sure, other]
+
+
+def test_touches_in_a_row_are_one_dribble():
+    kinds = [(1.0, "receive"), (1.7, "dribble"), (2.5, "dribble"), (3.2, "kick"), (4.0, "receive"), (5.5, "kick")]
+    (found,) = dribbles([touch(kind, time=time) for time, kind in kinds])
+    assert (found.time, found.end, found.words) == (1.0, 3.2, ("dribble",))
+    assert dribbles([touch("receive", time=1.0), touch("kick", time=2.5)]) == []
+
+
+def test_a_timeline_is_cut_to_its_span():
+    moments = [Moment(1.0, ("kick",), TOUCHES, 1.0), Moment(2.0, ("dribble",), TOUCHES, 1.0, 6.0)]
+    timeline = timeline_of(moments, 1.5, 4.0)
+    assert not timeline.keys and [(span.start, span.end) for span in timeline.spans] == [(2.0, 4.0)]
+
+
+# --- the text form
+
+
+def test_words_come_back_from_their_file(tmp_path, planted):
+    words = planted[3]
+    player = max(words.players, key=lambda one: len(words.players[one]))
+    moments = words.players[player]
+    write_words(tmp_path / "p.txt", player, moments)
+    assert not edited(tmp_path / "p.txt") and not edited(tmp_path / "none.txt")
+    assert read_words(tmp_path / "p.txt", moments) == moments
+    assert {m.source for m in read_words(tmp_path / "p.txt")} == {USER}
+
+
+def test_edits_are_seen_and_kept(tmp_path):
+    moments = (Moment(1.5, ("kick", "low"), TOUCHES, 0.75), Moment(3.0, ("header",), TOUCHES, 0.5))
+    file = tmp_path / "p.txt"
+    write_words(file, "home_7", moments)
+    text = file.read_text()
+    assert "1.5 kick low  # touches 0.75" in text
+    file.write_text(text.replace("3 header  # touches 0.50\n", "3.2 header jump\n"))
+    assert edited(file)
+    kept, changed = read_words(file, moments)
+    assert kept == moments[0] and changed == Moment(3.2, ("header", "jump"), USER, 1.0)
+    file.write_bytes(text.replace("\n", "\r\n").encode())  # another editor's line ends are no edit
+    assert not edited(file)
+    file.write_text("1.0 kcik\n")
+    assert edited(file)
+    with pytest.raises(InputError, match=r"p\.txt:1: the word 'kcik'.*kick"):
+        read_words(file)
+
+
+# --- the table
+
+
+def test_the_most_telling_row_counts(tmp_path):
+    file = tmp_path / "own.csv"
+    file.write_text("# mine\nkind,part,detail,words\npass,,,kick\npass,head,,header {jump}\npass,,throw-in,throwb\n")
+    table = read_event_words(file)
+    assert table.words("pass") == table.words("pass", "chest") == ("kick",)
+    assert table.words("pass", "head", filled_in={"jump": "jump"}) == ("header", "jump")
+    assert table.words("pass", "head") == ("header",)
+    assert table.words("pass", "head", ["throw-in"]) == ("throwb",)
+    assert table.words("shot") == ()
+
+
+@pytest.mark.parametrize("text, part", [
+    ("", "no rows"),
+    ("kind,words\n", ":1: columns 'kind,words'"),
+    ("kind,part,detail,words\n", "no rows"),
+    ("kind,part,detail,words\npasses,,,kick\n", ":2: kind 'passes'"),
+    ("kind,part,detail,words\npass,knee,,kick\n", ":2: part 'knee'"),
+    ("kind,part,detail,words\n\n# x\npass,,,kcik\n", ":4: the word 'kcik'"),
+    ("kind,part,detail,words\npass,,,kick {foot}\n", ":2: {foot}"),
+    ("kind,part,detail,words\npass,,,kick\npass,,,header\n", ":3: pass, ,  as in line 2"),
+    ("kind,part,detail,words\npass,,kick\n", ":2: 3 cells"),
+])
+def test_mistakes_in_a_table_get_one_line(tmp_path, text, part):
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_event_words(tmp_path / "t.csv")
+    assert " ".join(part.split()) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_our_own_table_is_read_and_own_words_may_be_added(tmp_path):
+    assert len(read_event_words().rows) > 20 and TABLE.is_file()
+    (tmp_path / "t.csv").write_text("kind,part,detail,words\npass,,,rabona\n")
+    assert read_event_words(tmp_path / "t.csv", ["rabona"]).words("pass") == ("rabona",)
