@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,8 +44,9 @@ class PlayerResult:
 
     @property
     def called(self) -> str:
-        """Number and name, as the page says it."""
-        return " ".join(part for part in (self.number, self.name or self.id) if part)
+        """Number and name, as the page says it; where the name has the number in it, the name alone."""
+        name = self.name or self.id
+        return name if not self.number or self.number in re.findall(r"\d+", name) else f"{self.number} {name}"
 
 
 @dataclass(frozen=True)

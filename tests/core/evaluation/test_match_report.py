@@ -129,6 +129,14 @@ def test_failed_and_unreadable_players_are_marked_and_the_rest_is_told(tmp_path)
     assert "no &lt;bones&gt; &amp; no luck" in text and "cannot be read" in text and "file-d.report.json is missing" in text
 
 
+def test_what_all_reports_say_is_told_once_and_not_counted(tmp_path):
+    reports = {name: report() for name in ("a", "b", "c")}
+    for name, one in reports.items():
+        one["warnings"] = ["unit guessed", f"only {name} slides"]
+    text = page(written(tmp_path, reports))
+    assert text.count("unit guessed") == 1 and all(text.count(f"only {name} slides") == 1 for name in reports)
+
+
 def test_a_player_who_comes_late_and_unknown_values(tmp_path):
     late = {"start_s": FIRST + 50.0, "root_error_m": [0.002, None, 0.09], "skate_cm_s": [1.0], "overlap_m": "none"}
     one = {**report(), "per_second": late}
