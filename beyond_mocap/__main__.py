@@ -18,9 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from . import __version__
-from .commands import (
-    matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches,
-)  # fmt: skip
+from .commands import matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches
 from .commands.numbers import between, positive, rate
 from .commands.outputs import Writer, check_outputs, writer_of
 from .commands.told import Told

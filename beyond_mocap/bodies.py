@@ -238,7 +238,7 @@ class _Body:
         own_speed = np.linalg.norm(shown.velocity, axis=1)
         moving = [np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0) for speed in (track.speed, own_speed)]
         going = moving[0] ** 2 * moving[1] ** 2
-        travel = track.direction - np.arctan2(shown.velocity[:, 1], shown.velocity[:, 0])
+        travel = track.direction - quaternion.angle_of(shown.velocity[:, 1], shown.velocity[:, 0])
         watch = track.direction + wanted_offset(track)
         weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
         goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)

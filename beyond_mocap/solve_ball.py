@@ -8,7 +8,7 @@ import numpy as np
 
 from .ball.tracked.solve import PITCH, SolvedBall, solve
 from .errors import InputError
-from .files.tracking import Match
+from .files.match_data import REFEREE, Match
 from .motion.track import Track
 
 
@@ -21,7 +21,8 @@ def solve_ball(
 ) -> SolvedBall:
     """Touches and the path of the ball in `source`, or from `start` to `end` seconds of it.
 
-    A track has one player: touches of others have the player "". InputError where the source has no ball then.
+    A track has one player: touches of others have the player "". Referees touch no ball. InputError where the source
+    has no ball then.
     """
     low, high = -np.inf if start is None else start, np.inf if end is None else end
     part = (source.times >= low) & (source.times <= high)
@@ -35,7 +36,9 @@ def solve_ball(
             source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
             pitch=PITCH, progress=progress, cancelled=cancelled,
         )  # fmt: skip
+    playing = [index for index, player in enumerate(source.players) if player.team != REFEREE]
+    players = [source.players[index] for index in playing]
     return solve(
-        source.times[part], source.ball[part], source.positions[:, part], [player.id for player in source.players],
-        [player.team for player in source.players], (source.length, source.width), source.provider, progress, cancelled,
+        source.times[part], source.ball[part], source.positions[playing][:, part], [player.id for player in players],
+        [player.team for player in players], (source.length, source.width), source.provider, progress, cancelled,
     )  # fmt: skip

@@ -44,8 +44,9 @@ def ball_samples(records) -> np.ndarray:
     return out
 
 
-def clock(records) -> tuple[np.ndarray, list[tuple[float, float]]]:
-    """Seconds of every frame (N,) on one clock for all periods, and each period's (start, end) on it."""
+def clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
+    """Seconds of every frame (N,) on one clock for all periods; and of each period its start and end on it, its number
+    and the seconds that had passed at its first frame."""
     period = np.array([frame.period.id for frame in records])
     seconds = np.array([frame.timestamp.total_seconds() for frame in records])
     times, spans = np.empty(len(records)), []
@@ -53,7 +54,7 @@ def clock(records) -> tuple[np.ndarray, list[tuple[float, float]]]:
         members = period == number_
         begin = spans[-1][1] + _PERIOD_BREAK if spans else 0.0
         times[members] = seconds[members] - seconds[members].min() + begin
-        spans.append((begin, float(times[members].max())))
+        spans.append((begin, float(times[members].max()), number_, float(seconds[members].min())))
     return times, spans
 
 

@@ -38,6 +38,17 @@ class MatchPlayer:
     position: str = ""
 
 
+@dataclass(frozen=True)
+class Half:
+    """A period on its provider's clock. number: 1 for the first half, 3 and 4 in extra time. zero: the second of the
+    match at which this clock stands at 0, before `start` where the file begins later. start, end: its frames, s."""
+
+    number: int
+    zero: float
+    start: float
+    end: float
+
+
 @dataclass(frozen=True, eq=False)
 class Match:
     """Everybody's samples, N times and P players, as the feed has them (not cleaned).
@@ -46,8 +57,9 @@ class Match:
     before. players: P of them. positions: (P, N, 2) metres, NaN where a player is not there. ball: (N, 3) metres, NaN
     where unknown. length, width: of the pitch, metres. fps: the feed's rate. provider: whose form it was. periods:
     (start, end) seconds. notes: what was guessed, for people. teams: home, away, and referees where there are any.
-    report: the data report, a line each: what was guessed, what was put right, who is there for how long. Arrays are
-    read-only.
+    report: the data report, a line each: what was guessed, what was put right, who is there for how long. passed: for
+    each period its number and the seconds that had passed at its first frame, () where they are 1, 2, ... from their
+    begin. Arrays are read-only.
     """
 
     times: np.ndarray
@@ -62,6 +74,15 @@ class Match:
     notes: tuple[str, ...] = ()
     teams: tuple[Team, ...] = ()
     report: tuple[str, ...] = ()
+    passed: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def halves(self) -> tuple[Half, ...]:
+        """The periods with their numbers and clocks."""
+        passed = self.passed or tuple((number, 0.0) for number in range(1, len(self.periods) + 1))
+        return tuple(
+            Half(number, start - before, start, end) for (number, before), (start, end) in zip(passed, self.periods)
+        )
 
     def track(self, player_id: str, start: float | None = None, end: float | None = None) -> Track:
         """One player and the ball between two times (seconds, whole match by default), from when he is first there.

@@ -14,7 +14,10 @@ _HIGHEST = 60.0  # m
 _FROZEN = 30.0  # s at one place to the last digit: a sample kept for somebody who is not there
 _APART = 5.0  # m between the teams' mean places along the pitch that tell their ends
 _SAMPLED = 25  # every how manieth sample is enough for means over a half
-_LIKE = 0.3  # correlation of the players' places across the pitch from which halves are told apart
+_LEAST = 60.0  # s of frames that a half must have for its means to tell anything
+_LIKE = 0.5  # correlation of the players' places across the pitch from which halves are told apart
+_SIDES = ("left", "right")
+_WRONG_SIDE = 5.0  # m by which the left have to stand to the right of the right
 _FEWEST = 6  # players in both halves that tell of it
 
 
@@ -41,7 +44,7 @@ def mended_players(times, positions, length: float, width: float, ids) -> tuple[
     with np.errstate(invalid="ignore"):
         beside = (np.abs(out) > np.array([length, width]) / 2.0 + _BESIDE).any(axis=2)
     for index, name in enumerate(ids):
-        frozen = _frozen(times, out[index])
+        frozen = _frozen(times, out[index]) & ~beside[index]
         for what, flags in (("beside the pitch", beside[index]), ("at one place to the last digit", frozen)):
             if flags.any():
                 out[index, flags] = np.nan
@@ -77,8 +80,9 @@ def mended_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
     teams = np.array(teams)
     for first in range(0, len(periods) - 1, 2):
         parts = [slice(*np.searchsorted(times, [start - 1e-6, end + 1e-6])) for start, end in periods[first : first + 2]]
-        ends = [_end(positions[:, part], teams) for part in parts]
-        if 0.0 in ends:
+        ends = [home_end(positions[:, part], teams) for part in parts]
+        interval = float(np.median(np.diff(times)))
+        if 0.0 in ends or min(part.stop - part.start for part in parts) * interval < _LEAST:
             continue
         signs = np.ones(2)
         if ends[0] == ends[1]:
@@ -102,7 +106,7 @@ _TOLD = {
 }
 
 
-def _end(positions: np.ndarray, teams: np.ndarray) -> float:
+def home_end(positions: np.ndarray, teams: np.ndarray) -> float:
     """Which end the home team keeps: -1 where x is negative, 1 the other, 0 where it cannot be told."""
     middles = []
     for ground in ("home", "away"):
@@ -128,3 +132,18 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> float:
     a, b = one[both], other[both]
     size = np.sqrt((a**2).sum() * (b**2).sum())
     return float((a * b).sum() / size) if np.count_nonzero(both) >= _FEWEST and size > 1.0 else 0.0
+
+
+def side_lines(times, positions, periods, teams, called) -> list[str]:
+    """A line where players whom the lineup calls left stand to the right of those it calls right, over the first half,
+    looking where their team attacks. positions (P, N, 2) m put right; called: P position words."""
+    part = slice(*np.searchsorted(times, [periods[0][0] - 1e-6, periods[0][1] + 1e-6]))
+    end = home_end(positions[:, part], np.array(teams))
+    if not end or (part.stop - part.start) * float(np.median(np.diff(times))) < _LEAST:
+        return []
+    attack = np.where(np.array(teams) == "home", -end, end)
+    across = _across(positions[:, part]) * attack
+    sides = {side: [y for y, said in zip(across, called) if side in said.split() and np.isfinite(y)] for side in _SIDES}
+    if min(map(len, sides.values())) < 2 or np.mean(sides["left"]) - np.mean(sides["right"]) > -_WRONG_SIDE:
+        return []
+    return ["players called left stand on the right: the file may be mirrored side to side, or the lineup"]

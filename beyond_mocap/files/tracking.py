@@ -20,8 +20,9 @@ from ..motion.track import Track
 from . import match_arrays
 from .match_checks import check_periods, check_players, check_same_match, whole_lines
 from .match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
-from .match_mending import mended_ball, mended_players, mended_sides
+from .match_mending import mended_ball, mended_players, mended_sides, side_lines
 from .providers import Feed, feed_of, load
+from .referees import described_referee, referee_samples
 from .tables import number, read_rows
 from .team_colours import team_colours
 from .whole import atomic_write
@@ -128,11 +129,14 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward)
     ball = match_arrays.ball_samples(records)
     ball = np.concatenate([metric(ball[:, :2]), ball[:, 2:] * match_arrays.height_unit(dataset)], axis=1)
-    who = [match_arrays.described(player) for player in players]
-    positions = metric(match_arrays.player_samples(records, players))
+    referees, places = referee_samples(feed, np.array([frame.frame_id for frame in records]))
+    who = [*map(match_arrays.described, players), *map(described_referee, referees)]
+    positions = metric(np.concatenate([match_arrays.player_samples(records, players), places]))
     positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
     ball, of_ball = mended_ball(ball, length, width)
-    positions, ball, turned = mended_sides(times, positions, ball, periods, [one[1] for one in who])
+    spans, teams = [one[:2] for one in periods], [one[1] for one in who]
+    positions, ball, turned = mended_sides(times, positions, ball, spans, teams)
+    turned += side_lines(times, positions, spans, teams, [one[4] for one in who])
     return {
         "times": times,
         "positions": positions,
@@ -169,9 +173,10 @@ def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match
         width=width,
         fps=fps,
         provider=feed.provider,
-        periods=tuple(map(tuple, arrays["periods"].tolist())),
+        periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()),
         notes=tuple(notes),
         teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
+        passed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
     )
     return replace(match, report=(*notes, *arrays["lines"].tolist(), *presence_lines(match)))
 
@@ -200,8 +205,8 @@ def _cached(cache: Path) -> dict[str, np.ndarray] | None:
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
         return None
     count, who = len(arrays["times"]), arrays["players"].shape
-    fits = arrays["positions"].shape == (who[0], count, 2) and arrays["ball"].shape == (count, 3)
-    return arrays if fits and who[1:] == (5,) and arrays["pitch"].shape == (4,) else None
+    fits = arrays["pitch"].shape == (4,) and arrays["positions"].shape == (who[0], count, 2) and arrays["ball"].shape == (count, 3)
+    return arrays if fits and who[1:] == (5,) and arrays["periods"].shape[1:] == (4,) else None
 
 
 def _keep(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:

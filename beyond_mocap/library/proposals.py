@@ -118,7 +118,7 @@ def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
     limits = np.array([speed for _, speed in gaits][1:])
     middle = np.concatenate([[0.0], 0.5 * (limits[1:] + limits[:-1]), [limits[-1] + 1.0]]) if len(limits) else [0.0]
     gait = automatic_gaits(seen.speed, fps, middle, limits, hysteresis=0.1, minimum=_SHORTEST)
-    off = quaternion.wrapped(np.arctan2(seen.path[:, 1], seen.path[:, 0]) - seen.facing)
+    off = quaternion.wrapped(quaternion.angle_of(seen.path[:, 1], seen.path[:, 0]) - seen.facing)
     quarter = without_short_runs(np.round(off / (np.pi / 2.0)).astype(int) % 4, int(_SHORTEST * fps))
     way = np.where(np.array([words[g] == "standing" for g in gait]), -1, quarter)
     kind = without_short_runs(gait * 5 + way + 1, int(_SHORTEST * fps))

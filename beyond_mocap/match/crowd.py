@@ -17,7 +17,7 @@ import numpy as np
 
 from ..motion.motion import Motion
 from ..motion.runs import runs
-from ..polish.crowd.capsules import capsules, lines, touching
+from ..polish.crowd.capsules import FAR, capsules, lines, touching
 from ..polish.crowd.correction import CURVES, Correction, carried
 from ..polish.crowd.episodes import Episode, joined_spans
 from ..polish.crowd.pushing import ALLOWED, CrowdBody, moved, pushed
@@ -26,7 +26,6 @@ REACH = 1.5
 """Seconds before and behind an overlap within which something is changed."""
 
 PASSES = 3
-_NEAR = 2.5  # m between two bodies' hips beyond which they cannot touch
 
 
 def kept_apart(
@@ -95,7 +94,7 @@ def _near_pairs(placed: Sequence[np.ndarray]) -> list[tuple[int, int, np.ndarray
     found = []
     for one in range(len(hips) - 1):
         off = hips[one + 1 :] - hips[one]
-        near = np.einsum("ptk,ptk->pt", off, off) < _NEAR**2
+        near = np.einsum("ptk,ptk->pt", off, off) < FAR**2
         found += [(one, one + 1 + int(row), np.flatnonzero(near[row])) for row in np.flatnonzero(near.any(axis=1))]
     return found
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..ball.tracked.solve import SolvedBall
 from ..errors import BeyondMocapError, Cancelled, InputError
+from ..files.events import read_events
 from ..files.match_data import Match
 from ..files.tables import write_ball
 from ..files.tracking import read_match
@@ -120,8 +121,7 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     solved = _solved(job, match, span, _part(report, "ball"))
     state.took("ball", begin)
     clock = time.perf_counter()
-    words = words_of(match, solved)
-    state.told["notes"] += words.notes
+    words = _words(job, match, solved)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
     names = file_names(player.id for player in match.players)
@@ -152,6 +152,19 @@ def _solved(job: stages.Job, match: Match, span: tuple[float, float], report: Pr
     except InputError as error:
         job.state.told["notes"].append(f"the ball is not solved: {error}")
         return None
+
+
+def _words(job: stages.Job, match: Match, solved: SolvedBall | None) -> MatchWords:
+    """Everybody's words, from touches and, where there are some, events."""
+    events, told = None, job.state.told
+    if job.order.events is not None:
+        events = read_events(job.order.events, match=match)
+        if solved is None:
+            told["notes"].append(f"{job.order.events}: not used, since no touch of the ball tells how its clock goes")
+    words = words_of(match, solved, events)
+    told["notes"] += words.notes
+    told["events"] = dict(words.figures) or None
+    return words
 
 
 def _touches(words: MatchWords) -> dict[str, list[float]]:

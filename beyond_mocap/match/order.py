@@ -26,7 +26,7 @@ class MatchOrder:
     of every random choice. nearest: whether words that the library lacks give way to the nearest it has. solve_touches:
     whether the ball is solved. annotations: folder with a text for players (ID.txt), instead of automatic words.
     bvh: whether every player is written as BVH too; figures: whether reports, provenance and the page are made. window,
-    overlap: seconds that a piece of the search has, and on either side of it. workers, scheduler: `pool.Workplace`.
+    overlap: seconds that a piece of the search has, and on either side of it. variety: as a plan has it. workers, scheduler: `pool.Workplace`.
     InputError for numbers outside their limits and a span that ends before it begins.
     """
 
@@ -51,6 +51,7 @@ class MatchOrder:
     figures: bool = True
     window: float = 60.0
     overlap: float = 4.0
+    variety: float = 0.4
     workers: int = 1
     scheduler: str = ""
 
@@ -67,7 +68,8 @@ class MatchOrder:
         return {name: value.as_posix() if isinstance(value, Path) else value for name, value in asdict(self).items()}
 
 
-_RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "window", "overlap")
+_RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "window", "overlap",
+            "variety")
 _FILES = ("tracking", "meta", "events")
 
 

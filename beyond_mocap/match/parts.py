@@ -73,7 +73,7 @@ def _plan(role: Role, number: int, moments, solved: SolvedBall | None, order: Ma
     start, end = float(track.times[0]), float(track.times[-1])
     timeline: Timeline = timeline_of(moments, start, end)
     plan = Plan(
-        track=track, timeline=timeline, library=str(order.library), nearest=order.nearest, seed=order.seed,
-        fps=order.fps, solve_touches=solved is not None,
+        track=track, timeline=timeline, library=str(order.library), nearest=order.nearest, seed=order.seed + role.number,
+        fps=order.fps, solve_touches=solved is not None, variety=order.variety,
     )
     return kept(plan if solved is None else replace(plan, solved=course_of(solved, role.player.id, plan)))

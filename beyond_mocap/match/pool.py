@@ -15,6 +15,7 @@ import contextlib
 import logging
 import os
 import signal
+import sys
 import threading
 import time
 from collections import deque
@@ -49,6 +50,14 @@ class Failed:
     reason: str
 
 
+@dataclass(frozen=True, eq=False)
+class Done:
+    """A piece of work that was tried: its result, and the MB that its process has needed at most so far."""
+
+    result: object
+    memory: float = 0.0
+
+
 @dataclass(frozen=True)
 class Workplace:
     """Where work is done. workers: processes on this machine, 1: this process itself; scheduler: address of a Dask
@@ -63,45 +72,65 @@ class Workplace:
 
 
 def run(
-    tasks: Iterable[Task], work: Work, place: Workplace, cancelled: Callable[[], bool] | None = None
+    tasks: Iterable[Task], work: Work, place: Workplace, cancelled: Callable[[], bool] | None = None,
+    memory: Callable[[float], None] | None = None,
 ) -> Iterator[tuple[object, object]]:
     """(key, result) of every task, as they end, in any order; the result is `Failed` where `work` raises.
 
     tasks: taken one by one, only as far as workers are free for them. work: a function of a module, which other
-    processes can import by its name. Raises Cancelled soon after `cancelled()` says so, InputError where the cluster
+    processes can import by its name. memory: is told, with each result, the MB that its process has needed so far.
+    Raises Cancelled soon after `cancelled()` says so, InputError where the cluster
     does not answer, has no workers, or goes away. Closing the iterator, or an error, ends what is still being done.
     """
     stop = cancelled or (lambda: False)
     if place.scheduler:
         with _cluster(place.scheduler) as client:
-            yield from _spread(iter(tasks), work, _Cluster(client), stop)
+            yield from _told(_spread(iter(tasks), work, _Cluster(client), stop), memory)
     elif place.workers == 1:
-        yield from _here(tasks, work, stop)
+        yield from _told(_here(tasks, work, stop), memory)
     else:
-        yield from _spread(iter(tasks), work, _Processes(place.workers), stop)
+        yield from _told(_spread(iter(tasks), work, _Processes(place.workers), stop), memory)
 
 
-def attempt(work: Work, arguments: tuple) -> object:
+def _told(done: Iterator[tuple[object, Done]], memory) -> Iterator[tuple[object, object]]:
+    with contextlib.closing(done):
+        for key, one in done:
+            if memory is not None:
+                memory(one.memory)
+            yield key, one.result
+
+
+def attempt(work: Work, arguments: tuple) -> Done:
     """What `work` gives for `arguments`, or why it gives nothing. Errors are told as text, since not every error comes
     through to another process. Raises Cancelled."""
     try:
-        return work(*arguments)
+        result = work(*arguments)
     except Cancelled:
         raise
     except BeyondMocapError as error:
-        return Failed(str(error))
+        result = Failed(str(error))
     except Exception as error:  # a fault of one piece must not cost the others
-        return Failed(" ".join(f"{type(error).__name__}: {error}".split()))
+        result = Failed(" ".join(f"{type(error).__name__}: {error}".split()))
+    return Done(result, peak_memory())
 
 
-def _here(tasks: Iterable[Task], work: Work, stop: Callable[[], bool]) -> Iterator[tuple[object, object]]:
+def peak_memory() -> float:
+    """MB that this process has needed at most; 0 where the system does not tell (Windows)."""
+    try:
+        import resource
+    except ImportError:
+        return 0.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1024.0)
+
+
+def _here(tasks: Iterable[Task], work: Work, stop: Callable[[], bool]) -> Iterator[tuple[object, Done]]:
     for key, arguments in tasks:
         if stop():
             raise Cancelled("cancelled")
         yield key, attempt(work, arguments)
 
 
-def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Iterator[tuple[object, object]]:
+def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Iterator[tuple[object, Done]]:
     """The loop over one place's workers: keeps them busy, hands on what is done, and does again what was lost.
 
     After a break all that was in hand is done again; after several the pieces go one by one, so that the one that ends
@@ -128,7 +157,7 @@ def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Iterator[tuple[ob
                     yield task[0], _result(future)
                 elif alone:
                     place.renew()
-                    yield task[0], Failed("its worker process ended; is there too little memory?")
+                    yield task[0], Done(Failed("its worker process ended; is there too little memory?"))
                 else:
                     lost.append(task)
             if lost:
@@ -151,12 +180,12 @@ def _is_broken(future: Future) -> bool:
     return future.cancelled() or isinstance(future.exception(), (BrokenExecutor, CancelledError))
 
 
-def _result(future: Future) -> object:
+def _result(future: Future) -> Done:
     """What a future gives; a failure of the place rather than of the work is a failure of this piece."""
     try:
         return future.result()
     except Exception as error:  # such as a result that cannot be sent
-        return Failed(f"its worker gave no result ({' '.join(f'{type(error).__name__}: {error}'.split())[:200]})")
+        return Done(Failed(f"its worker gave no result ({' '.join(f'{type(error).__name__}: {error}'.split())[:200]})"))
 
 
 class _Processes:

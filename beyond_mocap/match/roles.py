@@ -23,13 +23,15 @@ SHORTEST = 1.0
 class Role:
     """A player who is to be made. player: who; measured: his cleaned tracks, one for each stretch in which he is there,
     each from a frame of the match's clock (a whole number of 1 / fps seconds) to another; asked: the same, pushed out
-    of others' ways. notes: lines on what was put right. reason: why he cannot be made, else ""."""
+    of others' ways. notes: lines on what was put right. reason: why he cannot be made, else "". number: his place in
+    the match, by which he differs from others."""
 
     player: MatchPlayer
     measured: tuple[Track, ...] = ()
     asked: tuple[Track, ...] = ()
     notes: tuple[str, ...] = ()
     reason: str = ""
+    number: int = 0
 
 
 def span_of(match: Match, order: MatchOrder) -> tuple[float, float]:
@@ -50,14 +52,17 @@ def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tupl
     for wanted in order.players:
         if wanted not in known:
             raise InputError("--players", f"{wanted!r}", f"some of {', '.join(known)}")
-    asked = [player for player in match.players if not order.players or player.id in order.players]
-    roles = [role for player in asked if (role := _role(match, player, span, order.fps)) is not None]
+    asked = [
+        (number, player) for number, player in enumerate(match.players)
+        if not order.players or player.id in order.players
+    ]  # fmt: skip
+    roles = [role for which in asked if (role := _role(match, *which, span, order.fps)) is not None]
     if not roles:
         raise InputError("--from, --to", f"nobody is there from {span[0]:g} to {span[1]:g} s", "a time of play")
     return tuple(roles)
 
 
-def _role(match: Match, player: MatchPlayer, span: tuple[float, float], fps: float) -> Role | None:
+def _role(match: Match, number: int, player: MatchPlayer, span: tuple[float, float], fps: float) -> Role | None:
     """The role of a player; None where he is not there for SHORTEST."""
     tracks, notes = [], []
     try:
@@ -68,8 +73,8 @@ def _role(match: Match, player: MatchPlayer, span: tuple[float, float], fps: flo
                 tracks.append(_cut(track, begin, end, fps))
                 notes += found.lines
     except InputError as error:
-        return Role(player, reason=str(error))
-    return Role(player, tuple(tracks), tuple(tracks), tuple(notes)) if tracks else None
+        return Role(player, reason=str(error), number=number)
+    return Role(player, tuple(tracks), tuple(tracks), tuple(notes), number=number) if tracks else None
 
 
 def _on_frames(start: float, end: float, fps: float) -> tuple[float, float]:

@@ -50,7 +50,7 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
         library = searched_library(library, unit.plan)
         plan = in_library_size(unit.plan, size_of(unit.plan, library.skeleton))
         order = wanted(library, plan)
-        search = PathSearch(library, order, balanced(plan.alpha), cancelled=cancelled, hurry=hurry)
+        search = PathSearch(library, order, balanced(plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
         edit = exact_keys(library, search.run(), order)
     return Piece(
         unit.player, unit.stretch, unit.number, unit.first, unit.own, named(library, edit, plan.timeline.keys),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ from ..files.match_data import Match
 from .folder import MatchFolder
 from .order import MatchOrder
 from .parts import Part
+from .pool import peak_memory
 
 EVERY = 1.0
 """Seconds between two writings of a state in which only the number of done windows has changed."""
@@ -25,6 +25,7 @@ class MatchState:
     told: dict
     players: dict[str, dict] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    worker_memory: float = 0.0
     _written: float = 0.0
 
     def player(self, player: str, **news) -> None:
@@ -46,9 +47,14 @@ class MatchState:
     def write(self) -> None:
         """Writes match.json."""
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
-        told = {**self.told, "players": rows, "seconds": self.seconds, "peak_memory_mb": peak_memory()}
+        memory = {"main": round(peak_memory(), 1), "worker": round(self.worker_memory, 1)}
+        told = {**self.told, "players": rows, "seconds": self.seconds, "peak_memory_mb": memory}
         self.folder.tell(told)
         self._written = time.monotonic()
+
+    def needed(self, memory: float) -> None:
+        """A worker has needed so many MB."""
+        self.worker_memory = max(self.worker_memory, memory)
 
     def took(self, stage: str, begun: float) -> None:
         """A stage that began at `begun` (time.perf_counter) is done."""
@@ -84,15 +90,3 @@ def row_of(part: Part) -> dict:
         "stretches_s": [[float(track.times[0]), float(track.times[-1])] for track in role.measured],
         "units": 0, "units_done": 0, "data": list(role.notes),
     }  # fmt: skip
-
-
-def peak_memory() -> dict[str, float]:
-    """MB that this process, and the largest of those it has started and seen the end of, have needed at most; nothing
-    where the system does not tell (Windows)."""
-    try:
-        import resource
-    except ImportError:
-        return {}
-    unit = 1e6 if sys.platform == "darwin" else 1024.0
-    who = {"main": resource.RUSAGE_SELF, "worker": resource.RUSAGE_CHILDREN}
-    return {name: round(resource.getrusage(kind).ru_maxrss / unit, 1) for name, kind in who.items()}

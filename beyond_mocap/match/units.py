@@ -22,8 +22,12 @@ from .player_edit import kept
 WINDOW = 60.0
 """Seconds of a window's own part."""
 
-OVERLAP = 4.0
-"""Seconds that it is searched beyond either end: as long as the search remembers what it has shown."""
+OVERLAP = 12.0
+"""Seconds that two neighbours share: two thirds before the edge between them, which the later one needs to find onto the
+way of who comes from further back, and one third behind it."""
+
+RUN_IN = 2.0 / 3.0
+"""Share of the overlap that lies before the edge."""
 
 _SHORTEST = 0.25
 """Share of a window below which the last or the first one goes to its neighbour."""
@@ -34,8 +38,7 @@ class Unit:
     """One player's window of work, with all that is needed to search it.
 
     player: his id. stretch: which of his stretches on the pitch. number: of the window within the stretch. start, end:
-    s on the match's clock of the part that is its own. plan: his order from one overlap before to one behind, as it is
-    in force. first: frame of the plan's first time, at the library's rate from the stretch's first time on. own: (first,
+    s on the match's clock of the part that is its own. plan: his order of that and of the overlaps around it, as `kept`. first: frame of the plan's first time, at the library's rate from the stretch's first time on. own: (first,
     end) frames of its own part, counted in the same way.
     """
 
@@ -53,17 +56,17 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
     """The windows of one stretch of a player: `plan`, whose track's name is his id.
 
     window: seconds; their edges are at multiples of it on the match's clock, to the nearest slot. overlap: seconds that
-    each is searched beyond its edges. Key moments are moved to the touches they mean before the plan is cut. InputError
+    two neighbours share. Key moments are moved to the touches they mean before the plan is cut. InputError
     for a window or an overlap that leaves no sense.
     """
     _check(window, overlap)
     plan = kept(plan)
     begin, count = float(plan.track.times[0]), frame_count(plan)
     edges = window_edges(begin, count, window)
-    beyond = SLOT * max(1, round(overlap * FPS / SLOT))
+    before, behind = (SLOT * max(1, round(share * overlap * FPS / SLOT)) for share in (RUN_IN, 1.0 - RUN_IN))
     units = []
     for number, (low, high) in enumerate(zip(edges, edges[1:])):
-        first, end = max(0, low - beyond), min(count, high + beyond)
+        first, end = max(0, low - before), min(count, high + behind)
         part = cut_plan(plan, begin + first / FPS, begin + (end - 1) / FPS)
         times = begin + low / FPS, begin + high / FPS
         units.append(Unit(plan.track.name, number, *times, part, stretch, first, (low, high)))

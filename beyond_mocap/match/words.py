@@ -1,6 +1,6 @@
 """What everybody does with the ball and when, as words: from solved touches, and from a provider's events.
 
-    words = words_of(match, solve_ball(match), None)
+    words = words_of(match, solve_ball(match), read_events("events.xml", match=match))
     timeline = words.timeline("home_7", 0.0, 60.0)
 """
 
@@ -15,7 +15,9 @@ import numpy as np
 from ..annotation import KeyMoment, Span, Timeline
 from ..annotation.event_words import EventWords, read_event_words
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
+from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
 from ..files.match_data import Match
+from .event_clock import AlignedEvents, aligned
 
 LEAST_CONFIDENCE = 0.3
 """Touches of less make no key moment."""
@@ -32,7 +34,9 @@ _JUMP = 2.05  # m of the ball's centre, which nobody heads standing
 _CAUGHT = 3.0  # m/s of the ball after a save that held it
 _CHAIN = 3.0  # s between touches of one dribble
 _SHORTEST = 0.8  # s of a dribble
-_SENT = {"pass", "shot", "clearance"}
+_FORGETS = 0.2  # of what is doubtful in a touch, with an event that tells of it too
+_TOLD = 0.4  # confidence in an event without a touch
+_SHOWN_BY = 0.5  # s from an event without a touch within which another moment of the player shows it
 _LIKE_EVENT = {  # kind of a touch -> kind, details of an event like it
     "kick": ("pass", ()), "receive": ("receive", ()), "dribble": ("dribble", ()), "header": ("pass", ()),
     "chest": ("receive", ()), "throw-in": ("pass", ("throw-in",)), "hand": ("catch", ()), "save": ("save", ()),
@@ -77,28 +81,68 @@ def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = 
     return Timeline(tuple(spans), tuple(keys))
 
 
-def words_of(match: Match, solved: SolvedBall | None, table: EventWords | None = None) -> MatchWords:
-    """Everybody's moments. solved: the ball, on the match's clock; None where it cannot be solved. table: from what
-    happened to words, by default the one that comes with us.
+def words_of(
+    match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventWords | None = None
+) -> MatchWords:
+    """Everybody's moments. solved: the ball, on the match's clock; None where it cannot be solved. events: what a
+    provider's people wrote down. table: from what happened to words, by default the one that comes with us.
 
-    A touch becomes a key moment with the words that the table has for it, touches of one player in a row a stretch of
-    dribble. Of two within NEAREST the surer one stays. What is not known (the foot, a height without heights in the
-    feed) is left out of the words.
+    A touch becomes a key moment with the words that the table has for it, or for the event that tells of it too; its
+    time is the touch's. Touches of one player in a row are a stretch of dribble. A pass, shot or save without a touch
+    becomes a key moment at its place on the mended clock. Of two within NEAREST the surer one stays. What is not known
+    (the foot, a height without heights in the feed) is left out of the words. InputError where events fit no better
+    than by chance.
     """
     table = table or read_event_words()
     touches = solved.touches if solved else ()
-    heights = has_heights(match)
-    left_out: Counter[str] = Counter()
-    players = {}
+    span = (float(solved.times[0]), float(solved.times[-1])) if solved else None
+    onto = aligned(events, touches, match.halves, span) if events and solved else None
+    told = {touch: event for event, touch in enumerate(onto.touches) if touch >= 0} if onto else {}
+    heights, left_out, players = has_heights(match), Counter(), {}
     for player, path in zip(match.players, match.positions):
-        own = [touch for touch in touches if touch.player == player.id]
-        found = [moment_of(touch, match.times, path, heights, table) for touch in own]
-        sure = [moment for moment in found if moment and moment.confidence >= LEAST_CONFIDENCE]
-        left_out["doubtful"] += sum(moment is not None for moment in found) - len(sure)
+        own = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
+        found = [
+            moment_of(touch, match.times, path, heights, table, onto.events[told[i]] if i in told else None)
+            for i, touch in own
+        ]
+        found = [moment for moment in found if moment]
+        sure = [moment for moment in found if moment.confidence >= LEAST_CONFIDENCE]
+        sure += _untouched(player.id, onto, span, match.times, path, table, found) if onto else []
         kept = apart(sure)
+        left_out["doubtful"] += sum(moment.confidence < LEAST_CONFIDENCE for moment in found)
         left_out["close"] += len(sure) - len(kept)
-        players[player.id] = ordered([*kept, *dribbles(own)])
-    return MatchWords(players, tuple(_notes(touches, left_out)))
+        players[player.id] = ordered([*kept, *dribbles([touch for _, touch in own])])
+    notes = (*(events.notes if events else ()), *(onto.notes if onto else ()), *_notes(touches, left_out))
+    return MatchWords(players, notes, _figures(onto, touches, span) if onto else {})
+
+
+def _untouched(player: str, onto: AlignedEvents, span, times, path, table, beside) -> list[Moment]:
+    """Moments of one player's events that are touches for certain and have none, but where another moment of his
+    shows the same."""
+    out = []
+    for index, event in enumerate(onto.events):
+        time = float(onto.times[index])
+        if event.player != player or event.kind not in CERTAIN or onto.touches[index] >= 0:
+            continue
+        if not span[0] <= time <= span[1] or any(abs(one.time - time) < _SHOWN_BY for one in beside):
+            continue
+        filled_in = {**seen_words(time, times, path), "side": event.side}
+        words = table.words(event.kind, event.part or "foot", event.details, filled_in)
+        out += [Moment(round(time, 3), words, EVENTS, _TOLD)] * bool(words)
+    return out
+
+
+def _figures(onto: AlignedEvents, touches, span) -> dict[str, object]:
+    """How the events fit: counts, and each period's clock."""
+    inside = [i for i, time in enumerate(onto.times) if span[0] <= time <= span[1] and onto.events[i].played]
+    certain = [i for i in inside if onto.events[i].kind in CERTAIN]
+    off = [touches[onto.touches[i]].time - onto.times[i] for i in inside if onto.touches[i] >= 0]
+    return {
+        "events": len(inside), "with_touch": len(off), "certain": len(certain),
+        "certain_with_touch": sum(onto.touches[i] >= 0 for i in certain),
+        "residual_s": {"median": float(np.median(off)), "sd": float(np.std(off))} if off else None,
+        "clocks": {str(number): vars(clock) for number, clock in onto.clocks.items()},
+    }  # fmt: skip
 
 
 def has_heights(match: Match) -> bool:
@@ -108,24 +152,34 @@ def has_heights(match: Match) -> bool:
 
 
 def moment_of(
-    touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventWords
-) -> Moment | None:
+    touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventWords,
+    event: MatchEvent | None = None,
+) -> Moment | None:  # fmt: skip
     """The key moment of a touch, None where it makes none. times (N,) s and path (N, 2) m of its player; heights:
-    whether the touch's is known."""
+    whether the touch's is known. event: what tells of the same touch; its words count before the touch's own."""
     kind, details = _LIKE_EVENT[touch.kind]
     if touch.kind == "save" and np.linalg.norm(touch.after) > _CAUGHT:
         details = (*details, "parried")
     filled_in = {**seen_words(touch.time, times, path), **height_words(touch.part, touch.position[2], heights)}
-    words = table.words(kind, touch.part, details, filled_in)
-    return Moment(round(touch.time, 3), words, TOUCHES, round(touch.confidence, 3)) if words else None
+    if event is None:
+        words = table.words(kind, touch.part, details, filled_in)
+        return Moment(round(touch.time, 3), words, TOUCHES, round(touch.confidence, 3)) if words else None
+    part, filled_in = event.part or touch.part, {**filled_in, "side": event.side}
+    if part != touch.part:
+        filled_in.update(height_words(part, touch.position[2], heights))
+    words = table.words(event.kind, part, event.details, filled_in) or table.words(kind, part, details, filled_in)
+    sure = 1.0 - _FORGETS * (1.0 - touch.confidence)
+    return Moment(round(touch.time, 3), words, BOTH, round(sure, 3)) if words else None
 
 
 def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
     """The gait at a moment, from a player's path (N, 2) m at `times` (N,) s."""
-    near = np.flatnonzero((np.abs(times - time) <= 0.3) & np.isfinite(path).all(axis=1))
-    if len(near) < 2:
+    near = slice(*np.searchsorted(times, [time - 0.3, time + 0.3]))
+    there = np.isfinite(path[near]).all(axis=1)
+    seen, when = path[near][there], times[near][there]
+    if len(seen) < 2:
         return {}
-    away = np.linalg.norm(path[near[-1]] - path[near[0]]) / (times[near[-1]] - times[near[0]])
+    away = np.linalg.norm(seen[-1] - seen[0]) / (when[-1] - when[0])
     return {"gait": "running" if away > _RUNNING else "standing"}
 
 

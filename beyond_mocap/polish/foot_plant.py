@@ -157,7 +157,7 @@ def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndar
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
     own = length - np.linalg.norm(heel - hip, axis=1)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
-    yaw = np.arctan2(along[:, 1], along[:, 0])
+    yaw = quaternion.angle_of(along[:, 1], along[:, 0])
     left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
     return Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length, own)
 
@@ -174,7 +174,7 @@ def firmness(stands: np.ndarray) -> np.ndarray:
 
 def turned_flat(foot: Foot, scale: float) -> Foot:
     """The foot turned about its heel and the vertical so that it keeps its direction while it lies flat."""
-    yaw = np.unwrap(np.arctan2(-foot.left[:, 0], foot.left[:, 1]))
+    yaw = np.unwrap(quaternion.angle_of(-foot.left[:, 0], foot.left[:, 1]))
     flat = np.minimum(foot.weight[:, 0] / HEEL_SHARE, foot.weight[:, 1]).clip(0.0, 1.0)
     spin = quaternion.about_up(shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0])
     toe = foot.heel + quaternion.rotate(spin, foot.toe - foot.heel)

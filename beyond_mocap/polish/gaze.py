@@ -67,9 +67,9 @@ def head_angles(seen: np.ndarray) -> np.ndarray:
     unit = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
-    side = np.arctan2(unit[:, 1], np.maximum(unit[:, 0], back))
+    side = quaternion.angle_of(unit[:, 1], np.maximum(unit[:, 0], back))
     yaw = _limited(side, MOST_YAW) * _smooth(level / _OVERHEAD)
-    pitch = np.arctan2(unit[:, 2], level)
+    pitch = quaternion.angle_of(unit[:, 2], level)
     return np.column_stack([yaw, np.where(pitch > 0.0, _limited(pitch, MOST_UP), _limited(pitch, MOST_DOWN))])
 
 

@@ -53,7 +53,7 @@ def facing(
     """
     count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
-    offset = np.arctan2(velocity[:, 1], velocity[:, 0])
+    offset = quaternion.angle_of(velocity[:, 1], velocity[:, 0])
     goal = direction - offset
     trust = _moving(speed) ** 2 * _moving(own_speed) ** 2
     goal, trust = _with_aim(goal, trust, speed, aim, turn)

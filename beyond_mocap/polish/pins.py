@@ -365,8 +365,8 @@ class _Part:
         sight = quaternion.rotate(self.world[:, head], np.broadcast_to(look, (len(self.root), 3)))
         away = found.place - self.places[:, head]
         facing = heading_from_positions(self.skeleton, self.places)
-        yaw = np.clip(quaternion.wrapped(np.arctan2(away[:, 1], away[:, 0]) - facing), -MOST_YAW, MOST_YAW) + facing
-        pitch = np.clip(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])), -MOST_PITCH, MOST_PITCH)
+        yaw = np.clip(quaternion.wrapped(quaternion.angle_of(away[:, 1], away[:, 0]) - facing), -MOST_YAW, MOST_YAW) + facing
+        pitch = np.clip(quaternion.angle_of(away[:, 2], np.hypot(away[:, 0], away[:, 1])), -MOST_PITCH, MOST_PITCH)
         wanted = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
         return quaternion.to_rotation_vector(quaternion.between(sight, wanted))
 

@@ -125,6 +125,8 @@ class PathCosts:
         yield "made", np.float32(w.made) * what.made
         if self.wanted.off_style is not None:
             yield "style", self.wanted.off_style[what.frame]
+        if self.wanted.taste is not None:
+            yield "variety", self.wanted.taste.cost(first, what.frame)
         if self.price is not None:
             yield "price", self.price[what.frame]
         if avoid := self.wanted.avoided_in(first, end):

@@ -77,7 +77,8 @@ class PathSearch:
     """One search; `run()` gives the edit list.
 
     between: search this stretch only and keep the rest. used: footage to do without where that can be. alike: another
-    measure of how far poses are apart. hurry: when it
+    measure of how far poses are apart. on_grid: slots lie as in other searches of the same frames (`slot_edges`).
+    hurry: when it
     says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None; before the first
     slot is filled it ends the search as `cancelled` does.
     """
@@ -93,12 +94,13 @@ class PathSearch:
         between: Between | None = None,
         used: tuple[Used, ...] = (),
         alike: Alike | None = None,
+        on_grid: bool = False,
     ):
         self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
         self.frames = library.frames
         self.costs = PathCosts(library, wanted, weights, used, alike)
         self.offer = self.costs.offer
-        self.edges = slot_edges(library, wanted, *((between.first, between.end) if between else ()))
+        self.edges = slot_edges(library, wanted, *((between.first, between.end) if between else (0, None)), on_grid)
         self.pieces = key_pieces(library, wanted, self.edges)
         self.choice_cost = self._choice_costs()
         self._closed = {slot_of(self.edges, wanted.keys[number].frame) for number in self.pieces.wanted}

@@ -45,8 +45,11 @@ class Pieces:
         return wanted.keys[self.wanted[piece]].choices[self.choice[piece]]
 
 
-def slot_edges(library: Library, wanted: Wanted, first: int = 0, end: int | None = None) -> np.ndarray:
-    """(S + 1,) output frames from first to end (all of them); slots of about SLOT frames.
+def slot_edges(
+    library: Library, wanted: Wanted, first: int = 0, end: int | None = None, on_grid: bool = False
+) -> np.ndarray:
+    """(S + 1,) output frames from first to end (all of them); slots of about SLOT frames. on_grid: edges lie at
+    multiples of SLOT wherever key moments let them, so that searches of overlapping stretches share them.
 
     There is an edge half way between key moments that crowd each other, and one before and after each where the
     shortest of its clips begins and ends, so that a clip which does not fit its surroundings need not be played longer
@@ -62,8 +65,18 @@ def slot_edges(library: Library, wanted: Wanted, first: int = 0, end: int | None
         for edge in (round(key.frame - max(entry, AROUND)), round(key.frame + max(leave, AROUND))):
             if np.abs(fixed - edge).min() >= SHORTEST and first < edge < end:
                 fixed = np.sort(np.append(fixed, edge))
+    fixed = _with_grid(fixed) if on_grid else fixed
     parts = [np.linspace(a, b, max(1, round((b - a) / SLOT)) + 1)[:-1] for a, b in zip(fixed, fixed[1:])]
     return np.round(np.concatenate([*parts, [end]])).astype(int)
+
+
+def _with_grid(fixed: np.ndarray) -> np.ndarray:
+    """Edges with the first and the last multiple of SLOT between each two that leaves no short slot beside them."""
+    out = [fixed]
+    for low, high in zip(fixed, fixed[1:]):
+        first, last = -(-(low + SHORTEST) // SLOT) * SLOT, (high - SHORTEST) // SLOT * SLOT
+        out.append(np.array([first, last] if first <= last else [], int))
+    return np.unique(np.concatenate(out))
 
 
 def key_pieces(library: Library, wanted: Wanted, edges: np.ndarray) -> Pieces:

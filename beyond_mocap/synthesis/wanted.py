@@ -18,6 +18,7 @@ from ..library.library import Library
 from ..motion.track import SampledTrack
 from ..plan import Plan
 from .style import off_style_cost
+from .variety import Taste, taste
 
 PAPERS_OMEGA = 4.0
 
@@ -43,7 +44,8 @@ class Wanted:
     """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
     avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style:
     (N,) float32 cost per slot of library frames without the style that is asked, None where none is. weak_foot: side of
-    the foot that key moments without a side rather leave, or "". gait: per frame index into the library's gaits.
+    the foot that key moments without a side rather leave, or "". taste: at which times this player rather shows which
+    frames, None where that is all the same. gait: per frame index into the library's gaits.
     timeline: filled. keys: in time order. allowed: (C,) clips to use. warnings: what the library lacks of what is
     asked."""
 
@@ -57,6 +59,7 @@ class Wanted:
     avoided: tuple[frozenset[str], ...] = ()
     off_style: np.ndarray | None = None
     weak_foot: str = ""
+    taste: Taste | None = None
 
     def __len__(self) -> int:
         return len(self.track.times)
@@ -91,7 +94,9 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     avoided = tuple(avoided) if any(avoided) else ()
     off_style = off_style_cost(library, plan.style, plan.style_weight, warnings)
     weak_foot = {"left": "right", "right": "left"}.get(plan.strong_foot, "")
-    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, off_style, weak_foot)
+    own = taste(library, plan.seed, plan.variety, float(track.times[0]))
+    preferred = {"off_style": off_style, "weak_foot": weak_foot, "taste": own}
+    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, **preferred)
 
 
 def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:

@@ -29,6 +29,9 @@ RADII = {
 }
 """Metres at a stature of 1.80 m."""
 
+FAR = 2.5
+"""Metres between the middles of two bodies' first capsules, the hips, from which on they cannot touch."""
+
 _TALL = 1.80
 
 
@@ -104,13 +107,14 @@ def lines_of(parts: tuple[Capsule, ...], places: np.ndarray) -> np.ndarray:
 @dataclass(frozen=True, eq=False)
 class Touching:
     """Pairs of capsules (K,) that are in each other or nearly so: frame (K,); one, other (K,) numbers of the capsules;
-    depth (K,) m; away (K, 3) unit vector from the other to the one; at_one, at_other (K,) share of the way along
-    either line where they are nearest."""
+    depth (K,) m; radii (K,) m, the sum of both; away (K, 3) unit vector from the other to the one; at_one, at_other (K,)
+    share of the way along either line where they are nearest."""
 
     frame: np.ndarray
     one: np.ndarray
     other: np.ndarray
     depth: np.ndarray
+    radii: np.ndarray
     away: np.ndarray
     at_one: np.ndarray
     at_other: np.ndarray
@@ -121,17 +125,27 @@ def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, np.nda
 
     one (T, C, 2, 3) and other (T, D, 2, 3): ends of their lines, m; radii: (C,) and (D,) m.
     """
-    reach = radii[0][:, None] + radii[1] - least
-    low = [ends.min(axis=2) for ends in (one, other)]
-    high = [ends.max(axis=2) for ends in (one, other)]
-    gap = np.maximum(low[0][:, :, None] - high[1][:, None], low[1][:, None] - high[0][:, :, None]).max(axis=-1)
-    frame, a, b = np.nonzero(gap <= reach)
+    off = one[:, 0].sum(axis=1) - other[:, 0].sum(axis=1)
+    near = np.flatnonzero(np.einsum("tk,tk->t", off, off) < (2.0 * FAR) ** 2)
+    frame, a, b = np.nonzero(_balls_meet(one[near], other[near], radii[0][:, None] + radii[1] - least))
+    frame = near[frame]
     off, at_a, at_b = nearest(one[frame, a], other[frame, b])
     far = np.linalg.norm(off, axis=1)
-    depth = (radii[0][a] + radii[1][b]) - far
+    both = radii[0][a] + radii[1][b]
+    depth = both - far
     keep = np.flatnonzero(depth >= least)
     away = off[keep] / np.maximum(far[keep], 1e-9)[:, None]
-    return Touching(frame[keep], a[keep], b[keep], depth[keep], away, at_a[keep], at_b[keep])
+    return Touching(frame[keep], a[keep], b[keep], depth[keep], both[keep], away, at_a[keep], at_b[keep])
+
+
+def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """(T, C, D) bool: whether the balls around two lines, widened so that together they reach (C, D) m further, meet."""
+    (a, half_a), (b, half_b) = (
+        (0.5 * (ends[:, :, 0] + ends[:, :, 1]), 0.5 * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2))
+        for ends in (one, other)
+    )
+    square = (a * a).sum(axis=2)[:, :, None] + (b * b).sum(axis=2)[:, None] - 2.0 * (a @ b.transpose(0, 2, 1))
+    return square <= (half_a[:, :, None] + half_b[:, None] + reach) ** 2
 
 
 def nearest(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

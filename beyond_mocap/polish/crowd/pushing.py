@@ -33,7 +33,12 @@ in which it comes and goes."""
 ARM_STAY, ARM_SECONDS, MOST_TURN = 5e-4, 0.15, 1.1
 """Weight of an arm's turn, seconds in which it comes and goes, and radians that it turns at most."""
 
-_ROUNDS, _ARMS_ALONE = 12, 4
+OUTWARD = 1.0
+"""How much the way between two trunks counts against the shortest way out of a contact."""
+
+_ROUNDS, _ARMS_ALONE = 16, 4
+_STEP = 0.5
+_FIRMER = 1.1
 _SHORT_ARM = 0.08  # m from the shoulder's axis below which turning an arm brings nothing away
 _UPRIGHT = 0.35  # least share of a push that goes over the ground
 _HELD = 1e6
@@ -108,12 +113,15 @@ def pushed(
     its last frame. The bodies lie on the same T frames.
     """
     now = [np.array(values) for values in curves]
+    calm = [Calm.of(body, own, ends, fps) for body, own, ends in zip(bodies, now, held)]
     for turn in range(_ROUNDS):
         placed = [moved(body, values) for body, values in zip(bodies, now)]
         contacts = _contacts(bodies, placed, pairs)
-        for number, (body, mine) in enumerate(zip(bodies, contacts)):
-            if len(mine.frame):
-                now[number] = _given(body, mine, now[number], placed[number], held[number], turn >= _ARMS_ALONE, fps)
+        for number, mine in enumerate(contacts):
+            if len(mine.frame) and calm[number].count > 3:
+                weight = _BASE / fps * _FIRMER**turn
+                given = _given(calm[number], mine, now[number], placed[number], turn >= _ARMS_ALONE, weight)
+                now[number] = now[number] + _STEP * (given - now[number])
     return now
 
 
@@ -135,45 +143,113 @@ def _side(found: Touching, bodies, placed, body: int, against: int, sign: float)
     ends = placed[body][found.frame, part]
     place = ends[:, 0] + at[:, None] * (ends[:, 1] - ends[:, 0])
     firm = [bodies[number].firm[found.frame] for number in (body, against)]
-    deep = found.depth - ALLOWED
+    way, deep = _way_out(found, placed[body], placed[against], sign)
     arms = [np.array([p.limb == "arm" for p in bodies[n].parts])[c] for n, c in ((body, part), (against, beside))]
     arm = deep * np.where(arms[0], np.where(arms[1], 0.5, 1.0), 0.0)
-    return found.frame, part, at, place, sign * found.away, deep * firm[1] / (firm[0] + firm[1]), arm
+    return found.frame, part, at, place, way, deep * firm[1] / (firm[0] + firm[1]), arm
 
 
-def _given(body: CrowdBody, mine: Contact, curves, placed, held, arms_too: bool, fps: float) -> np.ndarray:
-    """The body's curves (T, 12) with its share of these contacts given way to."""
-    low, high = body.there
-    if high - low < 4:
-        return curves
-    out = np.array(curves)
-    is_arm = np.array([part.limb == "arm" for part in body.parts])[mine.part]
+def _way_out(found: Touching, own, others, sign: float) -> tuple[np.ndarray, np.ndarray]:
+    """Which way (K, 3), unit, a body leaves another by at each contact, and how far (K,) m: the shortest way, turned
+    towards the way from the other's trunk to its own, so that limbs that have caught each other come free."""
+    out = _middle(own)[found.frame] - _middle(others)[found.frame]
+    out[:, 2] = 0.0
+    shortest = sign * found.away
+    way = shortest + OUTWARD * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+    off = shortest * (found.radii - found.depth)[:, None]
+    along = np.einsum("kc,kc->k", way, off)
+    return way, np.sqrt(along**2 + (found.radii - ALLOWED) ** 2 - np.einsum("kc,kc->k", off, off)) - along
+
+
+def _middle(lines: np.ndarray) -> np.ndarray:
+    """(T, 3) m: the middle of the hips."""
+    return lines[:, 0].mean(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Calm:
+    """What keeps a body's curves small and smooth, whatever its contacts: the squares of its root and feet and of each
+    arm, over the frames low .. low + count in which it is there."""
+
+    body: CrowdBody
+    low: int
+    count: int
+    root_and_feet: BandedSquares
+    arms: tuple[BandedSquares, ...]
+
+    @classmethod
+    def of(cls, body: CrowdBody, curves: np.ndarray, held: tuple[bool, bool], fps: float) -> Calm:
+        """Of a body; held: whether its curves (T, 12) stay what they are at its first and at its last frame."""
+        low, high = body.there
+        whole = _calm_root_and_feet(body.frames(low, high), curves[low:high], held, fps)
+        arms = []
+        for side in (0, 1):
+            arms.append(BandedSquares(high - low, 3))
+            for axis in range(3):
+                values = curves[low:high, ARMS.start + 3 * side + axis]
+                _calm(arms[side], axis, ARM_STAY, ARM_SECONDS, body.firm[low:high], fps)
+                _hold(arms[side], axis, values, held)
+        return cls(body, low, high - low, whole, tuple(arms))
+
+
+def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedSquares:
+    squares, scale = BandedSquares(len(curves), ARMS.start), _BASE / fps
+    for curve in range(ARMS.start):
+        _calm(squares, curve, STAY, SECONDS if curve < FEET.start else FOOT_SECONDS, body.firm, fps)
+        _hold(squares, curve, curves[:, curve], held)
+    frames = np.arange(len(curves)) * ARMS.start
     for side in (0, 1):
-        number = next((n for n, part in enumerate(body.parts) if part.limb == "arm" and part.side == side), None)
-        if number is not None:
+        both = (body.stands[:-1, side] & body.stands[1:, side]).astype(float)
+        for axis in (0, 1):
+            foot = FEET.start + 2 * side + axis
+            near = frames[:, None] + np.array([foot, axis])
+            squares.add(near, np.array([1.0, -1.0]), FOOT_NEAR * scale * body.firm)
+            step = frames[:-1, None] + np.array([foot + ARMS.start, foot])
+            squares.add(step, np.array([1.0, -1.0]), FOOT_STANDS / scale * both)
+    return squares
+
+
+def _calm(squares: BandedSquares, curve: int, stay: float, seconds: float, firm: np.ndarray, fps: float) -> None:
+    """Keeps a curve small, and smooth over so many seconds."""
+    squares.stay(curve, stay * _BASE / fps * firm)
+    squares.smooth(curve, stay * _BASE / fps * (seconds * fps) ** 6 * firm)
+
+
+def _hold(squares: BandedSquares, curve: int, values: np.ndarray, held) -> None:
+    """Keeps a curve's first and last two frames what they are, where they are held."""
+    for ends, which in ((slice(0, 2), held[0]), (slice(-2, None), held[1])):
+        if which:
+            index = (np.arange(squares.count) * squares.unknowns + curve)[ends, None]
+            squares.add(index, np.ones(1), np.full(len(index), _HELD), values[ends])
+
+
+def _given(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: float) -> np.ndarray:
+    """The body's curves (T, 12) with its share of these contacts given way to."""
+    out, parts = np.array(curves), calm.body.parts
+    there = slice(calm.low, calm.low + calm.count)
+    is_arm = np.array([part.limb == "arm" for part in parts])[mine.part]
+    sides = np.array([part.side for part in parts])[mine.part]
+    for side in (0, 1):
+        rows = np.flatnonzero(is_arm & (sides == side))
+        if len(rows):
+            shoulder = placed[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side == side), 0]
             columns = slice(ARMS.start + 3 * side, ARMS.start + 3 * side + 3)
-            of = is_arm & (np.array([part.side for part in body.parts])[mine.part] == side)
-            arm = _arm(mine, of, placed[:, number, 0], curves[:, columns], body.firm, (low, high), held, fps)
-            out[low:high, columns] = arm
+            out[there, columns] = _arm(calm, side, mine, rows, shoulder, curves[:, columns], weight)
     whole = np.flatnonzero(~is_arm | arms_too)
-    out[low:high, : ARMS.start] = _root_and_feet(body, mine, whole, curves, (low, high), held, fps)
+    if len(whole) or curves[there, : ARMS.start].any():
+        out[there, : ARMS.start] = _root_and_feet(calm, mine, whole, curves, weight)
     return out
 
 
-def _arm(mine: Contact, of, shoulder, turns, firm, there, held, fps: float) -> np.ndarray:
-    """The turns (W, 3) of one arm over the frames `there`; shoulder (T, 3) m, of (K,) bool its contacts."""
-    low, high = there
-    squares, scale = BandedSquares(high - low, 3), _BASE / fps
-    for axis in range(3):
-        squares.stay(axis, ARM_STAY * scale * firm[low:high])
-        squares.smooth(axis, ARM_STAY * scale * (ARM_SECONDS * fps) ** 6 * firm[low:high])
-        _hold(squares, axis, turns[low:high, axis], held)
-    rows = np.flatnonzero(of)
-    row = np.cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
-    rows, row = rows[np.linalg.norm(row, axis=1) > _SHORT_ARM], row[np.linalg.norm(row, axis=1) > _SHORT_ARM]
+def _arm(calm: Calm, side: int, mine: Contact, rows, shoulder, turns, weight: float) -> np.ndarray:
+    """The turns (W, 3) of one arm with its contacts `rows`; shoulder (T, 3) m, turns (T, 3) so far."""
+    row = quaternion.cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
+    long = np.linalg.norm(row, axis=1) > _SHORT_ARM
+    rows, row, squares = rows[long], row[long], calm.arms[side].copy()
     frame = mine.frame[rows]
     goal = np.einsum("rk,rk->r", row, turns[frame]) + mine.arm[rows]
-    squares.add((frame - low)[:, None] * 3 + np.arange(3), row, np.full(len(rows), scale), goal)
+    squares.add((frame - calm.low)[:, None] * 3 + np.arange(3), row, np.full(len(rows), weight), goal)
     return _limited(squares.least())
 
 
@@ -183,34 +259,11 @@ def _limited(turns: np.ndarray) -> np.ndarray:
     return turns * (MOST_TURN * np.tanh(size / MOST_TURN) / size)
 
 
-def _root_and_feet(body: CrowdBody, mine: Contact, rows, curves, there, held, fps: float) -> np.ndarray:
-    """The first six curves (W, 6) over the frames `there`, from the contacts `rows`."""
-    low, high = there
-    squares = BandedSquares(high - low, ARMS.start)
-    firm, scale = body.firm[low:high], _BASE / fps
-    for curve in range(ARMS.start):
-        seconds = SECONDS if curve < FEET.start else FOOT_SECONDS
-        squares.stay(curve, STAY * scale * firm)
-        squares.smooth(curve, STAY * scale * (seconds * fps) ** 6 * firm)
-        _hold(squares, curve, curves[low:high, curve], held)
-    frames = np.arange(high - low) * ARMS.start
-    for side in (0, 1):
-        both = (body.stands[low : high - 1, side] & body.stands[low + 1 : high, side]).astype(float)
-        for axis in (0, 1):
-            foot = FEET.start + 2 * side + axis
-            near = frames[:, None] + np.array([foot, axis])
-            squares.add(near, np.array([1.0, -1.0]), FOOT_NEAR * scale * firm)
-            step = frames[:-1, None] + np.array([foot + ARMS.start, foot])
-            squares.add(step, np.array([1.0, -1.0]), FOOT_STANDS / scale * both)
-    _add_pushes(squares, body, mine, rows, curves, low, scale)
-    return squares.least()
-
-
-def _add_pushes(squares: BandedSquares, body: CrowdBody, mine: Contact, rows, curves, low: int, scale: float) -> None:
-    """Adds what lacks at the contacts `rows`: their places moved over the ground by root and foot."""
-    frame, part = mine.frame[rows], mine.part[rows]
-    side = np.array([p.side for p in body.parts])[part]
-    ends = np.array([p.along if p.limb == "leg" else (0.0, 0.0) for p in body.parts])[part]
+def _root_and_feet(calm: Calm, mine: Contact, rows, curves, weight: float) -> np.ndarray:
+    """The first six curves (W, 6) with what lacks at the contacts `rows` given by root and feet."""
+    parts, frame, part = calm.body.parts, mine.frame[rows], mine.part[rows]
+    side = np.array([p.side for p in parts])[part]
+    ends = np.array([p.along if p.limb == "leg" else (0.0, 0.0) for p in parts])[part]
     share = (ends[:, 0] + mine.at[rows] * (ends[:, 1] - ends[:, 0]))[:, None]
     push = mine.away[rows, :2]
     size = np.maximum(np.linalg.norm(push, axis=1, keepdims=True), 1e-9)
@@ -218,12 +271,6 @@ def _add_pushes(squares: BandedSquares, body: CrowdBody, mine: Contact, rows, cu
     columns = np.stack([0 * side, 0 * side + 1, FEET.start + 2 * side, FEET.start + 2 * side + 1], axis=1)
     values = np.concatenate([(1.0 - share) * push, share * push], axis=1)
     goal = np.einsum("rk,rk->r", values, curves[frame[:, None], columns]) + mine.give[rows]
-    squares.add((frame - low)[:, None] * ARMS.start + columns, values, np.full(len(rows), scale), goal)
-
-
-def _hold(squares: BandedSquares, curve: int, values: np.ndarray, held) -> None:
-    """Keeps a curve's first and last two frames what they are, where they are held."""
-    for ends, which in ((slice(0, 2), held[0]), (slice(-2, None), held[1])):
-        if which:
-            index = (np.arange(squares.count) * squares.unknowns + curve)[ends, None]
-            squares.add(index, np.ones(1), np.full(2, _HELD), values[ends])
+    squares = calm.root_and_feet.copy()
+    squares.add((frame - calm.low)[:, None] * ARMS.start + columns, values, np.full(len(rows), weight), goal)
+    return squares.least()

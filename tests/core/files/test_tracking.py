@@ -252,6 +252,8 @@ def test_without_kloppy_the_way_to_it_is_named(tmp_path, monkeypatch):
         ("sportec_positional.xml", "sportec_meta.xml", "sportec", 3),
         ("second_spectrum_fake_data.jsonl", "second_spectrum_fake_metadata.xml", "secondspectrum", 29),
         ("statsperform_tracking_ma25.txt", "statsperform_tracking_ma1.xml", "statsperform", 23),
+        ("pff_10517.jsonl", "pff_metadata_10517.json", "pff", 35),
+        ("signality_p1_raw_data_subset.json", "signality_meta_data.json", "signality", 30),
     ],
 )
 def test_every_provider_is_known_by_its_form(tmp_path, raw, meta, provider, players):

@@ -35,7 +35,8 @@ def test_a_picture_is_the_pose_of_that_second(made):
     for second in (2.5, 4.0):
         frame = round((second - take.start_time) * take.motion.fps)
         near = range(frame - 9, frame + 10, 3)
-        off = [np.abs(draw("home_1", second) - pose_picture(take.motion, one, SIZE)).mean() for one in near]
+        picture = draw("home_1", second)
+        off = [np.abs(picture - pose_picture(take.motion, one, SIZE)).mean() for one in near]
         assert near[int(np.argmin(off))] == frame and min(off) < 0.2 * np.median(off)
 
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from beyond_mocap.annotation import validate
 from beyond_mocap.annotation.event_words import TABLE, read_event_words
@@ -137,6 +139,18 @@ def test_edits_are_seen_and_kept(tmp_path):
     assert edited(file)
     with pytest.raises(InputError, match=r"p\.txt:1: the word 'kcik'.*kick"):
         read_words(file)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.one_of(st.binary(max_size=80), st.text("0123456789. -#kick[]\n", max_size=80).map(str.encode)))
+def test_any_file_of_words_is_read_or_refused(tmp_path_factory, content):
+    file = tmp_path_factory.mktemp("fuzz") / "p.txt"
+    file.write_bytes(content)
+    try:
+        assert edited(file) in (True, False)
+        read_words(file)
+    except InputError as error:
+        assert "\n" not in str(error)
 
 
 # --- the table

@@ -1,0 +1,116 @@
+"""Events on the tracking's clock: planted lags, drifts, scatter, missing and strange events."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import InputError
+from beyond_mocap.files.event_data import MatchEvent, MatchEvents
+from beyond_mocap.files.match_data import Half
+from beyond_mocap.match.event_clock import aligned
+
+HALVES = (Half(1, 0.0, 0.0, 900.0), Half(2, 910.0, 910.0, 1810.0))
+KINDS = {"kick": "pass", "receive": "receive", "header": "pass"}
+
+
+def planted(seed=0, count=300, lag=(2.9, 2.9), drift=(0.0, 0.0), scatter=0.4, seen=0.6, stray=0.1):
+    """Touches of 22 players in two halves, events of `seen` of them late by lag + drift x time + scatter, `stray` of
+    them of nothing; and (event's index -> touch's index)."""
+    rng = np.random.default_rng(seed)
+    touches, rows = [], []
+    for number, start, end in ((half.number, half.start, half.end) for half in HALVES):
+        times = np.sort(rng.uniform(start + 2.0, end - 10.0, count))
+        for time in times:
+            kind = ("kick", "receive", "header")[int(rng.integers(3))]
+            player = f"p{rng.integers(22)}"
+            touches.append(SimpleNamespace(time=time, player=player, kind=kind, part="foot", confidence=0.9))
+            since = time - start
+            late = lag[number - 1] + drift[number - 1] * since + rng.normal(0.0, scatter)
+            if rng.random() < seen:
+                event = MatchEvent(since + late, number, player, "home", KINDS[kind])
+                rows.append((event, len(touches) - 1))
+            if rng.random() < stray * seen:
+                rows.append((MatchEvent(rng.uniform(0, 900), number, f"p{rng.integers(22)}", "home", "pass"), -1))
+    rows.sort(key=lambda row: (row[0].period, row[0].time))
+    events = MatchEvents(tuple(event for event, _ in rows), "made", "events.xml")
+    return touches, events, np.array([touch for _, touch in rows])
+
+
+def right(found, truth):
+    """Share of the events with a touch that found theirs."""
+    own = truth >= 0
+    return float((found.touches[own] == truth[own]).mean())
+
+
+@pytest.mark.parametrize("lag, drift", [
+    ((2.9, 2.9), (0.0, 0.0)), ((-1.4, 6.2), (0.0, 0.0)), ((0.0, 0.0), (0.0, 0.0)), ((180.0, -40.0), (0.0, 0.0)),
+    ((2.0, 2.0), (8e-4, -1e-3)),
+])
+def test_each_period_gets_its_own_clock(lag, drift):
+    touches, events, truth = planted(lag=lag, drift=drift)
+    found = aligned(events, touches, HALVES)
+    for number, clock in found.clocks.items():
+        for since in (100.0, 800.0):
+            late = clock.lag + clock.drift * since
+            assert late == pytest.approx(lag[number - 1] + drift[number - 1] * since, abs=0.25)
+        assert 0.2 < clock.spread < 0.9 and clock.matched > 0.8 > 3.0 * clock.by_chance
+    assert right(found, truth) > 0.85
+    strays = found.touches[truth < 0]
+    assert np.mean(strays >= 0) < 0.35  # whom no touch is near
+
+
+def test_exact_events_find_every_touch():
+    touches, events, truth = planted(scatter=0.0, stray=0.0)
+    found = aligned(events, touches, HALVES)
+    assert right(found, truth) == 1.0
+    own = np.array([touches[i].time for i in found.touches])
+    np.testing.assert_allclose(found.times, own, atol=0.05)
+    assert any("2.90 s after" in note for note in found.notes)
+
+
+def test_events_of_another_match_are_refused():
+    touches, _, _ = planted(seed=1)
+    _, others, _ = planted(seed=2)
+    with pytest.raises(InputError, match=r"events.xml: .*by chance.*of the same match"):
+        aligned(others, touches, HALVES)
+
+
+def test_a_span_of_the_match_is_enough():
+    touches, events, truth = planted()
+    inside = [touch for touch in touches if 200.0 <= touch.time <= 320.0]
+    found = aligned(events, inside, HALVES, (200.0, 320.0))
+    assert found.clocks[1].lag == pytest.approx(2.9, abs=0.3)
+    there = [i for i, touch in enumerate(truth) if touch >= 0 and 205.0 < touches[touch].time < 315.0]
+    good = [found.touches[i] >= 0 and inside[found.touches[i]] is touches[truth[i]] for i in there]
+    assert len(good) > 15 and np.mean(good) > 0.85
+    assert (found.touches[found.times > 330.0] == -1).all()
+
+
+def test_too_few_events_are_told_and_left():
+    touches, events, _ = planted()
+    few = MatchEvents(events.events[:4], "made")
+    found = aligned(few, touches, HALVES)
+    assert not found.clocks and "too few" in found.notes[0]
+    assert aligned(MatchEvents((), "made"), touches, HALVES).touches.size == 0
+
+
+def test_events_of_nobody_and_of_periods_that_are_missing_keep_no_touch():
+    touches, events, _ = planted()
+    extra = (MatchEvent(5.0, 1, "", "home", "pass"), MatchEvent(5.0, 3, "p1", "home", "pass"))
+    found = aligned(MatchEvents((*events.events, *extra), "made"), touches, HALVES)
+    assert found.touches[-2:].tolist() == [-1, -1] and np.isnan(found.times[-1])
+
+
+def test_a_file_that_begins_within_the_second_half_is_no_trouble():
+    touches, events, truth = planted()
+    half = Half(2, -490.0, 10.0, 400.0)  # its first frame is 500 s into the half
+    moved = [SimpleNamespace(**{**vars(touch), "time": touch.time - 910.0 - 490.0}) for touch in touches]
+    inside = [touch for touch in moved if half.start <= touch.time <= half.end]
+    found = aligned(events, inside, [half])
+    assert found.clocks[2].lag == pytest.approx(2.9, abs=0.2) and list(found.clocks) == [2]
+    pairs = [(event, touch) for event, touch in enumerate(truth) if touch >= 0 and moved[touch] in inside]
+    assert len(pairs) > 50
+    assert np.mean([found.touches[e] >= 0 and inside[found.touches[e]] is moved[t] for e, t in pairs]) > 0.85
+    with pytest.raises(InputError, match="by chance"):  # events count from the half's begin, further off than MOST_LAG
+        aligned(events, inside, [Half(2, 10.0, 10.0, 400.0)])
