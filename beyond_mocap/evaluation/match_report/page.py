@@ -206,7 +206,7 @@ def _frame(match: MatchResults, time: float) -> str:
 
 
 def _go_to(one: WorstSecond) -> str:
-    return escape(f"bpy.ops.beyond_mocap.jump_to(seconds={one.time:g})")
+    return escape(f"bpy.ops.beyond_mocap.match_second(seconds={one.time:g}, player={one.player.id!r})")
 
 
 def _clock(seconds: float) -> str:

@@ -105,7 +105,7 @@ def test_the_page_tells_who_when_and_which_frame(tmp_path):
     text = page(folder)
     assert "110 s (1:50)" in text and "frame 300" in text
     assert "30.0 cm off the track" in text and "ball 20.0 m away" in text
-    assert "bpy.ops.beyond_mocap.jump_to(seconds=110)" in text
+    assert "bpy.ops.beyond_mocap.match_second(seconds=110, player=&#x27;a&#x27;)" in text
     assert "2 of 2 players made" in text and "Partial" not in text
     assert "0.21" in text and "12.3 s" in text and "ball &lt;measured&gt; in 80 %" in text
 
