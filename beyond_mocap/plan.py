@@ -26,6 +26,7 @@ LIMITS = {
     "root_window": (0.2, 5.0),
     "style_weight": (0.0, 10.0),
     "variety": (0.0, 10.0),
+    "lag": (0.0, 60.0),
 }
 """Least and most of a plan's numbers; outside them there is no sense in it."""
 
@@ -122,9 +123,9 @@ class Plan:
     little. style: words, or names or patterns of folders and clips ("academy", "lmd/*"), whose clips are taken rather
     than others by style_weight (m/s of missed speed that they are worth).
     solve_touches: whether key moments move to the touches that the ball's samples tell, and the ball goes as physics
-    has it, touched step by step in dribbles (`known_touches`). variety: what a clip's being to this player's taste,
-    which his seed decides, is worth in m/s of missed speed, so that not everybody shows the same (method "path").
-    solved: the ball's course where it is known already,
+    has it, touched step by step in dribbles (`known_touches`). variety: m/s of missed speed that
+    it is worth to show clips with this player's own lag against the clock, so that neighbours are not in step (method
+    "path"); lag: which, s (`match.variety.lags`). solved: the ball's course where it is known already,
     such as from a whole match.
 
     InputError for a number outside LIMITS or HEIGHTS, and for two pins of one part at one time.
@@ -154,6 +155,7 @@ class Plan:
     style_weight: float = 0.5
     solve_touches: bool = field(default=False, metadata=LATER)
     variety: float = field(default=0.0, metadata=LATER)
+    lag: float = field(default=0.0, metadata=LATER)
     solved: SolvedCourse | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
     def __post_init__(self):

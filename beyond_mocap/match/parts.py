@@ -74,6 +74,6 @@ def _plan(role: Role, number: int, moments, solved: SolvedBall | None, order: Ma
     timeline: Timeline = timeline_of(moments, start, end)
     plan = Plan(
         track=track, timeline=timeline, library=str(order.library), nearest=order.nearest, seed=order.seed + role.number,
-        fps=order.fps, solve_touches=solved is not None, variety=order.variety,
+        fps=order.fps, solve_touches=solved is not None, variety=order.variety, lag=role.lag,
     )
     return kept(plan if solved is None else replace(plan, solved=course_of(solved, role.player.id, plan)))

@@ -71,6 +71,13 @@ class Workplace:
             raise InputError("--workers", f"{self.workers}", "1 or more")
 
 
+def check_place(place: Workplace) -> None:
+    """InputError where a cluster's scheduler does not answer, so that it is told before work begins."""
+    if place.scheduler:
+        with _cluster(place.scheduler):
+            pass
+
+
 def run(
     tasks: Iterable[Task], work: Work, place: Workplace, cancelled: Callable[[], bool] | None = None,
     memory: Callable[[float], None] | None = None,

@@ -14,9 +14,13 @@ from ..motion.track import Track, clean
 from ..polish.crowd.spacing import keeping, spaced
 from .cut_plan import cut_track
 from .order import MatchOrder
+from .variety import lags
 
 SHORTEST = 1.0
 """Seconds; who is there for less is not made."""
+
+NEAR_SAMPLES = 2.0
+"""Times a second at which it is looked who is near whom."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +28,7 @@ class Role:
     """A player who is to be made. player: who; measured: his cleaned tracks, one for each stretch in which he is there,
     each from a frame of the match's clock (a whole number of 1 / fps seconds) to another; asked: the same, pushed out
     of others' ways. notes: lines on what was put right. reason: why he cannot be made, else "". number: his place in
-    the match, by which he differs from others."""
+    the match, by which he differs from others. lag: s, of the clips that he likes (`Plan.lag`)."""
 
     player: MatchPlayer
     measured: tuple[Track, ...] = ()
@@ -32,6 +36,7 @@ class Role:
     notes: tuple[str, ...] = ()
     reason: str = ""
     number: int = 0
+    lag: float = 0.0
 
 
 def span_of(match: Match, order: MatchOrder) -> tuple[float, float]:
@@ -56,10 +61,20 @@ def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tupl
         (number, player) for number, player in enumerate(match.players)
         if not order.players or player.id in order.players
     ]  # fmt: skip
-    roles = [role for which in asked if (role := _role(match, *which, span, order.fps)) is not None]
+    liked = lags(match.positions[:, _sampled(match, span)])
+    roles = [
+        replace(role, lag=float(liked[role.number]))
+        for which in asked if (role := _role(match, *which, span, order.fps)) is not None
+    ]  # fmt: skip
     if not roles:
         raise InputError("--from, --to", f"nobody is there from {span[0]:g} to {span[1]:g} s", "a time of play")
     return tuple(roles)
+
+
+def _sampled(match: Match, span: tuple[float, float]) -> np.ndarray:
+    """Samples of the span, some NEAR_SAMPLES a second."""
+    inside = np.flatnonzero((match.times >= span[0] - 1e-9) & (match.times <= span[1] + 1e-9))
+    return inside[:: max(1, round(match.fps / NEAR_SAMPLES))]
 
 
 def _role(match: Match, number: int, player: MatchPlayer, span: tuple[float, float], fps: float) -> Role | None:

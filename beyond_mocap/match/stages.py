@@ -121,7 +121,7 @@ class _Search:
         job.report(done / self._count, f"Searching: {done} of {self._count} windows")
         if len(mine) == job.state.players[player]["units"]:
             try:
-                edit, joints = spliced(job.library, self._parts[player].plans, mine, job.order.window)
+                edit, joints = spliced(job.library, self._parts[player].plans, mine)
             except BeyondMocapError as error:
                 return self._fail(player, str(error))
             self._edits[player] = edit

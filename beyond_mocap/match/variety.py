@@ -1,14 +1,39 @@
-"""Whether neighbours show the same clip in step."""
+"""Neighbours who do not show the same clip in step: which lag each player likes, and who is in step all the same."""
 
 from __future__ import annotations
 
 import numpy as np
+
+from ..synthesis.variety import PERIOD
 
 NEAR = 10.0
 """Metres between two players within which the same clip in step is seen."""
 
 PHASE = 0.15
 """Seconds between the places in a clip within which two players are in step."""
+
+
+APART = 0.3
+"""Seconds between the lags of two players who come near each other."""
+
+
+def lags(positions: np.ndarray) -> np.ndarray:
+    """(P,) s: the lag that each player is to like (`Plan.lag`), so that those who are much near each other have others.
+
+    positions (P, N, 2) m at evenly spaced times, NaN where somebody is not there; a sample or a few a second will do.
+    There are PERIOD / APART lags. Whoever is near others most chooses first, and each takes the lag of those near whom
+    he is least.
+    """
+    count = round(PERIOD / APART)
+    near = np.zeros((len(positions), len(positions)))
+    for one, place in enumerate(positions):
+        near[one] = (np.linalg.norm(positions - place, axis=-1) < NEAR).mean(axis=-1)
+    np.fill_diagonal(near, 0.0)
+    chosen = np.full(len(positions), -1)
+    for one in np.argsort(-near.sum(axis=1), kind="stable"):
+        beside = [near[one, chosen == number].sum() for number in range(count)]
+        chosen[one] = int(np.argmin(beside))
+    return chosen * APART
 
 
 def in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> np.ndarray:

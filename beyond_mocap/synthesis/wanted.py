@@ -94,7 +94,7 @@ def wanted(library: Library, plan: Plan) -> Wanted:
     avoided = tuple(avoided) if any(avoided) else ()
     off_style = off_style_cost(library, plan.style, plan.style_weight, warnings)
     weak_foot = {"left": "right", "right": "left"}.get(plan.strong_foot, "")
-    own = taste(library, plan.seed, plan.variety, float(track.times[0]))
+    own = taste(library, plan.lag, plan.variety, float(track.times[0]))
     preferred = {"off_style": off_style, "weak_foot": weak_foot, "taste": own}
     return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, **preferred)
 

@@ -15,11 +15,10 @@ from scipy.interpolate import CubicSpline
 
 from ...errors import InputError
 from ...motion import quaternion
-from ...motion.humanoid import Humanoid, identify
-from ...motion.motion import Motion
-from ...motion.runs import runs
+from ...motion.humanoid import identify
+from ...motion.motion import Motion, pose_kinematics
 from ...motion.skeleton import frozen_array
-from ..carry import Body, Resting, leg, limb_carried
+from .leg_moved import in_parent, leg_moved
 
 ROOT, FEET, ARMS = slice(0, 2), slice(2, 6), slice(6, 12)
 """Columns: metres (x, y) of the root; metres of the left and the right foot; rotation vectors, rad, of both arms."""
@@ -92,10 +91,8 @@ def knot_step(fps: float) -> int:
 
 def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
     """The motion, whose frame 0 is frame `first` of the match's clock, as corrected: bones as long as they were, feet
-    flat where they were flat, and every bit as it was where nothing is corrected.
-
-    A leg that shows no bend takes its knee's plane from the rest of the motion that is given, so the same bits come out
-    for the same motion only, not for the same frames of a longer one. InputError where rates differ.
+    flat where they were flat, and every bit as it was where nothing is corrected. Each frame is corrected by itself.
+    InputError where rates differ.
     """
     if abs(motion.fps - correction.fps) > 1e-9:
         raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
@@ -105,29 +102,23 @@ def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
 
 def carried(motion: Motion, curves: np.ndarray) -> Motion:
     """The motion with the curves (T, 12) put on it."""
+    moved = np.flatnonzero(curves.any(axis=1))
+    if not len(moved):
+        return motion
+    skeleton, body, own = motion.skeleton, identify(motion.skeleton), curves[moved]
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
-    body = identify(motion.skeleton)
-    for low, high in runs(curves.any(axis=1)):
-        pose = Body.posed(motion.skeleton, motion.root_positions[low:high], motion.rotations[low:high])
-        root[low:high, :2] += curves[low:high, ROOT]
-        rotations[low:high] = _limbs(pose, body, root[low:high], curves[low:high])
-    return replace(motion, root_positions=root, rotations=rotations)
-
-
-def _limbs(pose: Body, body: Humanoid, root: np.ndarray, curves: np.ndarray) -> np.ndarray:
-    """Local rotations (W, J, 4) with feet and arms where the curves (W, 12) have them."""
-    rotations = np.array(pose.rotations)
+    places, world = pose_kinematics(skeleton, root[moved], rotations[moved])
+    root[moved, :2] += own[:, ROOT]
     for side, limb in enumerate((body.left, body.right)):
-        foot = np.column_stack([curves[:, FEET].reshape(-1, 2, 2)[:, side], np.zeros(len(root))])
-        if np.any(foot) or np.any(curves[:, ROOT]):
-            rotations = limb_carried(pose, Resting.of(pose, leg(limb)), foot, root, rotations)
-        turn = curves[:, ARMS].reshape(-1, 2, 3)[:, side]
-        if limb.upper_arm is not None and np.any(turn):
-            above = pose.world[:, pose.skeleton.parents[limb.upper_arm]]
-            own = quaternion.multiply(quaternion.from_rotation_vector(turn), pose.world[:, limb.upper_arm])
-            local = quaternion.multiply(quaternion.inverse(above), own)
-            rotations[:, limb.upper_arm] = quaternion.signed_like(local, rotations[:, limb.upper_arm])
-    return rotations
+        against = own[:, FEET].reshape(-1, 2, 2)[:, side] - own[:, ROOT]
+        turned = leg_moved(skeleton, limb, places, world, np.column_stack([against, np.zeros(len(moved))]))
+        turn = own[:, ARMS].reshape(-1, 2, 3)[:, side]
+        if limb.upper_arm is not None and turn.any():
+            upper = quaternion.multiply(quaternion.from_rotation_vector(turn), world[:, limb.upper_arm])
+            turned[limb.upper_arm] = in_parent(skeleton, world, limb.upper_arm, upper)
+        for joint, local in turned.items():
+            rotations[moved, joint] = quaternion.signed_like(local, rotations[moved, joint])
+    return replace(motion, root_positions=root, rotations=rotations)
 
 
 def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correction:
