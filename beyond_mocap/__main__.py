@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from . import __version__
-from .commands import passing, reconstructing, releasing, ride_path, stream, throwing, touches
+from .commands import learning, passing, reconstructing, releasing, ride_path, stream, throwing, touches
 from .commands.numbers import between, positive, rate
 from .commands.outputs import Writer, check_outputs, writer_of
 from .commands.told import Told
@@ -57,6 +57,7 @@ def _add_library(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--rebuild", action="store_true", help="ignore the cache")
     _add_library_options(verb)
     verb.add_argument("--report", type=Path, metavar="R.json")
+    learning.add_options(verb)
     verb.set_defaults(run=run_library)
     return verb
 
@@ -179,7 +180,9 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
 
 
 def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`library`: builds it and prints what it holds."""
+    """`library`: builds it and prints what it holds; or learns from its words, and proposes those that are lacking."""
+    if options.learn or options.propose:
+        return learning.run(options, told)
     check_outputs(options.report)
     library = _library(options, told, rebuild=options.rebuild)
     summary = summarize(library)
