@@ -181,7 +181,7 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
 
 def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`library`: builds it and prints what it holds; or learns from its words, and proposes those that are lacking."""
-    if options.learn or options.propose:
+    if options.learn or options.propose or options.learned:
         return learning.run(options, told)
     check_outputs(options.report)
     library = _library(options, told, rebuild=options.rebuild)

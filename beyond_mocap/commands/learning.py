@@ -31,6 +31,8 @@ def run(options, told: Told) -> None:
     check_outputs(options.learn, options.propose, never=(options.learned,))
     if options.learn and options.learned:
         raise InputError("--learned", "given beside --learn", "one of them", "leave it away: what is learned is used")
+    if options.learned and not options.propose:
+        raise InputError("--learned", "given without --propose", "--propose OUT.csv", "say where the proposals go")
     known = keep.read(options.learned) if options.learned else None
     if options.learn:
         examples = examples_of(options.library, options.unit, told.progress, options.cache, told.cancelled)
