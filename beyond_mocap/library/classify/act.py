@@ -18,19 +18,22 @@ from .windows import Space
 NEAR = 0.15  # seconds within which a rule's moment and a candidate are the same
 _APART = 10  # samples between two candidates
 _STEADY = 9  # samples over which a stretch's score is averaged
+_NOTHING = 0.01  # seconds: leads that are shorter are how somebody sets keys
 _AROUND = 0.12  # seconds around a candidate in which its strike is looked for
 
 
 @dataclass(frozen=True, eq=False)
 class Act:
     """word: what is done; moment: whether it has key moments, else it is a stretch. kernel: its looks; weights (3,): of
-    its confidence (`confidence.sure`). shown: by how many moments or seconds it was learned. strike: index of STRIKES whose peak tells the key frame, -1 for the score's own;
+    its confidence (`confidence.sure`). silent: what counts as the rules'
+    confidence where they say nothing. shown: by how many moments or seconds it was learned. strike: index of STRIKES whose peak tells the key frame, -1 for the score's own;
     lead: seconds by which the key comes after that peak. before, after: seconds of a row around its key."""
 
     word: str
     moment: bool
     kernel: Kernel
     weights: np.ndarray
+    silent: float
     shown: float
     strike: int
     lead: float
@@ -80,10 +83,10 @@ def rule_at(ruled: Sequence[Proposal], word: str, moment: bool, time: float) -> 
     return max(there, key=lambda one: one.confidence, default=None)
 
 
-def rule_sure(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray) -> np.ndarray:
-    """(N,) confidence of the rules at each of the times, -1 where they are silent."""
+def rule_sure(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray, silent: float) -> np.ndarray:
+    """(N,) confidence of the rules at each of the times, `silent` where they say nothing."""
     found = (rule_at(ruled, word, moment, time) for time in seconds)
-    return np.array([-1.0 if one is None else one.confidence for one in found])
+    return np.array([silent if one is None else one.confidence for one in found])
 
 
 def struck(signals: Signals, strike: int, time: float) -> float:
@@ -103,6 +106,7 @@ def strike_of(signals: Sequence[tuple[Signals, float]]) -> tuple[int, float]:
     for strike in range(len(STRIKES)):
         late = np.array([time - struck(one, strike, time) for one, time in signals])
         lead = float(np.median(late))
+        lead = lead if abs(lead) > _NOTHING else 0.0
         off = float(np.mean(np.abs(late - lead)))
         best = min(best, (off, strike, lead))
     return best[1], best[2]

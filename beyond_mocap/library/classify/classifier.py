@@ -65,7 +65,7 @@ def in_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = False) ->
 def _moments(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
     """The key moments of one act."""
     at, score = candidates(act.kernel, rows, seconds, told, act.word)
-    sure = confidence.sure(act.weights, score, rule_sure(told, act.word, True, seconds[at]))
+    sure = confidence.sure(act.weights, score, rule_sure(told, act.word, True, seconds[at], act.silent))
     return [_moment(act, seen, rows, seconds, told, sample, float(how)) for sample, how in zip(at, sure) if how >= LEAST]
 
 
@@ -82,7 +82,7 @@ def _moment(act: Act, seen: Signals, rows, seconds, told, sample: int, sure: flo
 def _stretches(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
     """The stretches of one act."""
     score = steady(act.kernel.scores(rows))
-    rule = rule_sure(told, act.word, False, seconds)
+    rule = rule_sure(told, act.word, False, seconds, act.silent)
     sure = confidence.sure(act.weights, score, rule)
     out = []
     for start, stop in runs(sure >= 0.5):

@@ -22,6 +22,7 @@ from .windows import Space, windows
 
 _COMPONENTS, _FOLDS, _MOST = 80, 5, 4000  # of a window; of the clips; windows that are no act, for one act
 _KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1  # seconds: an act's moment; where it is neither; the same of a stretch's ends
+_MARGIN = 0.1  # of F1 by which a stretch has to be told better than by the rules
 _EVERY = 5  # samples between two of a stretch that count for its confidence and words
 
 
@@ -61,7 +62,11 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
             if progress is not None:
                 progress(number / len(wanted), f"Learning {word.replace('_', ' ')}")
             acts.append(_act(word, moment, sides))
-    return Classifier(space, tuple(acts), len(examples))
+    kept = tuple(act for act in acts if act is not None)
+    if not kept:
+        words = ", ".join(word for word, _ in wanted)
+        raise InputError("examples", f"only {words}, which the rules find as well", "other acts too", "annotate kicks")
+    return Classifier(space, kept, len(examples))
 
 
 def _acts(examples: Sequence[Example]) -> dict[tuple[str, bool], float]:
@@ -91,10 +96,15 @@ def _twins(example: Example, space: Space) -> list[_Side]:
     ]
 
 
-def _act(word: str, moment: bool, sides: list[_Side]) -> Act:
-    """One act, learned from all sides of all clips."""
+def _act(word: str, moment: bool, sides: list[_Side]) -> Act | None:
+    """One act, learned from all sides of all clips; None of stretches that the rules find better by themselves."""
     looks = _kernel(word, moment, sides)
-    weights = _weights(word, moment, sides)
+    silent = _silent(word, moment, sides)
+    score, rule, shown = _unseen(word, moment, sides, silent)
+    ruled = any(word in one.annotation.words for side in sides for one in side.ruled)
+    weights = confidence.calibrated(score, rule, shown, ruled)
+    if looks is None or (ruled and not moment and not _better(weights, score, rule, shown)):
+        return None
     beside = _details(word, moment, sides)
     strike, lead, before, after = -1, 0.0, 0.0, 0.0
     if moment:
@@ -102,8 +112,8 @@ def _act(word: str, moment: bool, sides: list[_Side]) -> Act:
         strike, lead = strike_of([(one.signals, row.key / one.signals.fps) for one, row in keys])
         before = float(np.median([(row.key - row.start) / one.signals.fps for one, row in keys]))
         after = float(np.median([(row.end - row.key) / one.signals.fps for one, row in keys]))
-    shown = _acts([side.example for side in sides if not side.twin])[word, moment]
-    return Act(word, moment, looks, weights, shown, strike, lead, before, after, beside)
+    times = _acts([side.example for side in sides if not side.twin])[word, moment]
+    return Act(word, moment, looks, weights, silent, times, strike, lead, before, after, beside)
 
 
 def _labels(side: _Side, word: str, moment: bool) -> np.ndarray:
@@ -139,24 +149,37 @@ def _thinned(which: np.ndarray) -> np.ndarray:
     return which[::step]
 
 
-def _weights(word: str, moment: bool, sides: list[_Side]) -> np.ndarray:
-    """Those of the act's confidence, from clips that a kernel had not seen."""
+def _better(weights: np.ndarray, score: np.ndarray, rule: np.ndarray, shown: np.ndarray) -> bool:
+    """Whether score and rules together tell an act better, by F1, than the rules do alone."""
+    ours, theirs = confidence.sure(weights, score, rule) >= 0.5, rule > 0.0
+    f1 = [2.0 * np.sum(said & shown) / max(np.sum(said) + np.sum(shown), 1) for said in (ours, theirs)]
+    return bool(f1[0] > f1[1] + _MARGIN)
+
+
+def _silent(word: str, moment: bool, sides: list[_Side]) -> float:
+    """What the rules' silence counts for: as much as they have found of the examples."""
+    found = []
+    for side in sides:
+        for row in side.example.rows_of(word, moment):
+            middle = row.key if row.key is not None else 0.5 * (row.start + row.end)
+            found.append(rule_at(side.ruled, word, moment, middle / side.example.signals.fps) is not None)
+    return -confidence.silence(sum(found) // 2, len(found) // 2)
+
+
+def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple[np.ndarray, ...]:
+    """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that had not seen their clips."""
     names = list(dict.fromkeys(side.example.name for side in sides))
-    score, rule, shown = [], [], []
+    parts = [(np.zeros(0), np.zeros(0), np.zeros(0, bool))]
     for fold in range(min(_FOLDS, len(names))):
         out = set(names[fold::_FOLDS])
         looks = _kernel(word, moment, [side for side in sides if side.example.name not in out])
         for side in sides if looks is not None else ():
             if side.example.name in out and not side.twin:
-                for column, part in zip((score, rule, shown), _seen(looks, side, word, moment)):
-                    column.append(part)
-    ruled = any(word in one.annotation.words for side in sides for one in side.ruled)
-    if not score:
-        return np.array(confidence.PRIOR[ruled])
-    return confidence.calibrated(np.concatenate(score), np.concatenate(rule), np.concatenate(shown), ruled)
+                parts.append(_seen(looks, side, word, moment, silent))
+    return tuple(np.concatenate(column) for column in zip(*parts))
 
 
-def _seen(looks: kernel.Kernel, side: _Side, word: str, moment: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _seen(looks: kernel.Kernel, side: _Side, word: str, moment: bool, silent: float) -> tuple[np.ndarray, ...]:
     """Scores, the rules' confidences and the truth (C,) of one clip's candidates."""
     if moment:
         at, score = candidates(looks, side.rows, side.seconds, side.ruled, word)
@@ -171,7 +194,7 @@ def _seen(looks: kernel.Kernel, side: _Side, word: str, moment: bool) -> tuple[n
         labels = _labels(side, word, False)
         at = np.flatnonzero(labels >= 0)[::_EVERY]
         score, shown = steady(looks.scores(side.rows))[at], labels[at] == 1
-    return score, rule_sure(side.ruled, word, moment, side.seconds[at]), shown
+    return score, rule_sure(side.ruled, word, moment, side.seconds[at], silent), shown
 
 
 def _details(word: str, moment: bool, sides: list[_Side]) -> details.Details:
