@@ -18,7 +18,9 @@ from functools import partial
 from pathlib import Path
 
 from . import __version__
-from .commands import matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches
+from .commands import (
+    learning, matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches,
+)
 from .commands.numbers import between, positive, rate
 from .commands.outputs import Writer, check_outputs, writer_of
 from .commands.told import Told
@@ -61,6 +63,7 @@ def _add_library(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--rebuild", action="store_true", help="ignore the cache")
     _add_library_options(verb)
     verb.add_argument("--report", type=Path, metavar="R.json")
+    learning.add_options(verb)
     verb.set_defaults(run=run_library)
     return verb
 
@@ -183,7 +186,9 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
 
 
 def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`library`: builds it and prints what it holds."""
+    """`library`: builds it and prints what it holds; or learns from its words, and proposes those that are lacking."""
+    if options.learn or options.propose or options.learned:
+        return learning.run(options, told)
     check_outputs(options.report)
     library = _library(options, told, rebuild=options.rebuild)
     summary = summarize(library)

@@ -1,4 +1,5 @@
-"""Propose Words: what the active clip may show, by rules, as strips to be looked through."""
+"""Propose Words: what the active clip may show, by rules and by what was learned, as strips or to be judged one by
+one."""
 
 from __future__ import annotations
 
@@ -6,14 +7,15 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..beyond_mocap.errors import InputError
-from ..scene import clip_annotation, lanes, recordings, session
+from ..scene import clip_annotation, lanes, proposals, recordings, session
 from ..scene.settings import absolute
 from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_propose_words(Verb, bpy.types.Operator):
     """Propose words for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
-headers, turns, getting up. Look through them; what only a ball shows (dribbling, receiving) is yours to add"""
+headers, turns, getting up; and all that was learned from annotated clips. Look through them; what neither knows is yours
+to add"""
 
     bl_idname = "beyond_mocap.propose_words"
     bl_label = "Propose Words"
@@ -25,6 +27,11 @@ headers, turns, getting up. Look through them; what only a ball shows (dribbling
     replace: BoolProperty(
         name="Replace", default=True,
         description="In place of the strips that are there; else they stay, and proposals are put beside them",
+    )
+
+    review: BoolProperty(
+        name="One by One", default=False, options={"SKIP_SAVE"},
+        description="Only list them: each becomes a strip or key moment when it is accepted",
     )
 
     @classmethod
@@ -39,6 +46,8 @@ headers, turns, getting up. Look through them; what only a ball shows (dribbling
         from ..beyond_mocap.library.keep_words import as_timeline
         from ..beyond_mocap.library.proposals import GAITS, gaits_of, propose
 
+        from ..beyond_mocap.library.classify import keep
+
         settings, rig = context.scene.beyond_mocap, context.object
         motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
         built = session.library(absolute(settings.library_folder), settings.library_unit or None)
@@ -46,12 +55,17 @@ headers, turns, getting up. Look through them; what only a ball shows (dribbling
             gaits = gaits_of(built) if built is not None else GAITS
         except InputError:  # a library without locomotion says nothing of gaits
             gaits = GAITS
-        found = [one for one in propose(motion, gaits) if one.confidence >= self.least]
+        known = keep.read(absolute(settings.words_model)) if settings.words_model else None
+        found = [one for one in propose(motion, gaits, known) if one.confidence >= self.least]
+        if self.review:
+            self.list_them(rig, context.scene, motion, found)
+            return
         before = None if self.replace else lanes.read(rig)
         told = as_timeline([one.annotation for one in found], motion.fps)
         if before is not None:
             told = Timeline((*before.spans, *told.spans), (*before.keys, *told.keys))
         clip_annotation.lay(rig, context.scene, motion, told)
+        proposals.keep(rig, found, "ACCEPTED")
         for one in found:
             row = one.annotation
             if row.key is not None or one.confidence < 0.6:
@@ -59,3 +73,15 @@ headers, turns, getting up. Look through them; what only a ball shows (dribbling
                 self.report({"INFO"}, f"{when} {' '.join(row.words)}: {one.why}, {one.confidence:.0%} sure")
         keys = sum(one.annotation.key is not None for one in found)
         self.report({"INFO"}, f"{rig.name}: {len(found) - keys} stretches and {keys} key moments proposed")
+
+    def list_them(self, rig, scene, motion, found):
+        """List what is not among the clip's words already."""
+        said = set(lanes.read(rig).keys) if lanes.has(rig) else set()
+        if not lanes.has(rig):
+            from ..beyond_mocap.annotation import Timeline
+
+            clip_annotation.lay(rig, scene, motion, Timeline())
+        taken = {(round(key.time * motion.fps), key.words) for key in said}
+        new = [one for one in found if (one.annotation.key, one.annotation.words) not in taken]
+        proposals.keep(rig, new)
+        self.report({"INFO"}, f"{rig.name}: {len(new)} proposals to look through")

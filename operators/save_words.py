@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
-from ..scene import clip_annotation, clips
+from ..scene import clip_annotation, clips, proposals
 from .verb import Verb
 
 
@@ -52,6 +52,6 @@ it. What is written there already is overwritten only when you say so"""
         rig = context.object
         rows = clip_annotation.said(rig)
         clip, folder = clip_annotation.clip_file(rig)
-        target = keep(clip, folder, rows, rig[clip_annotation.RATE], self.overwrite)
+        target = keep(clip, folder, rows, rig[clip_annotation.RATE], self.overwrite, proposals.sources(rig))
         clips.say(context.window_manager, clip_annotation.shown(rig), rows)
         self.report({"INFO"}, f"{len(rows)} rows of words written to {target}; Build Library takes them in")

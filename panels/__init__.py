@@ -12,6 +12,7 @@ from . import (
 
 CLASSES = (
     library.BEYOND_MOCAP_UL_clips,
+    library.BEYOND_MOCAP_UL_proposals,
     library.BEYOND_MOCAP_PT_library,
     players.BEYOND_MOCAP_UL_players,
     players.BEYOND_MOCAP_UL_pins,

@@ -7,6 +7,7 @@ import bpy
 from .tab import Step, paragraph, table
 
 MARKS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
+STATES = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
 
 
 class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
@@ -22,6 +23,24 @@ class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
 
     def draw_filter(self, _context, _layout):
         """Filter and order stand above the list, and work there for any number of clips."""
+
+
+class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
+    """What was proposed for a clip: what became of it, the words, how sure they are, and buttons to judge them."""
+
+    def draw_item(self, _context, layout, _data, one, _icon, _active_data, _active_property, index=0):
+        """One proposal."""
+        row = layout.row(align=True)
+        row.active = one.state != "REFUSED"
+        names = row.split(factor=0.72, align=True)
+        names.label(text=one.name.replace("_", " "), icon=STATES[one.state])
+        names.label(text=f"{one.confidence:.0%}")
+        for what, icon in (("ACCEPT", "CHECKMARK"), ("REFUSE", "X")):
+            button = row.operator("beyond_mocap.judge_proposal", text="", icon=icon, emboss=False)
+            button.what, button.index = what, index
+
+    def draw_filter(self, _context, _layout):
+        """The list is short."""
 
 
 class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
@@ -59,7 +78,8 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
         if body:
             draw_clips(body, settings, listing, current)
         if context.object is not None and "beyond_mocap_clip" in context.object:
-            draw_opened(layout, context.object)
+            draw_opened(layout, context.object, settings)
+        self.progress(context, "learning")
         header, body = layout.panel("beyond_mocap_library_more", default_closed=True)
         header.label(text="Tools")
         if body:
@@ -104,14 +124,34 @@ def draw_assets(layout, listing) -> None:
     column.operator("beyond_mocap.make_assets", text="Selected Armatures", icon="ARMATURE_DATA").which = "SELECTED"
 
 
-def draw_opened(layout, thing) -> None:
+def draw_opened(layout, thing, settings) -> None:
     """What can be done with a clip that is in the scene."""
     box = layout.box()
     box.label(text=thing.name, icon="ARMATURE_DATA")
     column = box.column(align=True)
-    column.operator("beyond_mocap.propose_words", icon="LIGHT")
+    row = column.row(align=True)
+    row.operator("beyond_mocap.propose_words", icon="LIGHT")
+    row.operator("beyond_mocap.propose_words", text="Look Through", icon="VIEWZOOM").review = True
+    row = column.row(align=True)
+    row.prop(settings, "words_model", text="")
+    row.operator("beyond_mocap.learn_words", text="Learn", icon="OUTLINER_OB_LIGHTPROBE")
+    if thing.beyond_mocap_proposals.listed:
+        draw_proposals(box, thing.beyond_mocap_proposals)
+    column = box.column(align=True)
     column.operator("beyond_mocap.save_words", icon="FILE_TICK")
     column.operator("beyond_mocap.remove_clip", icon="TRASH")
+
+
+def draw_proposals(layout, group) -> None:
+    """What was proposed, and the keys to judge it."""
+    layout.template_list("BEYOND_MOCAP_UL_proposals", "", group, "listed", group, "active", rows=4)
+    if 0 <= group.active < len(group.listed):
+        one = group.listed[group.active]
+        paragraph(layout, f"{one.source}: {one.why}" if one.why else one.source, "INFO")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.review_proposals", icon="EVENT_A")
+    row.operator("beyond_mocap.judge_proposal", text="All", icon="CHECKMARK").what = "ACCEPT_ALL"
+    row.operator("beyond_mocap.judge_proposal", text="None", icon="X").what = "REFUSE_ALL"
 
 
 def draw_tools(body, settings) -> None:

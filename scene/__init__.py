@@ -31,6 +31,7 @@
 - `markers`     a recording of optical markers as a cloud that plays, and the way from it to a body
 - `match`       a stretch of a whole match: everybody in kit, pitch, ball, cameras, and the process that makes it
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
+- `proposals`   words that were proposed for a clip, to be accepted or refused one by one
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
 The classes are registered in the order of CLASSES: what others point to comes first.
@@ -39,7 +40,7 @@ The classes are registered in the order of CLASSES: what others point to comes f
 import bpy
 
 from . import (
-    background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, result, rig,
+    background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, proposals, result, rig,
     session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
 from .aimed import live as aimed_live
@@ -75,6 +76,7 @@ CLASSES = (
     view_settings.BeyondMocapPlayhead,
     strip_lines.BeyondMocapLine,
     lanes.BeyondMocapLanes,
+    *proposals.CLASSES,
     dots.BeyondMocapDot,
     word_checks.BeyondMocapProblem,
     word_checks.BeyondMocapProblems,
@@ -91,6 +93,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Action", "beyond_mocap", strip_lines.BeyondMocapLine),
     ("TimelineMarker", "beyond_mocap", strip_lines.BeyondMocapLine),
     ("Object", "beyond_mocap_lanes", lanes.BeyondMocapLanes),
+    ("Object", "beyond_mocap_proposals", proposals.BeyondMocapProposals),
     ("Object", "beyond_mocap_dot", dots.BeyondMocapDot),
     ("Object", "beyond_mocap_ride", BeyondMocapRide),
     ("Object", "beyond_mocap_hits", passes.BeyondMocapHits),

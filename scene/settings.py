@@ -153,6 +153,10 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         name="Metres per unit", default=0.0, min=0.0, precision=5,
         description="Size of one unit of the clips in metres; 0 guesses it from the height of the hips",
     )
+    words_model: StringProperty(
+        name="Learned Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        description="What Learn from Words has kept, of this library or another one; empty: Propose Words goes by rules",
+    )
     library_watch: BoolProperty(
         name="Watch Folder", default=False,
         description="Look every few seconds whether clips or words in the folder are new or changed, and say so; "

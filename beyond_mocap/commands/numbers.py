@@ -16,6 +16,11 @@ def rate(text: str) -> float:
     return between(text, 1.0, 480.0, "1 to 480 frames per second")
 
 
+def share(text: str) -> float:
+    """A share of 1."""
+    return between(text, 0.0, 1.0, "a number from 0 to 1")
+
+
 def between(text: str, low: float, high: float, expected: str, kind: type = float) -> float:
     """The number of a kind, float or int, that an option's text says, where it lies from `low` to `high`."""
     with contextlib.suppress(ValueError):

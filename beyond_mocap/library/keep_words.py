@@ -17,6 +17,7 @@ from ..annotation.text import read_text
 from ..errors import InputError
 from ..files.whole import atomic_write
 from .scan import TABLE_NAME, Annotations
+from .word_sources import Sources, cells, comment, sources_in_table, sources_in_text
 
 TEXT, TABLE = "TEXT", "TABLE"
 
@@ -46,6 +47,16 @@ def read_words(clip: Path, folder: Path, fps: float) -> tuple[ClipAnnotation, ..
     return Annotations(folder, [clip]).of(clip, fps)
 
 
+def read_sources(clip: Path, folder: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Sources:
+    """Who said the rows that `read_words` gave; those that a person has written have no source."""
+    form, target = place(clip, folder)
+    if not target.is_file():
+        return {}
+    if form == TEXT:
+        return sources_in_text(target, rows, fps)
+    return sources_in_table(target, _name_in(target, clip), rows)
+
+
 def place(clip: Path, folder: Path) -> tuple[str, Path]:
     """Where the words of a clip belong: TEXT and `NAME.txt`, or TABLE and the table that speaks of it. A text that is
     there counts most, then a table with rows for it, then one that stands in its folder."""
@@ -60,11 +71,11 @@ def place(clip: Path, folder: Path) -> tuple[str, Path]:
     return (TABLE, absolute.parent / TABLE_NAME) if absolute.parent in tables else (TEXT, beside)
 
 
-def text_of(rows: Sequence[ClipAnnotation]) -> str:
-    """The rows in the text form, in frames of the clip."""
+def text_of(rows: Sequence[ClipAnnotation], sources: Sources | None = None) -> str:
+    """The rows in the text form, in frames of the clip; behind those of `sources` who said it."""
     lines = []
     for row in rows:
-        words = " ".join(row.words)
+        words = " ".join(row.words) + comment(row, sources or {})
         if row.key is None or row.end > row.start:
             lines.append((row.start, f"{row.start}f {max(row.end, row.start + 1)}f {words}"))
         if row.key is not None:
@@ -72,8 +83,11 @@ def text_of(rows: Sequence[ClipAnnotation]) -> str:
     return "".join(line + "\n" for _, line in sorted(lines, key=lambda line: line[0]))
 
 
-def keep(clip: Path, folder: Path, rows: Sequence[ClipAnnotation], fps: float, overwrite: bool = False) -> Path:
-    """Write a clip's rows where they belong (`place`); returns the file.
+def keep(
+    clip: Path, folder: Path, rows: Sequence[ClipAnnotation], fps: float, overwrite: bool = False,
+    sources: Sources | None = None,
+) -> Path:
+    """Write a clip's rows where they belong (`place`); returns the file. sources: who said those that no person did.
 
     InputError where words that differ are there and `overwrite` does not say that they may go, or where the file cannot
     be written.
@@ -83,11 +97,15 @@ def keep(clip: Path, folder: Path, rows: Sequence[ClipAnnotation], fps: float, o
         what = "has other words for this clip already"
         raise InputError(target, what, "a clip without words", "say that they may be overwritten")
     if form == TEXT:
-        atomic_write(target, text_of(rows))
+        atomic_write(target, text_of(rows, sources))
     else:
-        name = Path(os.path.normpath(clip.absolute())).relative_to(target.parent).as_posix()
-        atomic_write(target, _table(target, name, rows, fps))
+        atomic_write(target, _table(target, _name_in(target, clip), rows, fps, sources or {}))
     return target
+
+
+def _name_in(table: Path, clip: Path) -> str:
+    """How a table's column `file` spells a clip."""
+    return Path(os.path.normpath(clip.absolute())).relative_to(table.parent).as_posix()
 
 
 def has_words(clip: Path, folder: Path, fps: float) -> bool:
@@ -98,7 +116,7 @@ def has_words(clip: Path, folder: Path, fps: float) -> bool:
     return bool(read_words(clip, folder, fps))
 
 
-def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float) -> str:
+def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float, sources: Sources) -> str:
     """The table's text with these rows in place of those of the clip; other rows and columns stay as they are."""
     read_annotation_csv(table)  # one that is broken is told, not made worse
     text = read_text(table)
@@ -111,7 +129,7 @@ def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float) -
     first = next((number for number, row in enumerate(old) if row["file"].strip() == name), len(old))
     kept = [row for row in old if row["file"].strip() != name]
     new = [{"file": name, "fps": f"{fps:g}", "start_frame": row.start, "end_frame": row.end,
-            "key_frame": "" if row.key is None else row.key, "labels": " ".join(row.words)} for row in rows]
+            "key_frame": "" if row.key is None else row.key, "labels": " ".join(row.words), **cells(row, sources)} for row in rows]
     before = len([row for row in old[:first] if row["file"].strip() != name])
     writer.writerows([*kept[:before], *new, *kept[before:]])
     return out.getvalue()

@@ -6,13 +6,15 @@ speed, the side the faster foot's), a body that falls freely for longer than a r
 head that strikes forward in the air (a header), a body that turns on the spot, one that gets up from the ground. There is
 no ball in a recording, so what only a ball shows (dribbling, receiving) is not proposed.
 
-`propose` is all that others call: another way of finding words takes its place behind the same call.
+`propose` is all that others call. With a classifier that has learned from annotated clips (`library.classify`) the rules
+are what it starts from: it weighs them with what it has seen, and they stay for all acts that it does not know.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -27,8 +29,13 @@ from ..motion.runs import runs
 from ..motion.striking import surfaces
 from .library import Library
 
+if TYPE_CHECKING:
+    from .classify.classifier import Classifier
+
 GAITS = (("standing", 0.0), ("walking", 0.4), ("jogging", 2.0), ("running", 4.0), ("sprinting", 5.5))
 """Each gait and the speed in m/s from which on it holds, where no library says its own."""
+
+RULES, LEARNED = "rules", "learned"
 
 _WAYS = ("front", "left", "back", "right")
 _GAIT_SECONDS, _SHORTEST = 0.5, 0.5  # over which speed is averaged; of a stretch
@@ -47,21 +54,27 @@ _LYING, _UP = 0.45, 0.85  # of the leg's length: the pelvis of a body on the gro
 
 @dataclass(frozen=True)
 class Proposal:
-    """Words for a stretch of a recording, in its own frames; confidence: 0 to 1; why: what was seen, for a person."""
+    """Words for a stretch of a recording, in its own frames; confidence: 0 to 1; why: what was seen, for a person;
+    source: RULES, or LEARNED from annotated clips."""
 
     annotation: ClipAnnotation
     confidence: float
     why: str
+    source: str = RULES
 
 
-def propose(motion: Motion, gaits: Sequence[tuple[str, float]] = GAITS) -> tuple[Proposal, ...]:
+def propose(
+    motion: Motion, gaits: Sequence[tuple[str, float]] = GAITS, classifier: "Classifier | None" = None
+) -> tuple[Proposal, ...]:
     """What a recording may show, ordered by its first frame. gaits: each gait's word and the m/s from which on it
-    holds, slow to fast (`gaits_of` a library). InputError where the skeleton has no legs."""
+    holds, slow to fast (`gaits_of` a library). classifier: what was learned from annotated clips; without one the rules
+    alone. InputError where the skeleton has no legs."""
     seen = _Seen.of(motion)
     kicks = _kicks(seen)
     low = _on_ground(seen)
     found = [*_locomotion(seen, gaits), *kicks, *_jumps(seen, kicks), *_turns(seen), *low]
-    return tuple(sorted(found, key=lambda one: (one.annotation.start, one.annotation.end)))
+    ruled = tuple(sorted(found, key=lambda one: (one.annotation.start, one.annotation.end)))
+    return ruled if classifier is None else classifier.propose(motion, ruled)
 
 
 def gaits_of(library: Library) -> tuple[tuple[str, float], ...]:

@@ -85,7 +85,7 @@ def test_words_that_are_there_stay_until_told(library):
         bpy.ops.beyond_mocap.save_words()
     assert (library / "jogging_2_9.txt").read_text() == before
     bpy.ops.beyond_mocap.save_words(overwrite=True)
-    assert (library / "jogging_2_9.txt").read_text() == "0f 180f jogging front\n"
+    assert (library / "jogging_2_9.txt").read_text() == "0f 180f jogging front  # rules 0.95\n"
 
 
 def test_undo_and_removal_leave_nothing_behind(library):

@@ -52,6 +52,11 @@ def list_clips():
     bpy.ops.beyond_mocap.list_clips()
 
 
+def list_proposals():
+    """What is proposed for the clip that is open."""
+    bpy.ops.beyond_mocap.propose_words(review=True)
+
+
 def forget_dots():
     """As in a file of the time before dots."""
     for player in bpy.context.scene.beyond_mocap.players:
@@ -362,11 +367,13 @@ ROWS = {
     "import_markers": Row("imported", lambda places: {"filepath": f"{places.match}/walk.trc"}),
     "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
     "import_words": Row("imported", lambda places: {"filepath": f"{places.match}/player1.txt"}),
+    "judge_proposal": Row("clip", prepare=list_proposals),
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
     "keep_throw": Row("accepted", prepare=throw),
     "kick_at_target": Row("accepted", prepare=lambda: a_target("kick")),
     "keep_bone_map": Row("rig", changes=False),
+    "learn_words": Row("clip"),
     "leave_aim": Row("accepted", prepare=aim_a_ball),
     "leave_throw": Row("accepted", prepare=throw),
     "leave_path": Row("accepted", prepare=ride),
@@ -409,6 +416,7 @@ ROWS = {
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
     "resynthesize_stretch": Row("synthesized", lambda places: {"player": "player1", "start": 1.0, "end": 2.0}),
+    "review_proposals": Row("clip", prepare=list_proposals, window=True),
     "save_bone_map": Row("rig", lambda places: {"filepath": f"{places.out}/saved.json"}, changes=False),
     "save_marker_model": Row(
         "imported", lambda places: {"filepath": f"{places.out}/model.json"}, a_body_of_markers, changes=False

@@ -1,0 +1,122 @@
+"""A recording as signals that no longer tell whose body it is: at one rate, in the facing frame, in lengths of a leg.
+
+Positions and velocities of thirteen points that every humanoid has, the pelvis's height, speed and turning, the trunk's
+lean, and what the rules of `proposals` look at. The mirrored body's signals come from these by exchanging sides, so that
+one example teaches both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from ...motion import contacts, quaternion
+from ...motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
+from ...motion.motion import Motion, forward_kinematics
+
+RATE = 30.0
+"""Signals per second."""
+
+MIDDLE, PAIRED = ("chest", "head"), ("hand", "elbow", "knee", "ankle", "toe")
+"""Points by name: those that have no side, and those of which there is a left and a right one."""
+
+_SMOOTH = 0.015  # seconds: velocities are taken of places smoothed so
+_REACH = 0.12  # seconds by which velocities are weighed, so that they are lengths like the places (`library.features`)
+STRIKES = ("foot", "hand", "head", "pelvis up", "pelvis down")
+"""What has a peak at the recording's own rate where something is struck, caught or cleared: the faster foot's and the
+faster hand's speed, the head's forward against the chest, the pelvis's height and its negative."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """What a recording shows.
+
+    fps: the recording's own rate; count: its frames. frames (N,): the fractional frames of N samples at RATE.
+    middle (N, 2, 6), paired (N, 2, 5, 6): of each point (MIDDLE; left and right PAIRED) place against the pelvis and
+    velocity times 0.12 s, x forward, y left, z up, in legs. trunk (N, 8): pelvis's height in legs, its velocity in
+    m/s (forward, left, up), turning in rad/s, the trunk's direction (3). strikes (count, 5): STRIKES in m/s and m.
+    """
+
+    fps: float
+    count: int
+    frames: np.ndarray
+    middle: np.ndarray
+    paired: np.ndarray
+    trunk: np.ndarray
+    strikes: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    @property
+    def mirrored(self) -> "Signals":
+        """The same with left and right exchanged."""
+        across, trunk = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]), np.array([1, 1, -1, 1, -1, 1, -1, 1.0])
+        return replace(self, middle=self.middle * across, paired=self.paired[:, ::-1] * across, trunk=self.trunk * trunk)
+
+
+def signals(motion: Motion) -> Signals:
+    """The signals of a recording; InputError where its skeleton has no legs."""
+    body, leg = identify(motion.skeleton), leg_length(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    facing = np.unwrap(heading_from_positions(motion.skeleton, places))
+    moving = _velocity(places, motion.fps)
+    hips = body.hips
+    at = np.arange(0.0, len(motion) - 1 + 1e-6, motion.fps / RATE)
+    rows = np.minimum(np.round(at).astype(int), len(motion) - 1)
+
+    def points(joints: list[int]) -> np.ndarray:
+        away = places[rows][:, joints] - places[rows][:, [hips]]
+        pace = (moving[rows][:, joints] - moving[rows][:, [hips]]) * _REACH
+        turn = -facing[rows][:, None]
+        return np.concatenate([_turned(away, turn), _turned(pace, turn)], axis=-1) / leg
+
+    sides = [_points_of(body, limb) for limb in (body.left, body.right)]
+    head = body.head if body.head is not None else body.neck if body.neck is not None else body.chest
+    strikes = _strikes(places, moving, body, head, facing)
+    return Signals(motion.fps, len(motion), at, points([body.chest, head]),
+                   np.stack([points(one) for one in sides], axis=1),
+                   _trunk(motion, body, places, moving, facing, leg)[rows], strikes)
+
+
+def _points_of(body: Humanoid, limb) -> list[int]:
+    """Joints of PAIRED on one side; what a body lacks stands where it would hang."""
+    upper = limb.upper_arm if limb.upper_arm is not None else body.chest
+    elbow = limb.lower_arm if limb.lower_arm is not None else upper
+    return [limb.hand if limb.hand is not None else elbow, elbow, limb.lower_leg, limb.foot, limb.toe_or_foot]
+
+
+def _trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.ndarray:
+    """(T, 8) of `Signals.trunk`."""
+    hips, top = body.hips, body.neck if body.neck is not None else body.chest
+    height = (places[:, hips, 2] - contacts.ground_height(motion)) / leg
+    pace = gaussian_filter1d(_turned(moving[:, hips], -facing), max(0.05 * motion.fps, 0.5), axis=0, mode="nearest")
+    smooth = gaussian_filter1d(facing, max(0.1 * motion.fps, 0.5), mode="nearest")
+    turning = np.gradient(smooth) * motion.fps if len(motion) > 1 else np.zeros(1)
+    up = _turned(places[:, top] - places[:, hips], -facing)
+    up = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9)
+    return np.concatenate([height[:, None], pace, turning[:, None], up], axis=1)
+
+
+def _strikes(places, moving, body: Humanoid, head: int, facing) -> np.ndarray:
+    """(T, 5) of `Signals.strikes`."""
+    feet = [body.left.toe_or_foot, body.right.toe_or_foot]
+    hands = [_points_of(body, limb)[0] for limb in (body.left, body.right)]
+    speed = np.linalg.norm(moving[:, [*feet, *hands]], axis=-1).reshape(len(places), 2, 2).max(axis=2)
+    nod = _turned(moving[:, head] - moving[:, body.chest], -facing)[:, 0]
+    height = places[:, body.hips, 2]
+    return np.concatenate([speed, nod[:, None], height[:, None], -height[:, None]], axis=1)
+
+
+def _velocity(places: np.ndarray, fps: float) -> np.ndarray:
+    """(T, J, 3) m/s of places (T, J, 3) m."""
+    if len(places) < 2:
+        return np.zeros_like(places)
+    return np.gradient(gaussian_filter1d(places, max(_SMOOTH * fps, 0.5), axis=0, mode="nearest"), axis=0) * fps
+
+
+def _turned(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) turned by angles (...) about the world's Z."""
+    return np.concatenate([quaternion.turned_level(v[..., :2], angle), v[..., 2:]], axis=-1)

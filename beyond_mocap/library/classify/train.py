@@ -1,0 +1,218 @@
+"""Training: from a few annotated clips to a classifier of the acts that are said in them.
+
+Every clip counts twice, as it is and mirrored. A clip is taken to be annotated throughout: where no row says an act,
+there is none. How sure a score makes is found from clips that were left out of its training, a fifth at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...annotation import swap_sides
+from ...errors import InputError
+from ..proposals import Proposal
+from . import confidence, details, kernel
+from .act import Act, candidates, in_space, rule_at, rule_sure, steady, strike_of
+from .classifier import Classifier, in_seconds
+from .examples import Example, act_of
+from .windows import Space, windows
+
+_COMPONENTS, _FOLDS, _MOST = 80, 5, 4000  # of a window; of the clips; windows that are no act, for one act
+_KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1  # seconds: an act's moment; where it is neither; the same of a stretch's ends
+_MARGIN = 0.1  # of F1 by which a stretch has to be told better than by the rules
+_EVERY = 5  # samples between two of a stretch that count for its confidence and words
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """A clip or its mirrored twin. example: the clip; rows (N, K): its windows; seconds (N,); said: its rows' words in
+    `example.rows`' order; ruled: what the rules say, in seconds; twin: whether it is mirrored."""
+
+    example: Example
+    rows: np.ndarray
+    seconds: np.ndarray
+    said: tuple[tuple[str, ...], ...]
+    ruled: tuple[Proposal, ...]
+    twin: bool
+
+
+def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Classifier:
+    """A classifier of all acts that at least two moments or one second of stretches show.
+
+    progress(fraction, text); cancelled(). The same examples give the same bits. InputError where no act has enough.
+    """
+    from threadpoolctl import threadpool_limits
+
+    from ...errors import Cancelled
+
+    wanted = _acts(examples)
+    if not wanted:
+        found = f"{len(examples)} clips with too few key moments"
+        raise InputError("examples", found, "two moments of an act at least", "annotate more clips, kicks for example")
+    with threadpool_limits(limits=1):  # with more, sums of products come out in another order
+        space = Space.of(np.concatenate([windows(s) for one in examples for s in _sides(one)]), _COMPONENTS)
+        sides = [side for one in examples for side in _twins(one, space)]
+        acts = []
+        for number, (word, moment) in enumerate(wanted):
+            if cancelled is not None and cancelled():
+                raise Cancelled("learning: cancelled")
+            if progress is not None:
+                progress(number / len(wanted), f"Learning {word.replace('_', ' ')}")
+            acts.append(_act(word, moment, sides))
+    kept = tuple(act for act in acts if act is not None)
+    if not kept:
+        words = ", ".join(word for word, _ in wanted)
+        raise InputError("examples", f"only {words}, which the rules find as well", "other acts too", "annotate kicks")
+    return Classifier(space, kept, len(examples))
+
+
+def _acts(examples: Sequence[Example]) -> dict[tuple[str, bool], float]:
+    """(word, whether it has moments) of all acts that are shown often enough, with the number of their moments or the
+    seconds of their stretches."""
+    found: dict[tuple[str, bool], float] = {}
+    for one in examples:
+        for row in one.rows:
+            kind, moment = (act_of(row), row.key is not None), row.key is not None
+            length = 1.0 if moment else (row.end - row.start) / one.signals.fps
+            found[kind] = found.get(kind, 0.0) + length
+    return {kind: shown for kind, shown in sorted(found.items()) if kind[0] and shown >= (2.0 if kind[1] else 1.0)}
+
+
+def _sides(example: Example):
+    return example.signals, example.signals.mirrored
+
+
+def _twins(example: Example, space: Space) -> list[_Side]:
+    """The clip and its mirrored twin."""
+    words = tuple(row.words for row in example.rows)
+    ruled, fps = in_seconds(example.ruled, example.signals.fps), example.seconds()
+    other = in_seconds(example.ruled, example.signals.fps, mirrored=True)
+    return [
+        _Side(example, in_space(example.signals, space), fps, words, ruled, False),
+        _Side(example, in_space(example.signals.mirrored, space), fps, tuple(map(swap_sides, words)), other, True),
+    ]
+
+
+def _act(word: str, moment: bool, sides: list[_Side]) -> Act | None:
+    """One act, learned from all sides of all clips; None of stretches that the rules find better by themselves."""
+    looks = _kernel(word, moment, sides)
+    silent = _silent(word, moment, sides)
+    score, rule, shown = _unseen(word, moment, sides, silent)
+    ruled = any(word in one.annotation.words for side in sides for one in side.ruled)
+    weights = confidence.calibrated(score, rule, shown, ruled)
+    if looks is None or (ruled and not moment and not _better(weights, score, rule, shown)):
+        return None
+    beside = _details(word, moment, sides)
+    strike, lead, before, after = -1, 0.0, 0.0, 0.0
+    if moment:
+        keys = [(side.example, row) for side in sides if not side.twin for row in side.example.rows_of(word, True)]
+        strike, lead = strike_of([(one.signals, row.key / one.signals.fps) for one, row in keys])
+        before = float(np.median([(row.key - row.start) / one.signals.fps for one, row in keys]))
+        after = float(np.median([(row.end - row.key) / one.signals.fps for one, row in keys]))
+    times = _acts([side.example for side in sides if not side.twin])[word, moment]
+    return Act(word, moment, looks, weights, silent, times, strike, lead, before, after, beside)
+
+
+def _labels(side: _Side, word: str, moment: bool) -> np.ndarray:
+    """(N,) 1 where a side shows the act, 0 where it does not, -1 where nobody can say."""
+    out, fps = np.zeros(len(side.seconds), int), side.example.signals.fps
+    for row in side.example.rows:
+        if moment and row.key is not None and word in row.words:
+            apart = np.abs(side.seconds - row.key / fps)
+            out[(apart <= _GUARD) & (out == 0)] = -1
+            if act_of(row) == word:
+                out[apart <= _KEY] = 1
+        elif not moment and word in row.words:
+            start, end = row.start / fps, row.end / fps
+            out[(side.seconds >= start - _EDGE) & (side.seconds <= end + _EDGE) & (out == 0)] = -1
+            if act_of(row) == word and row.key is None:
+                out[(side.seconds >= start + _EDGE) & (side.seconds <= end - _EDGE)] = 1
+    return out
+
+
+def _kernel(word: str, moment: bool, sides: list[_Side]) -> kernel.Kernel | None:
+    """The looks of an act; None where these sides show none."""
+    labels = np.concatenate([_labels(side, word, moment) for side in sides])
+    rows = np.concatenate([side.rows for side in sides])
+    kept = np.concatenate([_thinned(np.flatnonzero(labels == 1)), _thinned(np.flatnonzero(labels == 0))])
+    if len(set(labels[kept])) < 2:
+        return None
+    return kernel.fitted(rows[kept], labels[kept] == 1)
+
+
+def _thinned(which: np.ndarray) -> np.ndarray:
+    """Every other one, or as many fewer as leave _MOST."""
+    step = max(2, -(-len(which) // _MOST)) if len(which) > 400 else 1
+    return which[::step]
+
+
+def _better(weights: np.ndarray, score: np.ndarray, rule: np.ndarray, shown: np.ndarray) -> bool:
+    """Whether score and rules together tell an act better, by F1, than the rules do alone."""
+    ours, theirs = confidence.sure(weights, score, rule) >= 0.5, rule > 0.0
+    f1 = [2.0 * np.sum(said & shown) / max(np.sum(said) + np.sum(shown), 1) for said in (ours, theirs)]
+    return bool(f1[0] > f1[1] + _MARGIN)
+
+
+def _silent(word: str, moment: bool, sides: list[_Side]) -> float:
+    """What the rules' silence counts for: as much as they have found of the examples."""
+    found = []
+    for side in sides:
+        for row in side.example.rows_of(word, moment):
+            middle = row.key if row.key is not None else 0.5 * (row.start + row.end)
+            found.append(rule_at(side.ruled, word, moment, middle / side.example.signals.fps) is not None)
+    return -confidence.silence(sum(found) // 2, len(found) // 2)
+
+
+def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple[np.ndarray, ...]:
+    """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that had not seen their clips."""
+    names = list(dict.fromkeys(side.example.name for side in sides))
+    parts = [(np.zeros(0), np.zeros(0), np.zeros(0, bool))]
+    for fold in range(min(_FOLDS, len(names))):
+        out = set(names[fold::_FOLDS])
+        looks = _kernel(word, moment, [side for side in sides if side.example.name not in out])
+        for side in sides if looks is not None else ():
+            if side.example.name in out and not side.twin:
+                parts.append(_seen(looks, side, word, moment, silent))
+    return tuple(np.concatenate(column) for column in zip(*parts))
+
+
+def _seen(looks: kernel.Kernel, side: _Side, word: str, moment: bool, silent: float) -> tuple[np.ndarray, ...]:
+    """Scores, the rules' confidences and the truth (C,) of one clip's candidates."""
+    if moment:
+        at, score = candidates(looks, side.rows, side.seconds, side.ruled, word)
+        fps = side.example.signals.fps
+        keys = np.array([row.key / fps for row in side.example.rows_of(word, True)])
+        shown = np.zeros(len(at), bool)
+        for key in keys:
+            near = np.flatnonzero(np.abs(side.seconds[at] - key) <= 0.1)
+            if len(near):
+                shown[near[np.argmax(score[near])]] = True
+    else:
+        labels = _labels(side, word, False)
+        at = np.flatnonzero(labels >= 0)[::_EVERY]
+        score, shown = steady(looks.scores(side.rows))[at], labels[at] == 1
+    return score, rule_sure(side.ruled, word, moment, side.seconds[at], silent), shown
+
+
+def _details(word: str, moment: bool, sides: list[_Side]) -> details.Details:
+    """The words beside the act."""
+    rows, words, ruled, clips = [], [], [], []
+    names = {name: number for number, name in enumerate(dict.fromkeys(side.example.name for side in sides))}
+    for side in sides:
+        fps = side.example.signals.fps
+        for row, said in zip(side.example.rows, side.said):
+            if act_of(row) != word or (row.key is not None) != moment:
+                continue
+            if moment:
+                middle = int(np.argmin(np.abs(side.seconds - row.key / fps)))
+                at = np.clip([middle - 1, middle, middle + 1], 0, len(side.seconds) - 1)
+            else:
+                at = np.flatnonzero((side.seconds >= row.start / fps) & (side.seconds <= row.end / fps))[::_EVERY]
+            rows.append(side.rows[at])
+            words += [tuple(other for other in said if other != word)] * len(at)
+            ruled += [rule_at(side.ruled, word, moment, float(time)) for time in side.seconds[at]]
+            clips += [names[side.example.name]] * len(at)
+    return details.fitted(np.concatenate(rows), words, ruled, np.array(clips))

@@ -1,0 +1,66 @@
+"""Who said a clip's words, where it was not a person: each automatic row's source and how sure it was.
+
+In a text it stands behind a line as a comment, `156f kick right low  # learned 0.93`, in a table in the columns `source`
+and `confidence`, where it has them. Nothing else reads it; a row that a person has changed has none.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..annotation import ClipAnnotation, clip_annotations, parse_timeline
+from ..annotation.text import read_text
+
+Sources = Mapping[ClipAnnotation, tuple[str, float]]
+"""A row -> what proposed it, and its confidence from 0 to 1."""
+
+_COMMENT = re.compile(r"#\s*([A-Za-z_]+)\s+([01](?:\.\d+)?)\s*$")
+COLUMNS = ("source", "confidence")
+
+
+def comment(row: ClipAnnotation, sources: Sources) -> str:
+    """What is written behind the row's lines; empty where a person has said it."""
+    found = sources.get(row)
+    return f"  # {found[0]} {found[1]:.2f}" if found else ""
+
+
+def cells(row: ClipAnnotation, sources: Sources) -> dict[str, str]:
+    """What stands in a table's COLUMNS."""
+    source, confidence = sources.get(row, ("", 0.0))
+    return {"source": source, "confidence": f"{confidence:.2f}" if source else ""}
+
+
+def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> dict[ClipAnnotation, tuple[str, float]]:
+    """The sources of rows that were read from a text file; of a row with two lines the key moment's counts.
+
+    fps: the clip's rate. InputError where the file cannot be read.
+    """
+    said = {}
+    for line in read_text(path).splitlines():
+        found = _COMMENT.search(line)
+        for row in clip_annotations(parse_timeline(line, str(path), fps), fps) if found else ():
+            said[(row.start, row.end) if row.key is None else row.key, frozenset(row.words)] = found
+    out = {}
+    for row in rows:
+        found = said.get((row.key if row.key is not None else (row.start, row.end), frozenset(row.words)))
+        if found:
+            out[row] = (found[1], min(1.0, float(found[2])))
+    return out
+
+
+def sources_in_table(path: Path, name: str, rows: tuple[ClipAnnotation, ...]) -> dict[ClipAnnotation, tuple[str, float]]:
+    """The sources of a clip's rows in a table that has the columns; `name` as its column `file` spells it."""
+    out = {}
+    for line in csv.DictReader(io.StringIO(read_text(path), newline="")):
+        source, sure = (line.get("source") or "").strip(), (line.get("confidence") or "").strip()
+        if (line.get("file") or "").strip() == name and source and re.fullmatch(r"[01](\.\d+)?", sure):
+            for row in rows:
+                key = "" if row.key is None else str(row.key)
+                there = (str(row.start), str(row.end), key, " ".join(row.words))
+                if there == tuple((line.get(c) or "").strip() for c in ("start_frame", "end_frame", "key_frame", "labels")):
+                    out[row] = (source, min(1.0, float(sure)))
+    return out

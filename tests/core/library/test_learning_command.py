@@ -1,0 +1,80 @@
+"""`library --learn` and `--propose`: from the clips with words to a table for those without, which a library reads."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from beyond_mocap.__main__ import main
+from beyond_mocap.annotation import read_annotation_csv
+
+SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three kicks and a jog with words, another kick and a walk without."""
+    folder = tmp_path_factory.mktemp("library")
+    for name in ("kick_low_inside", "kick_low_inside_slow", "kick_low_top", "jogging_2_9"):
+        for ending in (".bvh", ".txt"):
+            shutil.copy(SAMPLE / (name + ending), folder / (name + ending))
+    (folder / "new").mkdir()
+    shutil.copy(SAMPLE / "kick_low_top.bvh", folder / "new" / "one.bvh")
+    shutil.copy(SAMPLE / "walking_1_2.bvh", folder / "new" / "two.bvh")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def model(folder):
+    path = folder.parent / "model.npz"
+    assert main(["library", str(folder), "--learn", str(path)]) == 0
+    return path
+
+
+def test_words_are_proposed_for_the_clips_without(folder, model, tmp_path, capsys):
+    out = tmp_path / "proposed.csv"
+    assert main(["library", str(folder), "--propose", str(out), "--learned", str(model)]) == 0
+    assert "for 2 clips without words" in capsys.readouterr().out
+    rows = read_annotation_csv(out)
+    assert set(rows) == {"new/one.bvh", "new/two.bvh"}
+    (kick,) = [row for row in rows["new/one.bvh"] if row.key is not None]
+    assert kick.words[:2] == ("kick", "right") and abs(kick.key - 156) <= 2
+    assert all(row.key is None for row in rows["new/two.bvh"])
+    sources = {row["labels"].split()[0]: row["source"] for row in csv.DictReader(out.open())}
+    assert sources == {"kick": "learned", "walking": "rules", "jogging": "rules"}
+
+
+def test_what_is_learned_is_told_and_used_at_once(folder, tmp_path, capsys):
+    model, out = tmp_path / "m.npz", tmp_path / "p.csv"
+    assert main(["library", str(folder), "--learn", str(model), "--propose", str(out), "--json"]) == 0
+    told = capsys.readouterr()
+    assert "learned from 4 clips" in told.out and "kick: 3 moments" in told.out
+    assert all("progress" in json.loads(line) for line in told.err.splitlines())
+    assert "learned" in out.read_text()
+
+
+def test_rules_alone_where_nothing_was_learned(folder, tmp_path):
+    out = tmp_path / "p.csv"
+    assert main(["library", str(folder), "--propose", str(out), "--least", "0.6"]) == 0
+    assert "learned" not in out.read_text() and "kick right" in out.read_text()
+
+
+@pytest.mark.parametrize("options, told", [
+    (("--propose", "OUT/p.csv", "--learned", "OUT/none.npz"), "no such file"),
+    (("--learn", "OUT/m.npz", "--learned", "OUT/none.npz"), "given beside --learn"),
+    (("--propose", "OUT/none/p.csv"), "its folder does not exist"),
+    (("--propose", "OUT/p.csv", "--least", "2"), "a number from 0 to 1"),
+    (("--least", "0.3", "--learned", "OUT/none.npz"), "--propose"),
+])
+def test_bad_input_is_one_line(folder, tmp_path, capsys, options, told):
+    options = [part.replace("OUT", str(tmp_path)) for part in options]
+    assert main(["library", str(folder), *options]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert told in line and list(tmp_path.iterdir()) == []
+
+
+def test_a_library_without_words_has_nothing_to_learn_from(folder, tmp_path, capsys):
+    assert main(["library", str(folder / "new"), "--learn", str(tmp_path / "m.npz")]) == 2
+    assert "no clip with words" in capsys.readouterr().err
