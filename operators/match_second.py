@@ -20,7 +20,7 @@ seconds"""
     bl_label = "Go to Match Second"
 
     seconds: FloatProperty(name="Second", options={"SKIP_SAVE"}, description="Of the match's clock")
-    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody is selected")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody")
 
     @classmethod
     def poll(cls, context):

@@ -1,5 +1,6 @@
 """A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, and a camera
-that keeps at the same distance (Faustino §5.1.1). Shadows and, where there is one, the ball are what his study lacked."""
+that keeps at the same distance (Faustino §5.1.1). Shadows and, where there is one, the ball are what his study
+lacked."""
 
 from __future__ import annotations
 
@@ -57,8 +58,8 @@ def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> 
 
 
 def engine_here(wanted: str) -> str:
-    """Blender's name of an engine in this version: EEVEE has had two. AUTO is Cycles where there is no window, for EEVEE
-    is very slow where there is no graphics card."""
+    """Blender's name of an engine in this version: EEVEE has had two. AUTO is Cycles where there is no window, for
+    EEVEE is very slow where there is no graphics card."""
     if wanted == "AUTO":
         wanted = "CYCLES" if bpy.app.background else "EEVEE"
     names = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}

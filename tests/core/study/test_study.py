@@ -108,7 +108,8 @@ def test_a_study_comes_back_from_its_file(tmp_path):
 
 @pytest.mark.parametrize("change", [
     {"version": 2}, {"pairs": 1}, {"clips": []}, {"clips": 3}, {"orders": {"R01": ["ab"]}}, {"orders": {"R01": [[]]}},
-    {"orders": []}, {"seed": "x"},
+    {"orders": []}, {"seed": "x"}, {"orders": {"../R01": []}},
+    {"clips": [{"name": "../a", "file": "a", "system": "b", "scenario": "c"}], "orders": {}},
 ])
 def test_a_broken_study_file_is_told(tmp_path, change):
     write_study(tmp_path, ordered(CLIPS, 2))
