@@ -15,6 +15,7 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
     bl_idname = "beyond_mocap.make_match"
     bl_label = "Make Match"
     kind = "match"
+    left = "cancelled; what is finished is kept, and pressed again it goes on there"
 
     @classmethod
     def poll(cls, context):
@@ -27,7 +28,7 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
 
     def order(self, context):
         """The command line, and what is shown of its results."""
-        wanted = order.wanted(context.scene)
+        wanted = order.wanted(context.scene, order.folder_to_make(context.scene))
         return order.command(context.scene), wanted, self.known_library(wanted)
 
     @staticmethod

@@ -23,11 +23,12 @@ the one that is shown"""
             cls.poll_message_set("Choose the library's folder in step 1 first")
             return False
         cls.poll_message_set("Press Make Match, or choose the folder of a made match, first")
-        return bool(context.scene.beyond_mocap_match.folder)
+        match = context.scene.beyond_mocap_match
+        return bool(match.folder or match.made)
 
     def order(self, context):
         """Folder and span."""
-        wanted = order.wanted(context.scene)
+        wanted = order.wanted(context.scene, order.folder_to_show(context.scene))
         return wanted, self.known_library(wanted)
 
     @staticmethod

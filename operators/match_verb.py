@@ -6,7 +6,8 @@ import bpy
 
 from ..beyond_mocap.errors import InputError
 from ..scene import session
-from ..scene.match import load, order, show
+from ..scene.match import load, show
+from ..scene.settings import as_setting
 from .verb import BackgroundVerb
 
 MAKING = 0.85
@@ -33,9 +34,9 @@ class MatchVerb(BackgroundVerb):
         first = match.first_frame
         took = show.show(bpy.context, scenery, first)
         match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
+        match.made = "" if match.folder else as_setting(wanted.folder)
         known = match.report.splitlines()
         match.told = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)
-        order.keep_folder(match)
         for line in lines:
             self.report({"WARNING"}, line)
         seconds = scenery.end - scenery.start

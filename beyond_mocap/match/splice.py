@@ -111,7 +111,8 @@ def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, 
     costs = PathCosts(library, order, balanced(plan.alpha))
     step = np.gradient(leaves.frame)
     step[np.append(leaves.seams, leaves.seams - 1)] = 1.0
-    cost = np.diagonal(costs.cut(leaves.frame[:-1] + step[:-1], enters.frame[1:])).copy()
+    terms = costs.cut_terms(leaves.frame[:-1] + step[:-1], enters.frame[1:])
+    cost = np.diagonal(sum(values for _, values in terms)).copy()
     at = np.arange(1, high - low)
     for seam in (*leaves.seams, *enters.seams):
         cost += _NEAR_SEAM * ((np.abs(at - seam) < _APART) & (at != seam))

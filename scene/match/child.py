@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -29,6 +30,11 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
     Cancelled: somebody wanted out, and it has ended; what was finished is kept. BeyondMocapError: what the command told
     when it ended otherwise.
     """
+    while _running:  # one that was cancelled comes to its end
+        progress(0.0, "waiting for what was cancelled to end")
+        if cancelled():
+            raise Cancelled("cancelled")
+        time.sleep(LOOK)
     process = subprocess.Popen(
         [sys.executable, "-m", "beyond_mocap", *arguments, "--json"],
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8",

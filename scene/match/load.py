@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,6 +41,7 @@ def scenery(
 
     InputError where the folder holds no match, nobody of it is there in that time, or the library is another one.
     """
+    from ...beyond_mocap.files.tables import read_ball
     from ...beyond_mocap.library.library import build
     from ...beyond_mocap.match.folder import read_state
 
@@ -51,12 +52,14 @@ def scenery(
             progress=lambda done, text: progress(LIBRARYS_SHARE * done, text),
         )
     start, end = _span(wanted, state)
-    people, lines = _people(wanted, state, library, start, end, progress, cancelled)
+    course = Path(wanted.folder) / "ball.csv"
+    ball = read_ball(course) if course.is_file() else None
+    people, lines = _people(wanted, state, library, ball, (start, end), progress, cancelled)
     if not people:
         raise InputError(wanted.folder, f"nobody is there from {start:g} to {end:g} s", "a time of play", *lines[:1])
-    ball = _ball(Path(wanted.folder) / "ball.csv", start, end)
     length, width = map(float, state["pitch_m"])
-    return library, Scenery(start, end, length, width, wanted.colours, tuple(people), ball), tuple(lines)
+    seen = Scenery(start, end, length, width, wanted.colours, tuple(people), _between(ball, start, end))
+    return library, seen, tuple(lines)
 
 
 def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
@@ -68,7 +71,7 @@ def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
     return start, end
 
 
-def _people(wanted, state, library, start, end, progress, cancelled) -> tuple[list[Person], list[str]]:
+def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[list[Person], list[str]]:
     """Everybody who is there and was made, and lines about the others."""
     from ...beyond_mocap.files.take_npz import read_player
     from ...beyond_mocap.match.shown import shown
@@ -83,7 +86,7 @@ def _people(wanted, state, library, start, end, progress, cancelled) -> tuple[li
             lines.append(f"{player['id']} was not made: {player.get('reason') or player.get('status')}")
             continue
         edit = read_player(Path(wanted.folder) / f"{player['file']}.take.npz")
-        takes = shown(library, edit, None, start, end)
+        takes = shown(library, edit, ball, *span)
         if takes:
             people.append(_person(player, tuple((take.start_time, take.motion) for take in takes)))
     return people, lines
@@ -97,22 +100,15 @@ def _person(player: dict, motions: tuple) -> Person:
     return Person(player["id"], str(player.get("name") or ""), number, team, keeper, motions)
 
 
-def _ball(path: Path, start: float, end: float) -> "BallPath | None":
-    """The ball of that time, gaps in it drawn straight; None where it is nowhere known."""
-    from ...beyond_mocap.files.tables import number, read_rows
-    from ...beyond_mocap.take import BallPath
-
-    if not path.is_file():
+def _between(ball: "BallPath | None", start: float, end: float) -> "BallPath | None":
+    """Its way from `start` to `end` s, gaps in it drawn straight; None where it is nowhere known."""
+    if ball is None:
         return None
-    names = ("time_s", "x_m", "y_m", "z_m")
-    rows = read_rows(path, names)
-    cells = np.array([[number(row[name], name, place, blank=True) for name in names] for place, row in rows], float)
-    cells = cells.reshape(-1, 4)
-    inside = (cells[:, 0] >= start - 1e-6) & (cells[:, 0] <= end + 1e-6)
-    known = np.isfinite(cells).all(axis=1) & inside
+    inside = (ball.times >= start - 1e-6) & (ball.times <= end + 1e-6)
+    known = inside & np.isfinite(ball.positions).all(axis=1)
     if np.count_nonzero(known) < 2:
         return None
-    first, last = np.flatnonzero(known)[[0, -1]]
-    times = cells[first : last + 1, 0]
-    places = np.stack([np.interp(times, cells[known, 0], cells[known, axis]) for axis in (1, 2, 3)], axis=1)
-    return BallPath(times, places, known[first : last + 1])
+    part = slice(*(np.flatnonzero(known)[[0, -1]] + [0, 1]))
+    times = ball.times[part]
+    columns = [np.interp(times, ball.times[known], ball.positions[known, axis]) for axis in range(3)]
+    return replace(ball, times=times, positions=np.stack(columns, axis=1), measured=ball.measured[part])

@@ -44,7 +44,8 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     provider: EnumProperty(name="Provider", items=GIVEN, description="Whose form the files have")
     folder: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="Where everybody's motion is kept, some megabytes a match; what was broken off goes on there",
+        description="Where everybody's motion is kept, some megabytes a match. Empty: one for each stretch and choice, "
+        "beside the saved file or the tracking",
     )
     start: FloatProperty(
         name="From", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1, description="Second of the match's clock"
@@ -83,6 +84,7 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     length_s: FloatProperty(options={"HIDDEN"}, description="Seconds that the match lasts on its clock")
     report: StringProperty(options={"HIDDEN"}, description="Lines about the data: guessed, put right, who is there")
     told: StringProperty(options={"HIDDEN"}, description="Lines about what was made")
+    made: StringProperty(options={"HIDDEN"}, description="The folder made last where none is chosen")
     shown_start: FloatProperty(options={"HIDDEN"}, description="Second of the match's clock at the first shown frame")
     shown_first: IntProperty(options={"HIDDEN"}, description="That frame")
     shown: StringProperty(options={"HIDDEN"}, description="The folder that is shown; empty where none is")

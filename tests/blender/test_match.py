@@ -94,7 +94,8 @@ def test_the_command_that_makes_it(place):
     match.players[0].use = False
     arguments = room("order").command(bpy.context.scene)
     text = " ".join(arguments)
-    assert f"match --tracking {TRACKING} --library {place / 'library'} --out {place / 'out'}" in text
+    assert text.startswith(f"match --tracking {TRACKING} --library {place / 'library'}")
+    assert f"--out {place / 'out'}" in text
     assert "--from 3 --to 9.5" in text and "--workers 3" in text and "--no-solve-touches" in text
     players = arguments[arguments.index("--players") + 1 :][:8]
     assert "home_1" not in players and set(players) == {player.feed_id for player in match.players if player.use}
@@ -133,6 +134,20 @@ def test_shown_it_is_one_step_of_undo(place, made):
     assert_one_step(bpy.ops.beyond_mocap.show_match)
     bpy.context.scene.beyond_mocap_match.end = 5.0
     assert_one_step(bpy.ops.beyond_mocap.show_match)  # in the place of the first
+
+
+def test_without_a_folder_each_choice_has_its_own(place):
+    match = a_match(place, "")
+    folder = room("order").folder_to_make
+    scene, seen = bpy.context.scene, set()
+    for change in ({}, {"end": 12.0}, {"solve_touches": False}, {"workers": 7}):
+        for name, value in change.items():
+            setattr(match, name, value)
+        seen.add(folder(scene))
+    assert len(seen) == 3  # the number of processes changes nothing
+    assert all(pathlib.Path(one).parent == TRACKING.parent and "small 0-" in one for one in seen)
+    match.folder = str(place)
+    assert folder(scene) == room("order").folder_to_show(scene) == str(place)
 
 
 def test_cameras_by_their_buttons(place, made):
