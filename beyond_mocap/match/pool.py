@@ -87,8 +87,9 @@ def run(
     """(key, result) of every task, as they end, in any order; the result is `Failed` where `work` raises.
 
     tasks: taken one by one, only as far as workers are free for them. work: a function of a module, which other
-    processes can import by its name. spent: is told of each piece what it took. Raises Cancelled soon after `cancelled()` says so, InputError where the cluster
-    does not answer, has no workers, or goes away. Closing the iterator, or an error, ends what is still being done.
+    processes can import by its name. spent: is told of each piece what it took. Raises
+    Cancelled soon after `cancelled()` says so, InputError where the cluster does not answer, has no workers, or goes
+    away. Closing the iterator, or an error, ends what is still being done.
     """
     stop = cancelled or (lambda: False)
     if place.scheduler:
@@ -289,7 +290,8 @@ class _Cluster:
 
     def renew(self) -> None:
         """A cluster looks after its workers itself; what it loses, it loses with its scheduler. InputError."""
-        raise InputError("--scheduler", "the scheduler went away", "one that stays", "start it again; what is done is kept")
+        what = "start it and the command again; what is done is kept"
+        raise InputError("--scheduler", "the scheduler went away", "one that stays", what)
 
     def close(self, going: Iterable[Future]) -> None:
         """Takes back what nobody needs any more."""
