@@ -35,7 +35,7 @@ def joined(library: Library, plan: Plan, window: float, overlap: float):
     """The edit list of a plan in windows, its joints, and seconds of processor time."""
     begun = time.process_time()
     pieces = [searched(library, unit) for unit in units_of(plan, 0, window, overlap)]
-    edit, joints = spliced(library, [plan], pieces, window)
+    edit, joints = spliced(library, [plan], pieces)
     return edit.stretches[0].edit, joints, time.process_time() - begun
 
 

@@ -92,7 +92,8 @@ def read_event_words(path: str | os.PathLike | None = None, known_words: Iterabl
                 continue
             row = _row(cells, known, place)
             if (same := seen.setdefault(row[:3], place)) != place:
-                raise InputError(place, f"{', '.join(row[:3])} as in line {same.rpartition(':')[2]}", "each once", _STEP)
+                said = ", ".join(row[:3])
+                raise InputError(place, f"{said} as in line {same.rpartition(':')[2]}", "each once", _STEP)
             rows.append(EventRow(*row))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None

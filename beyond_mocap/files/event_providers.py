@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import re
 import warnings
@@ -37,8 +38,10 @@ _OTHER = {  # parts of a name -> what the same part is in the name of the other 
     "impect": (("events", "lineups"), ("event", "lineup")),
 }
 _SECOND = {  # what the other file begins with, where no name fits
-    "opta": rb"(?s)\s*(<\?xml[^>]*>\s*)?<SoccerFeed\b", "sportec": rb"(?s)\s*(<\?xml[^>]*>\s*)?<PutDataRequest\b.{0,900}<MatchInf",
-    "statsbomb": rb'(?s)\s*\[\s*\{.{0,300}"lineup"', "metrica": rb"(?s)\s*(<\?xml[^>]*>\s*)?<main\b.{0,900}<Metadata\b",
+    "opta": rb"(?s)\s*(<\?xml[^>]*>\s*)?<SoccerFeed\b",
+    "sportec": rb"(?s)\s*(<\?xml[^>]*>\s*)?<PutDataRequest\b.{0,900}<MatchInf",
+    "statsbomb": rb'(?s)\s*\[\s*\{.{0,300}"lineup"',
+    "metrica": rb"(?s)\s*(<\?xml[^>]*>\s*)?<main\b.{0,900}<Metadata\b",
     "statsperform": rb'(?s)\s*(<\?xml[^>]*>\s*)?(<match\b|\{.{0,9000}"(lineUp|liveData)")',
     "impect": rb'(?s)\s*\{.{0,900}"squadHome"',
 }  # fmt: skip
@@ -95,6 +98,7 @@ def load_events(path: Path, provider: str, meta: Path | None):
         raise InputError(
             path, f"kloppy cannot be imported ({error})", "kloppy 3.19 or newer", "pip install 'beyond-mocap[tracking]'"
         ) from None
+    logging.getLogger("kloppy").addHandler(logging.NullHandler())  # what it would print is in our own lines
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

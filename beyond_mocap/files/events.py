@@ -71,7 +71,8 @@ def _with_players(path: Path, rows: list[tuple[MatchEvent, Who | None]], match: 
         raise InputError(path, found, "events of the same match, with ids, numbers or names", "check both files")
     out = []
     for event, who in rows:
-        player, team = known.get(who, ("", event.team)) if match else ((who.id, event.team) if who else ("", event.team))
+        own = (who.id if who and not match else "", event.team)
+        player, team = known.get(who, own)
         out.append(MatchEvent(**{**vars(event), "player": player, "team": team}))
     return sorted(out, key=lambda event: (event.period, event.time)), notes
 
@@ -156,7 +157,8 @@ def _plain(path: Path, match: Match | None):
         part = row.get("part", "").lower() or _part_in(words, said)
         if part and part not in PARTS:
             raise InputError(place, f"part {part!r}", f"one of {', '.join(PARTS)}, or none")
-        side = next((one for one in ("left", "right") if part == "foot" and one in f"{row.get('side', '')} {words}"), "")
+        sides = f"{row.get('side', '')} {words}".split() if part == "foot" else ()
+        side = next((one for one in ("left", "right") if one in sides), "")
         details = ("throw-in",) if "throw in" in f"{said} {words}".replace("-", " ") else ()
         xy = tuple(number(row.get(name, ""), name, place, blank=True) for name in ("x", "y"))
         success = {"true": True, "1": True, "false": False, "0": False}.get(row.get("success", "").lower())
@@ -188,8 +190,8 @@ def _metrica_csv(path: Path, match: Match | None):
         x, y = (number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
         team = row["Team"].lower() if row["Team"].lower() in ("home", "away") else ""
         event = MatchEvent(
-            time, period, "", team, kind if kind in KINDS else "other", part, "", ("throw-in",) * (part == "hand"), said,
-            None, ((x - 0.5) * length, (0.5 - y) * width),
+            time, period, "", team, kind if kind in KINDS else "other", part, "", ("throw-in",) * (part == "hand"),
+            said, None, ((x - 0.5) * length, (0.5 - y) * width),
         )
         rows.append((event, Who.spelled(row["From"], team) if row["From"] else None))
     return rows

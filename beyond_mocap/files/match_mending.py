@@ -30,10 +30,12 @@ def mended_ball(ball: np.ndarray, length: float, width: float) -> tuple[np.ndarr
     out = np.where(wrong[:, None], np.nan, ball)
     out[high, 2] = np.nan
     known = np.isfinite(out[:, :2]).all(axis=1)
-    lines = [f"{np.count_nonzero(wrong)} samples with the ball at no place of a ball taken as unknown"] * bool(wrong.any())
-    lines += [f"{np.count_nonzero(high)} heights of the ball above {_HIGHEST:g} m taken as unknown"] * bool(high.any())
+    counts = np.count_nonzero(wrong), np.count_nonzero(high)
+    lines = [f"{counts[0]} samples with the ball at no place of a ball taken as unknown"] * bool(counts[0])
+    lines += [f"{counts[1]} heights of the ball above {_HIGHEST:g} m taken as unknown"] * bool(counts[1])
     heights = np.isfinite(out[known, 2]).mean() if known.any() else 0.0
-    return out, [*lines, f"the ball is known in {known.mean():.0%} of the samples, its height in {heights:.0%} of these"]
+    told = f"the ball is known in {known.mean():.0%} of the samples, its height in {heights:.0%} of these"
+    return out, [*lines, told]
 
 
 def mended_players(times, positions, length: float, width: float, ids) -> tuple[np.ndarray, list[str]]:
@@ -79,7 +81,8 @@ def mended_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
     positions, ball, lines = np.array(positions), np.array(ball), []
     teams = np.array(teams)
     for first in range(0, len(periods) - 1, 2):
-        parts = [slice(*np.searchsorted(times, [start - 1e-6, end + 1e-6])) for start, end in periods[first : first + 2]]
+        pair = periods[first : first + 2]
+        parts = [slice(*np.searchsorted(times, [start - 1e-6, end + 1e-6])) for start, end in pair]
         ends = [home_end(positions[:, part], teams) for part in parts]
         interval = float(np.median(np.diff(times)))
         if 0.0 in ends or min(part.stop - part.start for part in parts) * interval < _LEAST:

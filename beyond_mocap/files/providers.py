@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import re
 import warnings
@@ -164,6 +165,7 @@ def load(feed: Feed, pitch: tuple[float, float]):
             feed.path, f"kloppy cannot be imported ({error})", "kloppy 3.19 or newer",
             "pip install 'beyond-mocap[tracking]'",
         ) from None
+    logging.getLogger("kloppy").addHandler(logging.NullHandler())  # what it would print is in our own lines
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

@@ -11,21 +11,28 @@ import numpy as np
 from .match_data import REFEREE
 from .providers import Feed
 
+_HAVE_THEM = {"tracab", "sportec", "signality"}
 _TRACAB_CODE = 3
 _TRACAB = re.compile(rb"[;:]3,(-?\d+),(-?\d+),(-?\d+\.?\d*),(-?\d+\.?\d*),")
 _SAMPLE = tuple[int, str, float, float]  # frame, who, x and y in the provider's coordinates
 
 
-def referee_samples(feed: Feed, frames: np.ndarray) -> tuple[list[str], np.ndarray]:
-    """Ids of the R referees in a feed, and where they are (R, N, 2) in the provider's coordinates, NaN where they are
-    not known. frames: (N,) the numbers of kloppy's frames."""
+def referee_samples(feed: Feed, frames: np.ndarray) -> tuple[list[str], np.ndarray, list[str]]:
+    """Ids of the R referees in a feed, where they are (R, N, 2) in the provider's coordinates, NaN where they are not
+    known, and lines: samples that cannot be read end them. frames: (N,) the numbers of kloppy's frames."""
+    if feed.provider not in _HAVE_THEM:
+        return [], np.empty((0, len(frames), 2)), []
     row = {int(frame): index for index, frame in enumerate(frames)}
     found: dict[str, np.ndarray] = {}
-    for frame, who, x, y in _samples(feed):
-        if frame in row:
-            found.setdefault(who, np.full((len(frames), 2), np.nan))[row[frame]] = x, y
+    lines, frame = [], "the first"
+    try:
+        for frame, who, x, y in _samples(feed):
+            if frame in row:
+                found.setdefault(who, np.full((len(frames), 2), np.nan))[row[frame]] = x, y
+    except (ValueError, TypeError, LookupError, AttributeError, SyntaxError) as error:  # SyntaxError: of XML
+        lines = [f"referees are read up to frame {frame} only ({type(error).__name__}: {str(error)[:60]})"]
     names = sorted(found)
-    return names, np.stack([found[name] for name in names]) if names else np.empty((0, len(frames), 2))
+    return names, np.stack([found[name] for name in names]) if names else np.empty((0, len(frames), 2)), lines
 
 
 def described_referee(id_: str) -> tuple[str, str, str, str, str]:
@@ -40,7 +47,7 @@ def _samples(feed: Feed) -> Iterator[_SAMPLE]:
         yield from _tracab_json(feed)
     elif feed.provider == "sportec":
         yield from _sportec(feed)
-    elif feed.provider == "signality":
+    else:
         yield from _signality(feed)
 
 

@@ -129,7 +129,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward)
     ball = match_arrays.ball_samples(records)
     ball = np.concatenate([metric(ball[:, :2]), ball[:, 2:] * match_arrays.height_unit(dataset)], axis=1)
-    referees, places = referee_samples(feed, np.array([frame.frame_id for frame in records]))
+    referees, places, of_referees = referee_samples(feed, np.array([frame.frame_id for frame in records]))
     who = [*map(match_arrays.described, players), *map(described_referee, referees)]
     positions = metric(np.concatenate([match_arrays.player_samples(records, players), places]))
     positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
@@ -145,7 +145,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
         "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]),
         "periods": np.array(periods),
         "teams": np.array(_teams(dataset, feed), dtype=str).reshape(-1, 3),
-        "lines": np.array([*lines, *turned, *of_ball, *more], dtype=str),
+        "lines": np.array([*lines, *turned, *of_ball, *more, *of_referees], dtype=str),
     }
 
 
@@ -205,8 +205,9 @@ def _cached(cache: Path) -> dict[str, np.ndarray] | None:
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
         return None
     count, who = len(arrays["times"]), arrays["players"].shape
-    fits = arrays["pitch"].shape == (4,) and arrays["positions"].shape == (who[0], count, 2) and arrays["ball"].shape == (count, 3)
-    return arrays if fits and who[1:] == (5,) and arrays["periods"].shape[1:] == (4,) else None
+    shapes = {"positions": (who[0], count, 2), "ball": (count, 3), "pitch": (4,), "players": (who[0], 5)}
+    fits = all(arrays[name].shape == shape for name, shape in shapes.items())
+    return arrays if fits and arrays["periods"].shape[1:] == (4,) and arrays["teams"].shape[1:] == (3,) else None
 
 
 def _keep(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:

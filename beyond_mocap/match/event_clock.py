@@ -1,10 +1,10 @@
 """Events brought to the tracking's clock: people and their software write events down seconds late, and their clock may
 run apart from the cameras'.
 
-Touches of the ball are solved from tracking (`solve_ball`); an event of a player belongs to one of his touches. Over all
-pairs of an event and a touch of the same player, the difference of times that comes most often is the lag of a period;
-a line through the pairs near it takes out what the clocks run apart. Then each player's events and touches are brought
-together in order, as two lines of text are.
+Touches of the ball are solved from tracking (`solve_ball`); an event of a player belongs to one of his touches. Over
+all pairs of an event and a touch of the same player, the difference of times that comes most often is the lag of a
+period; a line through the pairs near it takes out what the clocks run apart. Then each player's events and touches are
+brought together in order, as two lines of text are.
 """
 
 from __future__ import annotations
@@ -114,8 +114,8 @@ def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndar
 def _told(number: int, clock: PeriodClock) -> str:
     drift = f", {1000.0 * clock.drift:+.2f} s more in 1000 s" if clock.drift else ""
     return (
-        f"period {number}: events come {clock.lag:.2f} s after their touches{drift}, give or take {clock.spread:.2f} s; "
-        f"{clock.matched:.0%} of passes and shots fit (by chance {clock.by_chance:.0%})"
+        f"period {number}: events come {clock.lag:.2f} s after their touches{drift}, "
+        f"give or take {clock.spread:.2f} s; {clock.matched:.0%} of passes and shots fit (by chance {clock.by_chance:.0%})"
     )
 
 

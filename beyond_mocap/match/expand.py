@@ -29,7 +29,7 @@ from .library_clips import bound
 from .named_edit import part
 from .player_edit import PlayerEdit, Stretch
 from .searched import searched_library
-from .units import frame_count, window_edges
+from .units import frame_count, layout_edges
 
 AROUND = 4.0
 """Seconds on either side of a window that are laid out too."""
@@ -90,8 +90,7 @@ class _Layout:
         self.library = searched_library(library, self.plan) if any(path.startswith(MADE_FOLDER) for path, _ in self.edit.clips) else library
         self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
         self.count = frame_count(self.plan, self.fps)
-        edges = window_edges(self.begin, frame_count(self.plan), window)
-        self.edges = [*(round(edge * self.fps / FPS) for edge in edges[:-1]), self.count]
+        self.edges = layout_edges(self.begin, self.count, self.fps, window)
 
     def take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
         """Frames from `start` to `end` s; None where there are fewer than two."""

@@ -81,6 +81,7 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     somebody else works in it.
     """
     check_folder(path)
+    new = not path.exists()
     try:
         (path / _WORK).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -89,7 +90,13 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     with _locked(path / _WORK / _LOCK, path):
         before = read_state(path) if (path / STATE).exists() else {}
         _check_order(path, before, identity)
-        yield MatchFolder(path, digest_of(identity), before)
+        try:
+            yield MatchFolder(path, digest_of(identity), before)
+        finally:
+            if not (path / STATE).exists():  # nothing was begun
+                shutil.rmtree(path / _WORK, ignore_errors=True)
+                with contextlib.suppress(OSError):  # the user's own folder, or one with texts in it
+                    path.rmdir() if new else None
 
 
 def read_state(folder: str | os.PathLike) -> dict:

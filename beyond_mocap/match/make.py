@@ -30,7 +30,7 @@ from .folder import MatchFolder, check_folder, file_names, opened
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
 from .parts import parts_of
-from .pool import Workplace, ended
+from .pool import Workplace, check_place, ended
 from .roles import pushed_apart, roles_of, span_of
 from .state import MatchState, begun, row_of
 from .words import MatchWords, words_of
@@ -39,7 +39,7 @@ from .workplace_library import LibrarySource, hold
 AROUND = 5.0
 """Seconds before and behind the span in which the ball is solved too."""
 
-_SHARES = {"library": 0.05, "read": 0.07, "ball": 0.12, "search": 0.7, "crowd": 0.8, "figures": 0.98, "page": 1.0}
+_SHARES = {"read": 0.02, "library": 0.07, "ball": 0.12, "search": 0.7, "crowd": 0.8, "figures": 0.98, "page": 1.0}
 """Where the progress is when a stage is done."""
 
 Progress = Callable[[float, str], None]
@@ -74,26 +74,25 @@ def make_match(
     """
     report = progress or (lambda fraction, text: None)
     check_folder(order.out)
+    place = Workplace(order.workers, order.scheduler)
+    check_place(place)
     clock = time.perf_counter()
+    report(0.0, f"Reading {order.tracking.name}")
+    match = read_match(order.tracking, order.meta, order.provider or None)
+    span = span_of(match, order)
+    read = time.perf_counter()
     library, source = _library(order, _part(report, "library"), cancelled)
     known = identity(order, source.key)
     with opened(order.out, known) as folder:
-        loaded = time.perf_counter() - clock
-        report(_SHARES["library"], f"Reading {order.tracking.name}")
-        match = read_match(order.tracking, order.meta, order.provider or None)
-        span = span_of(match, order)
         state = begun(folder, order, known, match, span)
-        state.seconds["library"] = round(loaded, 3)
-        state.took("read", clock + loaded)
-        place = Workplace(order.workers, order.scheduler)
+        state.seconds["read"] = round(read - clock, 3)
+        state.took("library", read)
         job = stages.Job(order, folder, state, source, library, place, report, cancelled)
         try:
             _make(job, match, span, report)
-        except Cancelled:
-            state.tell(status="cancelled")
-            raise
         except BeyondMocapError as error:
-            state.tell(status="failed", reason=str(error))
+            if state.players:  # else nothing was begun
+                state.tell(status="cancelled" if isinstance(error, Cancelled) else "failed", reason=str(error))
             raise
         finally:
             if not order.scheduler:
@@ -133,7 +132,7 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     edits = stages.search(job.told(_part(report, "search")), parts)
     state.took("search", clock)
     clock = time.perf_counter()
-    crowd = stages.keep_apart(job.told(_part(report, "crowd")), edits, span)
+    crowd = stages.keep_apart(job.told(_part(report, "crowd")), edits, span) if edits else {}
     ball = _ball(job, match, solved, span, crowd)
     state.took("crowd", clock)
     clock = time.perf_counter()

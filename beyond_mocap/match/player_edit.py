@@ -14,7 +14,11 @@ from ..polish.crowd.correction import Correction
 from .named_edit import NamedEdit
 
 COURSE_STEP = 0.02
-"""Seconds between the points of the ball's course that are kept; gravity bends it by half a millimetre in between."""
+"""Seconds between the points of the ball's course that are kept; gravity bends it by half a millimetre in between, a
+bounce cuts its corner by some centimetres."""
+
+LAYOUT = 30.0
+"""Seconds of the windows in which a player is laid out."""
 
 _MOST_STEPS = 10_000_000
 

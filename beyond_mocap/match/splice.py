@@ -19,9 +19,8 @@ from ..synthesis.wanted import wanted
 from .cut_plan import cut_plan
 from .library_clips import bound
 from .named_edit import CONTINUES, NamedEdit, NamedKey, chained, part, retabled, table
-from .player_edit import PlayerEdit, Stretch, kept
+from .player_edit import LAYOUT, PlayerEdit, Stretch, kept
 from .searched import Piece, searched_library
-from .units import WINDOW
 
 _APART = 4
 """Frames that a transition keeps from other seams, so that it can be faded over."""
@@ -39,12 +38,12 @@ class Joint:
 
 
 def spliced(
-    library: Library, plans: Sequence[Plan], pieces: Sequence[Piece], window: float = WINDOW
+    library: Library, plans: Sequence[Plan], pieces: Sequence[Piece], window: float = LAYOUT
 ) -> tuple[PlayerEdit, tuple[Joint, ...]]:
     """A player out of all of his windows, and how these were joined.
 
     library: in which they were searched. plans: one per stretch, from which `units_of` made its windows; pieces: all of
-    theirs, in any order; window: s, as it was for `units_of`. InputError where a window is missing.
+    theirs, in any order; window: s of the windows in which he will be laid out. InputError where a piece is missing.
     """
     stretches, joints = [], []
     for number, plan in enumerate(plans):
@@ -112,7 +111,8 @@ def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, 
     costs = PathCosts(library, order, balanced(plan.alpha))
     step = np.gradient(leaves.frame)
     step[np.append(leaves.seams, leaves.seams - 1)] = 1.0
-    cost = np.diagonal(costs.cut(leaves.frame[:-1] + step[:-1], enters.frame[1:])).copy()
+    terms = costs.cut_terms(leaves.frame[:-1] + step[:-1], enters.frame[1:])
+    cost = np.diagonal(sum(values for _, values in terms)).copy()
     at = np.arange(1, high - low)
     for seam in (*leaves.seams, *enters.seams):
         cost += _NEAR_SEAM * ((np.abs(at - seam) < _APART) & (at != seam))

@@ -86,7 +86,7 @@ class _Search:
     def done(self) -> dict[str, PlayerEdit]:
         """Searches what is missing."""
         job = self._job
-        for (player, name), result in run(self._missing(), search_unit, job.place, job.cancelled, job.state.needed):
+        for (player, name), result in run(self._missing(), search_unit, job.place, job.cancelled, job.state.spent(SEARCH)):
             if isinstance(result, Failed):
                 self._fail(player, result.reason)
                 continue
@@ -121,7 +121,7 @@ class _Search:
         job.report(done / self._count, f"Searching: {done} of {self._count} windows")
         if len(mine) == job.state.players[player]["units"]:
             try:
-                edit, joints = spliced(job.library, self._parts[player].plans, mine, job.order.window)
+                edit, joints = spliced(job.library, self._parts[player].plans, mine)
             except BeyondMocapError as error:
                 return self._fail(player, str(error))
             self._edits[player] = edit
@@ -160,7 +160,7 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
             else:
                 yield number, (job.source, cut, start, end)
 
-    for number, result in run(missing(), part_crowd, job.place, job.cancelled, job.state.needed):
+    for number, result in run(missing(), part_crowd, job.place, job.cancelled, job.state.spent(CROWD)):
         if isinstance(result, Failed):
             start, end = windows[number]
             job.state.told["notes"].append(f"{start:g}-{end:g} s: bodies are not kept apart: {result.reason}")
@@ -223,7 +223,7 @@ def finish(
             else:
                 yield player, (job.source, order)
 
-    for player, result in run(missing(), finish_player, job.place, job.cancelled, job.state.needed):
+    for player, result in run(missing(), finish_player, job.place, job.cancelled, job.state.spent("figures")):
         if isinstance(result, Failed):
             job.state.player(player, status="failed", reason=result.reason)
             continue

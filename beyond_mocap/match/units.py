@@ -22,7 +22,7 @@ from .player_edit import kept
 WINDOW = 60.0
 """Seconds of a window's own part."""
 
-OVERLAP = 12.0
+OVERLAP = 8.0
 """Seconds that two neighbours share: two thirds before the edge between them, which the later one needs to find onto the
 way of who comes from further back, and one third behind it."""
 
@@ -73,6 +73,12 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
     return tuple(units)
 
 
+def layout_edges(begin: float, count: int, fps: float, window: float) -> list[int]:
+    """Frames, at `fps`, between which the windows lie in which a stretch is laid out: as `window_edges`, but to the
+    nearest frame, so that a part of a stretch has the same ones."""
+    return _edges(begin, count, fps, window, 1)
+
+
 def frame_count(plan: Plan, fps: float = FPS) -> int:
     """Frames of the plan's track at `fps`, as `motion.track.sample` counts them."""
     return int(np.floor((plan.track.times[-1] - plan.track.times[0]) * fps + 1e-6)) + 1
@@ -81,10 +87,15 @@ def frame_count(plan: Plan, fps: float = FPS) -> int:
 def window_edges(begin: float, count: int, window: float) -> list[int]:
     """Frames, at the library's rate, between which the windows of a stretch lie: it begins at `begin` s and has `count`
     frames. A first or last window that would be short goes to its neighbour."""
-    end = begin + count / FPS
+    return _edges(begin, count, FPS, window, SLOT)
+
+
+def _edges(begin: float, count: int, fps: float, window: float, step: int) -> list[int]:
+    """0, the multiples of `step` frames nearest to multiples of `window` s on the match's clock, and count."""
+    end = begin + count / fps
     numbers = range(int(np.floor(begin / window)) + 1, int(np.ceil(end / window)))
-    inner = [SLOT * round((number * window - begin) * FPS / SLOT) for number in numbers]
-    least = _SHORTEST * window * FPS
+    inner = [step * round((number * window - begin) * fps / step) for number in numbers]
+    least = _SHORTEST * window * fps
     return [0, *(edge for edge in inner if least <= edge <= count - least), count]
 
 

@@ -29,7 +29,7 @@ TOUCHES, EVENTS, BOTH, USER = "touches", "events", "touches and events", "user"
 """Where a moment comes from."""
 
 _RUNNING = 2.0  # m/s, from which a touch is made running
-_HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.5, 1.5, 0.7  # m of the ball's centre
+_HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.45, 1.5, 0.7  # m of the ball's centre
 _JUMP = 2.05  # m of the ball's centre, which nobody heads standing
 _CAUGHT = 3.0  # m/s of the ball after a save that held it
 _CHAIN = 3.0  # s between touches of one dribble

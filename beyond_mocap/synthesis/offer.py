@@ -24,32 +24,28 @@ _SHOWN = 14  # library frames that a long slot shows at the fastest rate
 
 
 @dataclass(frozen=True, eq=False)
-class Traits:
-    """K pairs of a rate and a library frame. number (K,) of the rate; frame (K,); speed (K,) m/s and turn (K,) radians
-    of a slot that begins there; long_stance (K,) s that both feet stand longer than in a walk; offset (K,) radians from
-    the direction of travel to the body's; made (K,) bool; missing (K,) share of the asked words that it lacks; unasked
-    (K,) bool: it shows an action nobody asked for, or nothing that is annotated."""
+class Pairs:
+    """K pairs of a rate and a library frame at which a slot may begin. number (K,) of the rate; frame (K,); speed (K,)
+    m/s and turn (K,) radians over the slot; offset (K,) radians from the direction of travel to the body's; long_stance
+    (K,) s that both feet stand longer than in a walk."""
 
     number: np.ndarray
     frame: np.ndarray
     speed: np.ndarray
     turn: np.ndarray
-    long_stance: np.ndarray
     offset: np.ndarray
-    made: np.ndarray
-    missing: np.ndarray
-    unasked: np.ndarray
+    long_stance: np.ndarray
 
-    def part(self, low: int, high: int) -> "Traits":
-        """The pairs low .. high."""
-        return Traits(*(getattr(self, field.name)[low:high] for field in fields(self)))
+    def part(self, which: slice) -> "Pairs":
+        """Some of the pairs."""
+        return Pairs(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 class Offer:
     """N library frames at R rates. speed (R, N) m/s, turn (R, N) radians and valid (R, N) of a slot that begins there;
-    by_speed (K,) the valid pairs (rate, frame), flat, in the order of speeds (K,); offset, long_stance, made (N,): see
-    `Traits`; wild_before, wild_after (N,): see `wildness`; bucket (N,) int: frames of one bucket look alike to whoever
-    sees them twice.
+    by_speed (K,) the valid pairs (rate, frame), flat, in the order of their speeds; offset, long_stance (N,): see
+    `Pairs`; made (N,) bool; wild_before, wild_after (N,): see `wildness`; bucket (N,) int: frames of one bucket look
+    alike to whoever sees them twice.
     """
 
     _kept: weakref.WeakKeyDictionary[Library, dict[bytes, "Offer"]] = weakref.WeakKeyDictionary()
@@ -73,38 +69,27 @@ class Offer:
         self.valid = lasts & allowed[library.frames.clip]
         usable = np.flatnonzero(self.valid)
         self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
-        self.speeds = self.speed.ravel()[self.by_speed]
         self.offset = -quaternion.angle_of(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
         self.long_stance = np.clip(library.stance_seconds - _USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
         self.stands = library.feet_standing
         self.wild_before, self.wild_after = wildness(library)
         self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
-        self._sorted: dict[tuple[frozenset[str], frozenset[str]], tuple[Traits, np.ndarray]] = {}
+        self._sorted: dict[frozenset[str], Pairs] = {}
         self._showing: dict[frozenset[str], np.ndarray] = {}
 
-    def traits(self, number: np.ndarray, frame: np.ndarray, words: frozenset[str]) -> Traits:
-        """Of the pairs of RATES[number (K,)] and frame (K,), where `words` are asked (none: all will do)."""
-        missing, unasked = self._words(words)
-        own = (values[frame] for values in (self.long_stance, self.offset, self.made, missing, unasked))
-        return Traits(number, frame, self.speed[number, frame], self.turn[number, frame], *own)
+    def pairs(self, number: np.ndarray, frame: np.ndarray) -> Pairs:
+        """The pairs of RATES[number (K,)] and frame (K,)."""
+        played = self.speed[number, frame], self.turn[number, frame]
+        return Pairs(number, frame, *played, self.offset[frame], self.long_stance[frame])
 
-    def near_in_speed(
-        self, speed: float, count: int, words: frozenset[str], avoid: frozenset[str] = frozenset()
-    ) -> Traits:
-        """Of the `count` pairs nearest to a speed in m/s, none that shows a word of `avoid` unless all do. The others'
-        misfit in speed alone would put them behind, and a large library is searched as fast as a small one."""
-        if (words, avoid) not in self._sorted:
-            pairs, speeds = self._without(avoid)
-            self._sorted[words, avoid] = self.traits(*np.divmod(pairs, len(self.frames)), words), speeds
-        traits, speeds = self._sorted[words, avoid]
-        middle = int(np.searchsorted(speeds, speed))
-        low = int(np.clip(middle - count // 2, 0, max(0, len(speeds) - count)))
-        return traits.part(low, low + count)
-
-    def _without(self, avoid: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Of the valid pairs (K,) and their speeds (K,) those that show no word of `avoid`; all where all do."""
-        fine = ~self.showing(avoid)[self.by_speed % len(self.frames)]
-        return (self.by_speed[fine], self.speeds[fine]) if avoid and fine.any() else (self.by_speed, self.speeds)
+    def in_speed(self, avoid: frozenset[str] = frozenset()) -> Pairs:
+        """All valid pairs in the order of their speeds, none that shows a word of `avoid` unless all do."""
+        if avoid not in self._sorted:
+            fine = ~self.showing(avoid)[self.by_speed % len(self.frames)]
+            kept = self.by_speed[fine] if avoid and fine.any() else self.by_speed
+            number, frame = np.divmod(kept, len(self.frames))
+            self._sorted[avoid] = self.pairs(number.astype(np.int8), frame.astype(np.int32))
+        return self._sorted[avoid]
 
     def showing(self, words: frozenset[str]) -> np.ndarray:
         """(N,) bool: a slot from there on shows one of the words."""
@@ -113,9 +98,9 @@ class Offer:
             self._showing[words] = maximum_filter1d(carried, _SHOWN, origin=-(_SHOWN // 2), mode="nearest")
         return self._showing[words]
 
-    def _words(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
-        """(N,) share of the words that each frame lacks; (N,) bool: a slot from there on shows an action
-        (a kick, a jump) that nobody asked for, or nothing that is annotated."""
+    def lacking(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Where `words` are asked (none: all will do): (N,) share of them that each frame lacks; (N,) bool: a slot from
+        there on shows an action (a kick, a jump) that nobody asked for, or nothing that is annotated."""
         if words not in self._by_words:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.missing_share(words) if words else np.zeros(len(frames))

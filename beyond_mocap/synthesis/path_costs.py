@@ -13,7 +13,8 @@ import numpy as np
 
 from ..annotation.gaze import wanted_offset
 from ..library.library import Library
-from .offer import RATES, SLOT, Offer, Traits
+from .candidates import cheapest
+from .offer import RATES, SLOT, Offer, Pairs
 from .used import Used, price
 from .wanted import Wanted
 
@@ -81,6 +82,8 @@ class PathCosts:
         self.alike = alike
         self.frames, self.offer = library.frames, Offer.of(library, wanted.allowed)
         self.wanted_offset = wanted_offset(wanted.track)
+        self._rate_cost = (weights.rate * np.abs(RATES - 1.0)).astype(np.float32)
+        self._kept: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
 
     def inside(self, frame: np.ndarray) -> np.ndarray:
         """Nearest whole library frames."""
@@ -96,41 +99,59 @@ class PathCosts:
     def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
         """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end;
         inf where the clip ends before or may not be used."""
-        cost = _added(self.misfit_terms(first, end, number, frame))
+        cost = _added(self._played_terms(first, end, self.offer.pairs(number, frame)))
+        cost += self._still(self._words(first, end), self.wanted.avoided_in(first, end))[frame]
         return np.where(self.offer.valid[number, frame], cost, np.inf)
 
     def misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
         """What `misfit` is the sum of, by name, each (K,)."""
-        return self._terms(first, end, self.offer.traits(number, frame, self._words(first, end)))
+        yield from self._played_terms(first, end, self.offer.pairs(number, frame))
+        yield from self._still_terms(frame, self._words(first, end), self.wanted.avoided_in(first, end))
 
     def cheapest(self, first: int, end: int, looked_at: int, count: int):
         """The `count` pairs of rate and library frame that cost least of the `looked_at` nearest in speed: number (K,),
-        frame (K,), misfit (K,)."""
-        avoid = self.wanted.avoided_in(first, end)
-        near = self.offer.near_in_speed(self.asked(first, end)[0], looked_at, self._words(first, end), avoid)
-        cost = _added(self._terms(first, end, near))
-        best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
-        return near.number[best], near.frame[best], cost[best]
+        frame (K,), misfit (K,). The others' misfit in speed alone would put them behind, and a large library is searched
+        as fast as a small one."""
+        words, avoid = self._words(first, end), self.wanted.avoided_in(first, end)
+        pairs, still, (speed, _) = self.offer.in_speed(avoid), self._still(words, avoid), self.asked(first, end)
+
+        def cost_of(part: slice) -> np.ndarray:
+            some = pairs.part(part)
+            return _added(self._played_terms(first, end, some)) + still[some.frame]
+
+        best, cost = cheapest(cost_of, pairs.speed, speed, self.weights.speed, looked_at, count)
+        return pairs.number[best], pairs.frame[best], cost
 
     def _words(self, first: int, end: int) -> frozenset[str]:
         return self.wanted.asked[(first + end) // 2] or frozenset()
 
-    def _terms(self, first: int, end: int, what: Traits) -> Iterator[Term]:
-        w = self.weights
-        turn = what.turn * np.float32((end - first) / SLOT)
-        yield from self._motion_terms(first, end, what.speed, turn, what.offset, what.long_stance)
-        yield "rate", (w.rate * np.abs(RATES - 1.0)).astype(np.float32)[what.number]
-        yield "words", w.words * what.missing
-        yield "unasked", np.float32(w.unasked) * what.unasked
-        yield "made", np.float32(w.made) * what.made
-        if self.wanted.off_style is not None:
-            yield "style", self.wanted.off_style[what.frame]
+    def _played_terms(self, first: int, end: int, pairs: Pairs) -> Iterator[Term]:
+        """How far pairs (K,) are from what the track asks, the rate, and the player's taste."""
+        turn = pairs.turn * np.float32((end - first) / SLOT)
+        yield from self._motion_terms(first, end, pairs.speed, turn, pairs.offset, pairs.long_stance)
+        yield "rate", self._rate_cost[pairs.number]
         if self.wanted.taste is not None:
-            yield "variety", self.wanted.taste.cost(first, what.frame)
+            yield "variety", self.wanted.taste.cost(first, pairs.frame)
+
+    def _still(self, words: frozenset[str], avoid: frozenset[str]) -> np.ndarray:
+        """(N,) what the library's frames cost wherever these words are asked and avoided."""
+        if (words, avoid) not in self._kept:
+            terms = self._still_terms(np.arange(len(self.frames)), words, avoid)
+            self._kept[words, avoid] = _added(terms).astype(np.float32)
+        return self._kept[words, avoid]
+
+    def _still_terms(self, frame: np.ndarray, words: frozenset[str], avoid: frozenset[str]) -> Iterator[Term]:
+        """What it is the sum of, by name, each (K,) of frames (K,)."""
+        w, (missing, unasked) = self.weights, self.offer.lacking(words)
+        yield "words", w.words * missing[frame]
+        yield "unasked", np.float32(w.unasked) * unasked[frame]
+        yield "made", np.float32(w.made) * self.offer.made[frame]
+        if self.wanted.off_style is not None:
+            yield "style", self.wanted.off_style[frame]
         if self.price is not None:
-            yield "price", self.price[what.frame]
-        if avoid := self.wanted.avoided_in(first, end):
-            yield "avoided", AVOIDED * self.offer.showing(avoid)[what.frame]
+            yield "price", self.price[frame]
+        if avoid:
+            yield "avoided", AVOIDED * self.offer.showing(avoid)[frame]
 
     def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held
@@ -183,28 +204,31 @@ class PathCosts:
         aside = np.abs(offset - float(self.wanted_offset[(first + end) // 2]))
         yield "facing", w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
 
-    def cut(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """(B, K) cost of a cut from library frames ends (B,) to start (K,): how far their poses are apart, and how wild
-        the motion is that is left or entered (nobody can blend out of a kick half way)."""
-        return _added(self.cut_terms(ends, start))
-
     def cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
-        """What `cut` is the sum of, by name, each (B, K) or broadcast to it; "pose" first."""
+        """What a cut from library frames ends (B,) to start (K,) costs, by name, each (B, K) or broadcast to it: how far
+        their poses are apart ("pose", first), and how wild the motion is that is left or entered (nobody can blend out of
+        a kick half way)."""
         ends, start = self.inside(ends), self.inside(start)
-        apart = self._apart(ends, start)
-        apart *= np.float32(self.weights.pose)
-        yield "pose", apart
-        yield "feet", np.float32(self.weights.feet) * self._feet_apart(ends, start)
-        yield "left", (self.weights.wild * self.offer.wild_before[ends]).astype(np.float32)[:, None]
-        yield "cut", (self.weights.switch + self.weights.wild * self.offer.wild_after[start]).astype(np.float32)
+        yield "pose", self.apart(ends, start)
+        yield "feet", np.float32(self.weights.feet) * self.feet_apart(ends[:, None], start)
+        left, entered = self.left_and_entered(ends, start)
+        yield "left", left[:, None]
+        yield "cut", entered
 
-    def _apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """(B, K) m between the poses of frames ends (B,) and start (K,)."""
+    def left_and_entered(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(B,) what it costs to leave library frames ends (B,), and (K,) to cut to start (K,), whatever the other is."""
+        left = self.weights.wild * self.offer.wild_before[ends]
+        entered = self.weights.switch + self.weights.wild * self.offer.wild_after[start]
+        return left.astype(np.float32), entered.astype(np.float32)
+
+    def apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """(B, K) what the change of pose between library frames ends (B,) and start (K,) costs."""
+        weight = np.float32(self.weights.pose)
         if self.alike is None:
-            return distances(self.frames.features[ends], self.frames.features[start])
+            return distances(weight * self.frames.features[ends], weight * self.frames.features[start])
         total = np.zeros((len(ends), len(start)), np.float32)
         for offset in self.alike.offsets:
-            a, b = (self.alike.bones[self._beside(frames, offset)] for frames in (ends, start))
+            a, b = (weight * self.alike.bones[self._beside(frames, offset)] for frames in (ends, start))
             for bone in range(a.shape[1]):
                 total += distances(a[:, bone], b[:, bone])
         return total / np.float32(len(self.alike.offsets))
@@ -215,14 +239,14 @@ class PathCosts:
         first = self.frames.first[clip]
         return np.clip(frames + offset, first, first + self.frames.count[clip] - 1)
 
-    def _feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """(B, K) m between the feet that stand before and after a cut."""
+    def feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """m between the feet that stand before and after cuts from library frames `ends` to `start`, of shapes that go
+        together."""
         feet, stands = self.frames.feet, self.offer.stands
-        apart = np.zeros((len(ends), len(start)), np.float32)
+        apart = np.zeros(np.broadcast_shapes(ends.shape, start.shape), np.float32)
         for foot in (0, 1):
-            a, b = feet[ends, 2 * foot : 2 * foot + 2], feet[start, 2 * foot : 2 * foot + 2]
-            away = np.hypot(a[:, :1] - b[:, 0], a[:, 1:] - b[:, 1])
-            apart += away * (stands[ends, foot][:, None] & stands[start, foot])
+            x, y = (feet[ends, axis] - feet[start, axis] for axis in (2 * foot, 2 * foot + 1))
+            apart += np.sqrt(x * x + y * y) * (stands[ends, foot] & stands[start, foot])
         return apart
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import Cancelled, InputError
 from ..library.library import Library
+from .cheapest_way import Offered, Ways
 from .edit_list import EditList, PlacedKey, find_seams, replaced
 from .key_fit import ball_at, misfit, strikes
 from .offer import RATES, SLOT
@@ -28,7 +29,6 @@ from .wanted import Wanted
 
 MEMORY_SLOTS = 15
 _LEAD_IN = 2
-_SAME = 0.05
 
 
 @dataclass(frozen=True)
@@ -147,9 +147,9 @@ class PathSearch:
         return costs
 
     def _first(self) -> States:
-        clip, start, rate, cost, piece = self.offered(0)
-        recent = np.full((len(clip), MEMORY_SLOTS), -1)
-        return self._kept(States(clip, start, rate, cost, np.zeros(len(clip), int), piece, recent))
+        to = self.offered(0)
+        recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
+        return self._kept(States(to.clip, to.start, to.rate, to.cost, np.zeros(len(to.clip), int), to.piece, recent))
 
     def _arriving(self) -> tuple[States, int]:
         """The one state from which a stretch sets out, the frame before, with what was shown up to there; and its
@@ -164,21 +164,20 @@ class PathSearch:
     def _leaving(self, states: States, shown: int) -> States:
         """The last states, of `shown` frames, with what it costs to come to the frame that stays behind the stretch."""
         edit, at = self.between.edit, np.array([self.between.end])
-        everyone = np.arange(len(states.cost))
-        ends, goal = states.start + states.rate * shown, (edit.clip[at], edit.frame[at], _steps(edit, at))
-        way = self.ways(states, everyone, ends, *goal)
-        return replace(states, cost=way[:, 0])
+        goal = Offered(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), np.array([-1]))
+        ways = self.ways(states, np.arange(len(states.cost)), states.start + states.rate * shown)
+        return replace(states, cost=ways.every(goal)[:, 0])
 
     def _layer(self, slot: int, before: States, shown: int) -> States:
         """The best states of one slot, given those of the slot before, of `shown` frames."""
         ends = before.start + before.rate * shown
         bound = (before.piece >= 0) & (np.append(self.pieces.end, 0)[before.piece] > slot)
-        options = [self._bound(slot, before, ends, np.flatnonzero(bound))]
+        options = [self._bound(slot, before, ends, np.flatnonzero(bound))] if bound.any() else []
         free = np.flatnonzero(~bound)
         if len(free):
-            options.append(self._entered(slot, before, ends, free))
-            if slot not in self._closed:
-                options.append(self._continued(slot, before, ends, free))
+            going_on = [] if slot in self._closed else [self._continued(slot, before, ends, free)]
+            known = np.concatenate([np.zeros(0), *(cost for _, _, _, cost, _, _ in going_on)])
+            options += [self._entered(slot, before, ends, free, known), *going_on]
         clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
         return self._kept(States(clip, start, rate, cost, back, piece, np.roll(before.recent[back], -1, axis=1)))
 
@@ -191,32 +190,37 @@ class PathSearch:
         kept.recent[:, -1] = self.offer.bucket[self.costs.inside(kept.start)]
         return kept
 
-    def offered(self, slot: int):
+    def offered(self, slot: int) -> Offered:
         """What can begin in a slot: pieces of key moments, and, unless a key frame lies in it, library frames at any
-        rate: the cheapest candidates, those that lead into a piece, and what was shown before an edit. clip, start,
-        rate, cost, piece, each (K,)."""
+        rate: the cheapest candidates, those that lead into a piece, and what was shown before an edit."""
         low, high = self.edges[slot : slot + 2]
-        here = np.flatnonzero(self.pieces.first == slot)
+        closed, here = slot in self._closed, np.flatnonzero(self.pieces.first == slot)
+        offers = [self._beginning(low, high, here)] if closed or len(here) else []
+        if not closed:
+            offers += [self._candidates(low, high), *self._leading_in(slot)]
+            offers += [self._as_before(low, high)] if self.between else []
+        return Offered(*(np.concatenate(parts) for parts in zip(*offers)))
+
+    def _beginning(self, low: int, high: int, here: np.ndarray):
+        """Pieces `here` of key moments."""
         clip, start, rate = self.pieces.clip[here], self.pieces.start[here], self.pieces.rate[here]
         cost = self.costs.key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
-        offers = [(clip, start, rate, cost, here)]
-        if slot not in self._closed:
-            offers += [self._candidates(low, high), self._leading_in(slot)]
-            offers += [self._as_before(low, high)] if self.between else []
-        return [np.concatenate(parts) for parts in zip(*offers)]
+        return clip, start, rate, cost, here
 
     def _candidates(self, low: int, high: int):
         number, start, cost = self.costs.cheapest(low, high, self.width.looked_at, self.width.candidates)
         return self.frames.clip[start], start.astype(float), RATES[number], cost, np.full(len(cost), -1)
 
     def _leading_in(self, slot: int):
-        """Frames from which a piece that begins soon is reached without a cut."""
+        """Frames from which a piece that begins soon is reached without a cut: one offer of them all, or none."""
         soon = np.flatnonzero((self.pieces.first > slot) & (self.pieces.first <= slot + _LEAD_IN))
+        if not len(soon):
+            return
         number = np.abs(RATES - self.pieces.rate[soon][:, None]).argmin(axis=1)
         clip, rate = self.pieces.clip[soon], RATES[number]
         start = self.pieces.start[soon] - rate * (self.edges[self.pieces.first[soon]] - self.edges[slot])
         cost = self._misfit_inside(slot, clip, start, number)
-        return clip, start, rate, cost, np.full(len(soon), -1)
+        yield clip, start, rate, cost, np.full(len(soon), -1)
 
     def _as_before(self, low: int, high: int):
         """What the edit list shows in a slot of a stretch that is searched anew, so that the search may come back to
@@ -235,24 +239,16 @@ class PathSearch:
         lasts = (start >= first) & (start + RATES[number] * (high - low) <= last)
         return np.where(lasts, self.costs.misfit(low, high, number, self.costs.inside(start)), np.inf)
 
-    def _entered(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray):
-        """Whatever is offered, each by the cheapest way."""
-        clip, start, rate, unary, piece = self.offered(slot)
-        way = self.ways(before, free, ends[free], clip, start, rate)
-        best = np.argmin(way, axis=0)
-        return clip, start, rate, way[best, np.arange(len(start))] + unary, free[best], piece
+    def _entered(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray, known: np.ndarray):
+        """Whatever is offered and may be kept beside ways of `known` (L,) costs, each by the cheapest way."""
+        to = self.offered(slot)
+        which, cost, state = self.ways(before, free, ends[free]).cheapest(to, known, self.width.beam)
+        return to.clip[which], to.start[which], to.rate[which], cost, free[state], to.piece[which]
 
-    def ways(self, before: States, free: np.ndarray, ends: np.ndarray, clip, start, rate) -> np.ndarray:
-        """(B, K) cost of coming by the states `free` (B,), which end at library frames `ends` (B,), to frames start
-        (K,) of clips (K,) at a rate (K,): a cut, unless the clip shows that frame next anyway."""
-        cut = self.costs.cut(ends, start)
-        buckets = self.offer.bucket[self.costs.inside(start)]
-        cut += np.float32(self.weights.replay) * self._seen(before.recent[free])[:, buckets]
-        state, offer = _meeting(ends, start)
-        same = before.clip[free][state] == clip[offer]
-        cut[state[same], offer[same]] = 0.0
-        rates = [self.weights.rate_change * values.astype(np.float32) for values in (before.rate[free], rate)]
-        return cut + np.abs(rates[0][:, None] - rates[1]) + before.cost[free][:, None].astype(np.float32)
+    def ways(self, before: States, free: np.ndarray, ends: np.ndarray) -> Ways:
+        """The ways on from the states `free` (B,), which end at library frames `ends` (B,)."""
+        seen = self._seen(before.recent[free])
+        return Ways(self.costs, before.clip[free], ends, before.rate[free], before.cost[free], seen)
 
     def _seen(self, recent: np.ndarray) -> np.ndarray:
         """(B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
@@ -295,15 +291,6 @@ class PathSearch:
         if self.between:
             return replaced(self.between.edit, int(self.edges[0]), int(self.edges[-1]), clip, frame, keys)
         return EditList(clip, frame, find_seams(clip, frame), keys)
-
-
-def _meeting(ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices into ends (B,) and into start (K,) of all pairs that are the same but for rounding."""
-    order = np.argsort(start, kind="stable")
-    low, high = (np.searchsorted(start[order], ends + off) for off in (-_SAME, _SAME))
-    many = high - low
-    at = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many) + np.repeat(low, many)
-    return np.repeat(np.arange(len(ends)), many), order[at]
 
 
 def _steps(edit: EditList, at: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..library.library import Library
 from .annotation_cost import AnnotationCost
+from .cheapest_way import Offered
 from .edit_list import EditList
 from .offer import RATES, SLOT
 from .path_costs import Term, Weights
@@ -197,7 +198,8 @@ def _entry(search: PathSearch, way: _Way, slot: int) -> dict[str, float]:
     before, ends = _state_before(search, way, slot)
     here = way.clip[slot : slot + 1], way.start[slot : slot + 1], way.rate[slot : slot + 1]
     change = search.weights.rate_change * abs(float(way.rate[slot] - way.rate[slot - 1]))
-    whole = float(search.ways(before, np.zeros(1, int), ends, *here)[0, 0])
+    to = Offered(*here, np.zeros(1), np.array([-1]))
+    whole = float(search.ways(before, np.zeros(1, int), ends).every(to)[0, 0])
     if whole <= change + 1e-5:
         return {"rate_change": change}
     costs = _named(search.costs.cut_terms(ends, here[1]))
@@ -220,16 +222,17 @@ def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -
     edge = int(np.searchsorted(search.edges, way.edges[slot]))
     if search.edges[min(edge, len(search.edges) - 1)] != way.edges[slot]:
         return
-    clip, start, rate, cost, piece = search.offered(edge)
+    to = search.offered(edge)
+    cost = to.cost
     if slot:
         before, ends = _state_before(search, way, slot)
-        cost = cost + search.ways(before, np.zeros(1, int), ends, clip, start, rate)[0]
+        cost = search.ways(before, np.zeros(1, int), ends).every(to)[0]
     serves = np.append(search.pieces.wanted, -1)
-    cost = np.where(serves[piece] == serves[way.piece[slot]], cost, np.inf)
+    cost = np.where(serves[to.piece] == serves[way.piece[slot]], cost, np.inf)
     names = [(clip.path, clip.mirrored) for clip in search.library.clips]
     known = {names[way.clip[slot]]}
     for number in np.argsort(cost, kind="stable"):
-        name = names[clip[number]]
+        name = names[to.clip[number]]
         if not np.isfinite(cost[number]) or len(known) > count:
             return
         if name not in known:

@@ -16,7 +16,8 @@ from beyond_mocap.files.match_data import Match, MatchPlayer
 
 PLAYERS = (
     MatchPlayer("h7", "home", "Ana Núñez", 7), MatchPlayer("h9", "home", "Bo Berg", 9),
-    MatchPlayer("a7", "away", "Cy Dahl", 7), MatchPlayer("a3", "away", "Di Berg", 3), MatchPlayer("r", "referee", "R", -1),
+    MatchPlayer("a7", "away", "Cy Dahl", 7), MatchPlayer("a3", "away", "Di Berg", 3),
+    MatchPlayer("r", "referee", "R", -1),
 )  # fmt: skip
 
 
@@ -75,7 +76,8 @@ def test_a_second_file_that_is_missing_is_asked_for(tmp_path):
 
 @pytest.mark.parametrize("name, meta", [
     ("opta_f24.xml", "opta_f7.xml"), ("sportec_events.xml", "sportec_meta.xml"),
-    ("metrica_events.json", "epts_metrica_metadata.xml"), ("statsperform_event_ma3.json", "statsperform_event_ma1.json"),
+    ("metrica_events.json", "epts_metrica_metadata.xml"),
+    ("statsperform_event_ma3.json", "statsperform_event_ma1.json"),
     ("statsbomb_event.json", "statsbomb_lineup.json"), ("impect_events.json", "impect_lineups.json"),
 ])
 def test_a_second_file_is_known_by_its_form_too(tmp_path, name, meta):
@@ -119,7 +121,8 @@ def test_the_plain_table_gets_the_match_s_players_and_periods(tmp_path):
     ("time_s,type,player\n", "no events"),
     ("time_s,type,player\nx,pass,home_7\n", ":2: time_s 'x'"),
     ("time_s,type,player,part\n1,pass,home_7,knee\n", ":2: part 'knee'"),
-    ("time_s,type,player\n1,pass,home_20\n2,pass,home_21\n", "2 of 2 players (home_20, home_21) are not in the tracking"),
+    ("time_s,type,player\n1,pass,home_20\n2,pass,home_21\n",
+     "2 of 2 players (home_20, home_21) are not in the tracking"),
 ])
 def test_mistakes_get_one_line(tmp_path, text, part):
     (tmp_path / "e.csv").write_text(text)
@@ -147,9 +150,10 @@ def test_any_content_is_read_or_refused(tmp_path_factory, content):
 
 
 def test_metrica_s_table_of_events_is_read(tmp_path):
-    head = "Team,Type,Subtype,Period,Start Frame,Start Time [s],End Frame,End Time [s],From,To,Start X,Start Y,End X,End Y\n"
-    rows = "Away,PASS,HEAD,1,1,2.5,2,2.6,Player7,Player3,0.6,0.25,0.7,0.2\nHome,BALL LOST,,2,9,2800,9,2800,Player9,,,,,\n"
-    (tmp_path / "e.csv").write_text(head + rows)
+    head = "Team,Type,Subtype,Period,Start Frame,Start Time [s],End Frame,End Time [s],From,To,Start X,Start Y,End X,End Y"
+    one = "Away,PASS,HEAD,1,1,2.5,2,2.6,Player7,Player3,0.6,0.25,0.7,0.2"
+    other = "Home,BALL LOST,,2,9,2800,9,2800,Player9,,,,,"
+    (tmp_path / "e.csv").write_text("\n".join([head, one, other, ""]))
     first, second = read_events(tmp_path / "e.csv", match=made_match()).events
     assert (first.player, first.kind, first.part, first.time) == ("a7", "pass", "head", 2.5)
     np.testing.assert_allclose(first.place, (10.0, 16.0))

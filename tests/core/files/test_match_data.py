@@ -11,6 +11,7 @@ from beyond_mocap.files.match_data import Match, MatchPlayer, presence_lines
 from beyond_mocap.files.match_mending import mended_ball, mended_players, mended_sides, side_lines
 from beyond_mocap.files.team_colours import team_colours
 from beyond_mocap.files.providers import Feed
+from beyond_mocap.files.referees import referee_samples
 from beyond_mocap.files.tracking import read_match
 
 PERIODS = ((0.0, 99.9), (109.9, 209.8))
@@ -139,11 +140,13 @@ META = (
 
 def roster(side, shirts):
     one = (
-        "<Player><PlayerId>{side}{n}</PlayerId><FirstName>A</FirstName><LastName>B{n}</LastName><JerseyNo>{n}</JerseyNo>"
+        "<Player><PlayerId>{side}{n}</PlayerId><FirstName>A</FirstName><LastName>B{n}</LastName>"
+        "<JerseyNo>{n}</JerseyNo>"
         "<StartFrameCount>1</StartFrameCount><EndFrameCount>99</EndFrameCount></Player>"
     )
     players = "".join(one.format(side=side, n=n) for n in shirts)
-    return f"<{side}Team><LongName>{side}</LongName><ShortName>{side}</ShortName><TeamId>1</TeamId><Players>{players}</Players></{side}Team>"
+    names = f"<LongName>{side}</LongName><ShortName>{side}</ShortName><TeamId>1</TeamId>"
+    return f"<{side}Team>{names}<Players>{players}</Players></{side}Team>"
 
 
 def tracab(folder, frames=60, shirts=range(1, 12), start=1, end=60, second=0, last=0, named=None):
@@ -208,9 +211,10 @@ def test_two_teams_of_two_matches_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("said, expected", [
-    ('{"homeTeamKit":{"name":"x","primaryColor":"#ff00aa"},"awayTeamKit":{"primaryColor":"#003366"}}', ("#FF00AA", "#003366")),
+    ('{"homeTeamKit":{"name":"x","primaryColor":"#ff00aa"},"awayTeamKit":{"primaryColor":"#003366"}}',
+     ("#FF00AA", "#003366")),
     ('{"home_team_kit":{"id":1,"jersey_color":"#ffffff"}}', ("#FFFFFF", "")),
-    ('<Teams><Team Role="home" PlayerShirtMainColor="#DC0B21"/><Team PlayerShirtMainColor="8FBBF0" Role="guest"/></Teams>',
+    ('<Team Role="home" PlayerShirtMainColor="#DC0B21"/><Team PlayerShirtMainColor="8FBBF0" Role="guest"/>',
      ("#DC0B21", "#8FBBF0")),
     ('{"homeTeamKit":{"primaryColor":"red"}}', ("", "")),
     ("no colours", ("", "")),
@@ -222,6 +226,16 @@ def test_colours_of_shirts_are_found(tmp_path, said, expected):
 
 
 # --- referees
+
+
+def test_a_damaged_sample_ends_the_referees_and_is_told(tmp_path):
+    file = tracab(tmp_path)
+    frame = ('{{"FrameCount":{0},"PlayerPositions":[{{"Team":3,"JerseyNumber":0,"X":{1},"Y":5}}]}}').format
+    (tmp_path / "g.json").write_text('{"FrameData":[' + ",".join(map(frame, (1, 2, 3), (1, 2, '"?"'))) + "]}")
+    feed = Feed("tracab", (tmp_path / "g.json",), (file.with_name("g_meta.xml"),))
+    names, places, lines = referee_samples(feed, np.arange(1, 5))
+    assert names == ["referee_0"] and np.isfinite(places[0, :, 0]).tolist() == [True, True, False, False]
+    assert "up to frame 2 only" in lines[0]
 
 
 def test_tracab_s_referees_are_players_of_their_own_team(tmp_path):

@@ -1,38 +1,22 @@
 """A player searched in windows, joined and laid out: what every span of him has to be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import parse_timeline
 from beyond_mocap.errors import InputError
 from beyond_mocap.match.expand import expanded
-from beyond_mocap.match.player_edit import PlayerEdit
-from beyond_mocap.match.searched import searched
-from beyond_mocap.match.splice import spliced
-from beyond_mocap.match.units import units_of
-from beyond_mocap.motion.track import Track
-from beyond_mocap.plan import Plan
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.track import sample
+from beyond_mocap.synthesize import constructed, synthesize
 
-WINDOW = 8.0
+from .conftest import KICK_TIME
 
 
-def weaving(start: float, end: float) -> Track:
-    """Samples at 25 Hz of a player who walks and jogs on a bent line, from second `start` to `end`."""
-    times = np.arange(start, end + 1e-9, 0.04)
-    way = 2.0 * (times - start) + 2.0 * np.sin(0.6 * times)
-    return Track(times, np.column_stack([way, 4.0 * np.sin(0.08 * way)]), name="home_7")
-
-
-def made(library, fps=30.0, **settings) -> PlayerEdit:
-    timeline = parse_timeline("20.5 kick right\n", fps=fps)
-    plan = Plan(track=weaving(5.0, 30.0), timeline=timeline, nearest=True, fps=fps, **settings)
-    pieces = [searched(library, unit) for unit in units_of(plan, window=WINDOW, overlap=2.0)]
-    return spliced(library, [plan], pieces[::-1], WINDOW)[0]
-
-
-@pytest.fixture(scope="module")
-def player(library) -> PlayerEdit:
-    return made(library)
+def at_rate(player, fps: float):
+    stretches = tuple(replace(one, plan=replace(one.plan, fps=fps)) for one in player.stretches)
+    return replace(player, stretches=stretches)
 
 
 def same_frames(whole, part) -> bool:
@@ -50,30 +34,57 @@ def same_frames(whole, part) -> bool:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("fps", [30.0, 25.0, 24000 / 1001])
-def test_any_span_shows_the_same_frames(library, fps):
-    player = made(library, fps)
+@pytest.mark.parametrize("fps", [30.0, 24000 / 1001])
+def test_any_span_shows_the_same_frames(library, weaving_player, fps):
+    player = at_rate(weaving_player, fps)
     (whole,) = expanded(library, player, 0.0, 100.0)
     assert len(whole.motion) == int(np.floor(25.0 * fps + 1e-6)) + 1
     for start, end in [(5.0, 30.0), (15.9, 17.3), (16.1, 24.0), (23.0, 29.0)]:
         (part,) = expanded(library, player, start, end)
         assert start <= part.start_time < start + 1.0 / fps + 1e-6 and len(part.motion) > (end - start) * fps - 2
         assert same_frames(whole, part)
-        assert len(part.keys) == (start <= 20.5 <= end)
+        assert len(part.keys) == (start <= KICK_TIME <= end)
+        assert part.timeline.spans[0].start == pytest.approx(part.start_time)
 
 
-def test_two_windows_meet_without_a_jump(library, player):
-    (take,) = expanded(library, player, 5.0, 30.0)
-    step = np.linalg.norm(np.diff(take.motion.root_positions, 2, axis=0), axis=1)
-    edges = [int(round((edge - take.start_time) * 30.0)) for edge in (8.0, 16.0, 24.0)]
-    near = np.array([abs(frame - edge) < 20 for edge in edges for frame in range(len(step))]).reshape(3, -1).any(axis=0)
-    assert step[near].max() <= 1.5 * step[~near].max()
+def test_he_shows_the_whole_of_his_edit_list_on_his_track(library, weaving_player):
+    (take,) = expanded(library, weaving_player, 0.0, 100.0)
+    clip, frame = weaving_player.stretches[0].edit.frames()
+    names = [(take.clips[c], bool(m)) for c, m in zip(take.clip, take.mirrored)]
+    table = weaving_player.stretches[0].edit.clips
+    assert np.mean([name == table[c] for name, c in zip(names, clip)]) > 0.99
+    track = sample(weaving_player.stretches[0].plan.track, 30.0)
+    assert np.abs(take.motion.root_positions[:, :2] - track.positions).max() < 0.35
+    assert take.keys[0].frame == pytest.approx((KICK_TIME - 5.0) * 30.0, abs=1.0)
 
 
-def test_nothing_of_a_player_who_is_not_there(library, player):
-    assert expanded(library, player, 40.0, 50.0) == ()
+def test_two_windows_meet_without_a_jump(library, weaving_player):
+    (take,) = expanded(library, weaving_player, 5.0, 30.0)
+    places, _ = forward_kinematics(take.motion)
+    jerk = np.linalg.norm(np.diff(places, 3, axis=0), axis=-1).max(axis=1)
+    near = np.zeros(len(jerk), bool)
+    for edge in (8.0, 16.0, 24.0):
+        at = int(round((edge - take.start_time) * 30.0))
+        near[at - 3 : at + 63] = True
+    assert jerk[near].max() <= 1.2 * jerk[~near].max()
 
 
-def test_a_span_that_ends_before_it_starts_is_told(library, player):
+def test_one_window_is_what_synthesize_makes(library, weaving_plan):
+    take = synthesize(library, weaving_plan)
+    again = constructed(library.extended, weaving_plan, take.edit)
+    assert np.allclose(again.motion.root_positions, take.motion.root_positions, rtol=0.0, atol=1e-9)
+    assert (again.keys[0].clip, again.words, again.timeline) == (take.keys[0].clip, take.words, take.timeline)
+
+
+def test_nothing_of_a_player_who_is_not_there(library, weaving_player):
+    assert expanded(library, weaving_player, 40.0, 50.0) == ()
+
+
+def test_a_span_that_ends_before_it_starts_is_told(library, weaving_player):
     with pytest.raises(InputError, match="an end behind the start"):
-        expanded(library, player, 20.0, 10.0)
+        expanded(library, weaving_player, 20.0, 10.0)
+
+
+def test_another_library_is_told(strikes_library, weaving_player):
+    with pytest.raises(InputError, match="the library that the match was made from"):
+        expanded(strikes_library, weaving_player, 5.0, 10.0)

@@ -2,57 +2,14 @@
 
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
 
 from beyond_mocap.errors import Cancelled, InputError
 from beyond_mocap.match import pool
 from beyond_mocap.match.pool import Failed, Workplace, run
-
-TOP = Path(__file__).resolve().parents[3]
-
-
-@pytest.fixture(scope="session")
-def chores(tmp_path_factory):
-    """A module of work to do that other processes can import: its functions."""
-    folder = tmp_path_factory.mktemp("chores")
-    (folder / "planted_chores.py").write_text('''
-import os, signal, time
-from pathlib import Path
-
-def square(number):
-    return number * number
-
-def odd(number):
-    if number % 2:
-        raise ValueError(f"{number} is odd")
-    return number
-
-def deadly(number, folder, times):
-    """Ends its own process while fewer than `times` marks lie in the folder."""
-    if number == 3 and len(list(Path(folder).iterdir())) < times:
-        (Path(folder) / str(time.time_ns())).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number, os.getpid()
-
-def slow(seconds):
-    time.sleep(seconds)
-    return os.getpid()
-''')
-    sys.path.insert(0, str(folder))
-    before = os.environ.get("PYTHONPATH")
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(folder), str(TOP), *([before] if before else [])])
-    import planted_chores
-
-    yield planted_chores
-    pool.ended()
-    sys.path.remove(str(folder))
-    os.environ.pop("PYTHONPATH") if before is None else os.environ.update(PYTHONPATH=before)
 
 
 def numbers(count, *more):
@@ -102,6 +59,12 @@ def test_cancelling_does_not_wait_for_the_work(chores):
     assert time.monotonic() - begun < 10.0
 
 
+def test_what_pieces_took_is_told(chores):
+    told = []
+    list(run(numbers(3), chores.square, Workplace(2), spent=told.append))
+    assert len(told) == 3 and all(5.0 < one.memory < 1000.0 and 0.0 <= one.seconds < 5.0 for one in told)
+
+
 def test_fewer_than_one_worker_is_told():
     with pytest.raises(InputError, match="--workers: 0; expected 1 or more"):
         Workplace(0)
@@ -112,30 +75,6 @@ def test_a_scheduler_that_does_not_answer_is_told(chores, monkeypatch):
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         with pytest.raises(InputError, match="--scheduler: .* does not answer"):
             list(run(numbers(1), chores.square, Workplace(1, address)))
-
-
-@pytest.fixture
-def cluster(chores, tmp_path):
-    """A scheduler and two workers as processes of their own: (address, processes)."""
-    pytest.importorskip("distributed")
-    where = tmp_path / "scheduler.json"
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1",
-               "--no-dashboard", "--scheduler-file", str(where)]  # fmt: skip
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
-    processes = [subprocess.Popen(command, **quiet)]
-    command = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(where), "--nthreads", "1",
-               "--no-dashboard", "--no-nanny"]  # fmt: skip
-    processes += [subprocess.Popen(command, **quiet) for _ in range(2)]
-    deadline = time.monotonic() + 60.0
-    while not (where.is_file() and where.stat().st_size):
-        assert time.monotonic() < deadline, "no scheduler came up"
-        time.sleep(0.05)
-    import json
-
-    yield json.loads(where.read_text())["address"], processes
-    for process in processes:
-        process.kill()
-        process.wait()
 
 
 def test_a_cluster_does_the_same_though_a_worker_is_killed_midway(chores, cluster):

@@ -60,11 +60,11 @@ def test_a_cut_costs_what_the_standing_foot_would_jump(library, order):
     frames = frames_of(library, "walk.bvh")
     stands = library.feet_standing[frames]
     one = frames[stands[:, 0] & ~stands[:, 1]]
-    found = costs(library, order(), feet=1.0).cut(one, one)
+    found = costs(library, order()).feet_apart(one[:, None], one)
     feet = library.frames.feet[one, :2]
     assert np.allclose(found, np.linalg.norm(feet[:, None] - feet, axis=-1), atol=1e-6)
     other = frames[~stands[:, 0] & stands[:, 1]]
-    assert not np.any(costs(library, order(), feet=1.0).cut(one, other))
+    assert not np.any(costs(library, order()).feet_apart(one[:, None], other))
 
 
 def test_the_cheapest_are_the_cheapest(library, order, track_of):

@@ -1,0 +1,174 @@
+"""A match from file to folder: what is in it, and that neither workers, kills, edits nor a bad player change the rest."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import Cancelled
+from beyond_mocap.files import bvh
+from beyond_mocap.files.tables import read_ball, read_provenance, read_rows
+from beyond_mocap.files.take_npz import read_player
+from beyond_mocap.files.tracking import read_match
+from beyond_mocap.library.library import build
+from beyond_mocap.match.folder import read_state
+from beyond_mocap.match.make import make_match
+from beyond_mocap.match.shown import shown
+from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP, kept_files
+from tests.core.test_command_line import assert_contract
+
+FRAMES = round((SECONDS[1] - SECONDS[0]) * 30.0) + 1
+
+
+def touches():
+    """(seconds, player, x, y) of the planted touches in the stretch, but for those of dribbles, which are no key
+    moments."""
+    rows = [row for _, row in read_rows(SMALL / "small_touches.csv", ("time_s", "player", "words", "x_m", "y_m"))]
+    return [(float(row["time_s"]), row["player"], float(row["x_m"]), float(row["y_m"])) for row in rows
+            if SECONDS[0] < float(row["time_s"]) < SECONDS[1] and row["words"] != "dribble"]  # fmt: skip
+
+
+def test_everything_promised_is_in_the_folder(made):
+    folder, result = made
+    assert sorted(one.id for one in result.done) == sorted(PLAYERS) and not result.failed and result.span == SECONDS
+    state = read_state(folder)
+    assert (state["status"], state["title"], state["from_s"], state["to_s"]) == ("done", "Reds - Blues", *SECONDS)
+    assert [row["status"] for row in state["players"]] == ["done"] * 3
+    for row in state["players"]:
+        assert row["units"] == row["units_done"] == 2
+        for kind in ("take", "report", "provenance", "bvh"):
+            assert (folder / row[kind]).is_file()
+        motion = bvh.read(folder / row["bvh"], 0.01).motion
+        provenance = read_provenance(folder / row["provenance"])
+        assert len(motion) == len(provenance) == FRAMES and provenance.times[0] == SECONDS[0]
+        report = json.loads((folder / row["report"]).read_text())
+        assert_contract(report)
+        assert report["root_error_m"]["mean"] < 0.005 and (report["id"], report["team"]) == (row["id"], row["team"])
+        assert report["per_second"]["start_s"] == 3 and len(report["per_second"]["root_error_m"]) == 9
+    assert set(state["seconds"]) >= {"read", "library", "ball", "words", "search", "crowd", "figures", "total"}
+    assert "Cora Wing" in (folder / "report.html").read_text()
+
+
+def test_players_are_where_the_tracking_has_them_and_the_ball_where_it_is_touched(made):
+    folder, _ = made
+    match, ball = read_match(SMALL / "small.dat"), read_ball(folder / "ball.csv")
+    assert len(ball.times) == FRAMES and np.isfinite(ball.positions).all()
+    for player in PLAYERS:
+        motion, track = bvh.read(folder / f"{player}.bvh", 0.01).motion, match.track(player, *SECONDS)
+        times = SECONDS[0] + np.arange(FRAMES) / 30.0
+        wanted = np.stack([np.interp(times, track.times, column) for column in track.positions.T], axis=1)
+        assert np.linalg.norm(motion.root_positions[:, :2] - wanted, axis=1).mean() < 0.12
+    for when, _, x, y in touches():
+        at = [np.interp(when, ball.times, column) for column in ball.positions[:, :2].T]
+        assert np.hypot(at[0] - x, at[1] - y) < 0.5
+    for when, player, *_ in touches():
+        if player in PLAYERS:
+            keys = json.loads((folder / f"{player}.report.json").read_text())["keys"]
+            assert min(abs(when - key["time_s"]) for key in keys) < 0.15
+
+
+def test_a_player_is_shown_from_his_file_as_he_was_written(made, sample_cache):
+    folder, _ = made
+    edit, ball = read_player(folder / "home_7.take.npz"), read_ball(folder / "ball.csv")
+    library = build(LIBRARY, cache_dir=sample_cache)
+    (take,) = shown(library, edit, ball, *SECONDS)
+    motion = bvh.read(folder / "home_7.bvh", 0.01).motion
+    assert np.abs(take.motion.root_positions - motion.root_positions).max() < 1e-4
+    assert len(read_provenance(folder / "home_7.provenance.csv").clip) == len(take.clip)
+
+
+def test_any_number_of_workers_gives_the_same_bits(made, order_to, tmp_path):
+    make_match(order_to(tmp_path / "two", workers=2))
+    assert kept_files(tmp_path / "two") == kept_files(made[0])
+
+
+def command(order):
+    """The order as the command has it; windows are what no option tells."""
+    return [sys.executable, "-c", f"""
+import sys; sys.path.insert(0, {str(TOP)!r})
+from pathlib import Path, PosixPath
+from beyond_mocap.match.make import make_match
+from beyond_mocap.match.order import MatchOrder
+if __name__ == "__main__":
+    make_match({order!r})
+"""]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["search", "crowd"])
+def test_a_run_that_was_killed_is_gone_on_with_to_the_same_bits(made, order_to, tmp_path, kind):
+    order = order_to(tmp_path / "killed", workers=2)
+    process = subprocess.Popen(command(order), start_new_session=True)
+    deadline = time.monotonic() + 120.0
+    while not list((order.out / ".work" / kind).glob("*.npz")):
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert read_state(order.out)["status"] == "running"
+    kept = {path: path.stat().st_mtime_ns for path in (order.out / ".work").rglob("*.npz")}
+    make_match(replace(order, workers=1))
+    assert kept_files(order.out) == kept_files(made[0])
+    assert kept and all(path.stat().st_mtime_ns == when for path, when in kept.items())
+
+
+def test_what_is_cancelled_is_told_and_gone_on_with(made, order_to, tmp_path):
+    order, told = order_to(tmp_path / "cancelled"), []
+
+    def progress(fraction, text):
+        told.append((fraction, text))
+
+    with pytest.raises(Cancelled):
+        make_match(order, progress, lambda: any("windows" in text for _, text in told))
+    state = read_state(order.out)
+    assert state["status"] == "cancelled" and sum(row["units_done"] for row in state["players"]) == 1
+    assert [fraction for fraction, _ in told] == sorted(fraction for fraction, _ in told)
+    make_match(order)
+    assert kept_files(order.out) == kept_files(made[0])
+
+
+def test_edited_words_touch_their_player_and_nobody_else(made, order_to, tmp_path):
+    order = order_to(tmp_path / "edited")
+    make_match(order)
+    before, pieces = kept_files(order.out), set((order.out / ".work" / "search").iterdir())
+    text = order.out / "annotations" / "away_6.txt"
+    text.write_text(text.read_text() + "9.5 kick right\n")
+    make_match(order)
+    after = kept_files(order.out)
+    assert {name for name in before if before[name] != after[name]} - {"ball.csv"} >= {"away_6.take.npz", "away_6.bvh"}
+    others = [name for name in before if "away_6" not in name and name.endswith("take.npz")]
+    assert len(others) == 2 and all(before[name] == after[name] for name in others)
+    keys = json.loads(after["away_6.report.json"])["keys"]
+    assert any(key["time_s"] == 9.5 and "kick" in key["labels"] for key in keys)
+    assert len(set((order.out / ".work" / "search").iterdir()) - pieces) in (1, 2)  # windows with 9.5 s in them
+
+
+def test_one_bad_player_stops_nobody(made, order_to, tmp_path):
+    (tmp_path / "words").mkdir()
+    (tmp_path / "words" / "home_7.txt").write_text("5 kick wrongword\n")
+    result = make_match(order_to(tmp_path / "bad", annotations=tmp_path / "words", figures=True))
+    assert {one.id for one in result.done} == {"away_6", "home_10"}
+    assert [one.id for one in result.failed] == ["home_7"] and "wrongword" in result.failed[0].reason
+    state = read_state(tmp_path / "bad")
+    assert state["status"] == "partial"
+    assert {row["id"]: row["status"] for row in state["players"]}["home_7"] == "failed"
+    good = kept_files(made[0])
+    assert kept_files(tmp_path / "bad")["away_6.take.npz"] == good["away_6.take.npz"]
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_bits(made, order_to, tmp_path, cluster):
+    address, processes = cluster
+    killed = []
+
+    def progress(fraction, text):
+        if "windows" in text and not killed:
+            killed.append(processes[1].pid)
+            os.kill(processes[1].pid, signal.SIGKILL)
+
+    make_match(order_to(tmp_path / "spread", scheduler=address), progress)
+    assert killed and kept_files(tmp_path / "spread") == kept_files(made[0])

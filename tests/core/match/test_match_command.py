@@ -1,0 +1,92 @@
+"""The verb `match`: what it makes, and that everything wrong is one clear line and leaves nothing behind."""
+
+import json
+
+import pytest
+
+from beyond_mocap.__main__ import main
+from beyond_mocap.match.folder import read_state
+from tests.core.match.small_match import LIBRARY, SMALL
+
+
+@pytest.fixture
+def run(capfd):
+    """run(*arguments) -> status, standard output, lines on standard error."""
+
+    def call(*arguments):
+        capfd.readouterr()
+        status = main([str(argument) for argument in arguments])
+        out, error = capfd.readouterr()
+        return status, out, error.splitlines()
+
+    return call
+
+
+@pytest.fixture
+def match(run, sample_cache, tmp_path):
+    """match(*more, **options) -> as run; by default a second of one player of the small match, to tmp_path/out."""
+
+    def call(*more, **options):
+        options = {"tracking": SMALL / "small.dat", "library": LIBRARY, "cache": sample_cache, "out": tmp_path / "out",
+                   "from": 4, "to": 6, "players": "home_7", "workers": 1, **options}  # fmt: skip
+        pairs = [part for name, value in options.items() if value is not None for part in (f"--{name}", value)]
+        return run("match", *pairs, *more)
+
+    return call
+
+
+def test_a_player_and_the_ball(match, tmp_path):
+    status, out, error = match("--json", "--no-figures")
+    told = [json.loads(line) for line in error]
+    shares = [line["progress"] for line in told if "progress" in line]
+    assert status == 0 and "1 of 1 players, 2.0 s" in out and shares == sorted(shares) and shares[-1] > 0.9
+    assert any("small_meta.xml taken" in line.get("note", "") for line in told)
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert files == [".work", "annotations", "ball.csv", "home_7.take.npz", "match.json"]
+    assert read_state(tmp_path / "out")["status"] == "done"
+    status, _, error = match("--no-figures", to=7)
+    assert status == 2 and "holds the results of another order (its --to differs)" in error[0]
+
+
+def test_without_solved_touches_there_are_no_words(match, tmp_path):
+    assert match("--no-solve-touches", "--no-figures", "--bvh")[0] == 0
+    text = (tmp_path / "out" / "annotations" / "home_7.txt").read_text()
+    assert not [line for line in text.splitlines() if line and not line.startswith("#")]
+    assert (tmp_path / "out" / "home_7.bvh").is_file() and (tmp_path / "out" / "ball.csv").is_file()
+
+
+def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match, tmp_path):
+    (tmp_path / "words").mkdir()
+    (tmp_path / "words" / "home_7.txt").write_text("5 dive left high\n")
+    status, _, error = match("--exact", "--no-figures", annotations=tmp_path / "words")
+    assert status == 2 and "no player could be made" in error[-1] and any("home_7" in line and "dive" in line for line in error)
+    assert read_state(tmp_path / "out")["status"] == "failed"
+
+
+@pytest.mark.parametrize("options, status, told", [
+    ({"tracking": "no.dat"}, 2, "no.dat: no such file"),
+    ({"library": "nowhere"}, 2, "nowhere"),
+    ({"from": 6, "to": 5}, 2, "--to: 5 s; expected later than --from 6 s"),
+    ({"from": 100, "to": 200}, 2, "--from, --to: 100 to 200 s; expected a second or more within 0 to 24 s"),
+    ({"players": "home_99"}, 2, "--players: 'home_99'; expected some of"),
+    ({"players": "away_9", "from": 15, "to": 20}, 2, "nobody is there from 15 to 20 s"),
+    ({"provider": "nobody"}, 2, "provider: 'nobody'"),
+    ({"events": "no.csv"}, 2, "no.csv"),
+    ({"meta": "no.xml"}, 2, "no.xml"),
+    ({"workers": 0}, 2, "'0' is not 1 to 256"),
+    ({"scheduler": "tcp://127.0.0.1:9"}, 2, "not allowed with argument --workers"),
+    ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "--scheduler: tcp://127.0.0.1:9 does not answer"),
+    ({"fps": 0}, 2, "1 to 480 frames per second"),
+    ({"out": ""}, 2, "no folder is named"),
+    ({"out": "no/such/place"}, 2, "the folder above it does not exist"),
+    ({"out": str(SMALL)}, 2, "holds other files"),
+])  # fmt: skip
+def test_what_is_wrong_is_told_in_one_line(match, tmp_path, monkeypatch, options, status, told):
+    from beyond_mocap.match import pool
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pool, "_ANSWERS", "500ms")
+    found, out, error = match(**options)
+    assert found == status and len(error) == 1 and told in error[0] and error[0].startswith("beyond-mocap"), error
+    assert out == "" and "Traceback" not in error[0]
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,118 @@
+"""A plan in windows: their place on the clock, and that a cut plan asks for what the whole one does."""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from beyond_mocap.annotation import KeyMoment, Span, Timeline
+from beyond_mocap.errors import InputError
+from beyond_mocap.match.cut_plan import cut_plan, cut_track
+from beyond_mocap.match.player_edit import kept
+from beyond_mocap.match.units import frame_count, layout_edges, units_of, window_edges
+from beyond_mocap.motion.track import Track, sample
+from beyond_mocap.plan import Plan, SolvedCourse, Touched
+from beyond_mocap.synthesis.offer import SLOT
+
+
+@given(st.floats(0.0, 500.0), st.integers(60, 20000), st.sampled_from([10.0, 30.0, 60.0]))
+def test_windows_follow_each_other_and_lie_on_the_clock(begin, count, window):
+    edges = window_edges(begin, count, window)
+    assert edges[0] == 0 and edges[-1] == count and np.all(np.diff(edges) > 0)
+    for edge in edges[1:-1]:
+        time = begin + edge / 30.0
+        assert edge % SLOT == 0 and abs(time - window * round(time / window)) <= 0.5 * SLOT / 30.0 + 1e-6
+    assert np.all(np.diff(edges) <= 1.6 * window * 30.0 + SLOT)
+
+
+def test_a_part_of_a_stretch_is_laid_out_in_the_windows_of_the_whole():
+    whole, part = layout_edges(5.0, 6000, 30.0, 30.0), layout_edges(65.0, 1800, 30.0, 30.0)
+    assert {edge + 1800 for edge in part[1:-1]} <= set(whole)
+
+
+def test_units_cover_a_stretch_and_share_their_overlaps(weaving_plan):
+    units = units_of(weaving_plan, 3, window=8.0, overlap=3.0)
+    assert [unit.number for unit in units] == list(range(len(units))) and len(units) == 4
+    assert {(unit.player, unit.stretch) for unit in units} == {("home_7", 3)}
+    assert [unit.own for unit in units[1:]] == [(a.own[1], b.own[1]) for a, b in zip(units, units[1:])]
+    assert units[0].own[0] == 0 and units[-1].own[1] == frame_count(weaving_plan)
+    for unit in units:
+        assert unit.start == pytest.approx(5.0 + unit.own[0] / 30.0)
+        assert unit.plan.track.times[0] == pytest.approx(5.0 + unit.first / 30.0, abs=1e-9)
+        assert unit.first % SLOT == 0 and unit.first == max(0, unit.own[0] - 64)
+    assert [len(unit.plan.timeline.keys) for unit in units] == [0, 0, 1, 0]
+
+
+def test_a_unit_travels_to_another_process(weaving_plan):
+    unit = units_of(weaving_plan, window=8.0, overlap=3.0)[1]
+    again = pickle.loads(pickle.dumps(unit))
+    assert np.array_equal(again.plan.track.positions, unit.plan.track.positions) and again.own == unit.own
+
+
+@pytest.mark.parametrize("window, overlap", [(2.0, 1.0), (60.0, 40.0), (60.0, 0.1)])
+def test_windows_without_sense_are_told(weaving_plan, window, overlap):
+    with pytest.raises(InputError):
+        units_of(weaving_plan, window=window, overlap=overlap)
+
+
+def test_a_cut_track_is_sampled_as_the_whole_one_away_from_its_ends(weaving_plan):
+    whole = sample(weaving_plan.track, 30.0)
+    part = sample(cut_track(weaving_plan.track, 5.0 + 100 / 30.0, 5.0 + 400 / 30.0), 30.0)
+    inside = slice(60, -60)
+    assert len(part) == 301
+    assert np.allclose(part.times, whole.times[100:401]) and np.allclose(part.raw, whole.raw[100:401])
+    assert np.allclose(part.positions[inside], whole.positions[100:401][inside], atol=1e-9)
+    assert np.allclose(part.speed[inside], whole.speed[100:401][inside], atol=1e-9)
+
+
+def test_between_samples_a_cut_says_no_more_than_its_neighbours():
+    times, ball = np.array([0.0, 1.0, 2.0]), np.array([[0, 0, 0.11], [1, 0, np.nan], [2, 0, 0.11]])
+    track = Track(times, np.column_stack([times, times]), ball, filled=[False, True, False])
+    cut = cut_track(track, 0.5, 2.0)
+    assert cut.times.tolist() == [0.5, 1.0, 2.0] and cut.positions[0].tolist() == [0.5, 0.5]
+    assert cut.filled.tolist() == [True, True, False] and cut.ball_height_known.tolist() == [False, False, True]
+    assert cut.ball[0, 0] == 0.5 and np.isnan(cut.ball[0, 2])
+
+
+def test_a_cut_plan_keeps_what_reaches_into_it(weaving_plan):
+    spans = (Span(5.0, 12.0, ("walking",)), Span(25.0, 30.0, ("jogging",)))
+    keys = (KeyMoment(9.0, ("kick",)), KeyMoment(12.0, ("kick",)), KeyMoment(20.0, ("kick",)))
+    plan = cut_plan(Plan(track=weaving_plan.track, timeline=Timeline(spans, keys)), 10.0, 20.0)
+    assert plan.timeline == Timeline(spans[:1], keys[1:])
+
+
+def with_course(plan: Plan) -> Plan:
+    times = np.arange(5.0, 30.0, 0.004)
+    ball = np.column_stack([times, np.sin(times), 1.2 + np.sin(times)])
+    ball[:100] = np.nan
+    touches = (Touched(7.0, True, "foot", "kick"), Touched(20.45, None, "", "receive"))
+    return Plan(track=plan.track, timeline=plan.timeline, solve_touches=True, nearest=True,
+                solved=SolvedCourse(times, ball, times > 25.0, touches))  # fmt: skip
+
+
+def test_what_is_kept_of_a_plan_is_kept_once_for_all(weaving_plan):
+    once = kept(with_course(weaving_plan))
+    twice = kept(once)
+    assert np.array_equal(once.track.positions, twice.track.positions)
+    assert np.array_equal(once.solved.times, twice.solved.times)
+    assert np.array_equal(once.solved.ball, twice.solved.ball, equal_nan=True)
+    assert once.timeline == twice.timeline
+
+
+def test_a_kept_plan_is_a_millimetre_off_at_most(weaving_plan):
+    plan = with_course(weaving_plan)
+    short = kept(plan)
+    assert np.abs(short.track.positions - plan.track.positions).max() <= 0.000501
+    at = np.linspace(6.0, 29.0, 500)
+    assert np.abs(short.solved.at(at)[0] - plan.solved.at(at)[0]).max() <= 0.0012
+
+
+@settings(max_examples=20)
+@given(st.floats(6.0, 15.0), st.floats(1.0, 10.0))
+def test_a_cut_course_is_the_same_where_it_is_needed(weaving_plan, start, length):
+    plan = with_course(weaving_plan)
+    cut = cut_plan(plan, start, start + length)
+    at = np.linspace(start, start + length, 50)
+    assert np.array_equal(cut.solved.at(at)[0], plan.solved.at(at)[0], equal_nan=True)
