@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..motion import quaternion
 from ..motion.arc_length import ArcLength
 from ..motion.arctangent import arctan2
 from ..motion.path import Path, SplinePath

@@ -57,8 +57,8 @@ def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
 
 
 def folder_to_make(scene: bpy.types.Scene) -> str:
-    """Where the match is kept: the chosen folder, or one beside the file that is saved, or else beside the tracking, named
-    after the stretch and, by a few digits, all else that is asked for."""
+    """Where the match is kept: the chosen folder, or one beside the file that is saved, or else beside the tracking,
+    named after the stretch and, by a few digits, all else that is asked for."""
     match = scene.beyond_mocap_match
     if match.folder:
         return absolute(match.folder)

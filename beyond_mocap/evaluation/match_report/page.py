@@ -131,7 +131,8 @@ def _teams(match: MatchResults, span: tuple[float, float], anchors, everybody: t
         own = [player for player in match.players if player.team == team.name]
         dot = f'<span class=dot style="background:{team.colour}"></span>' if team.colour else ""
         if own:
-            parts.append(f"<h2>{dot}{escape(team.name or 'No team')}</h2>\n{team_table(own, strips, anchors, everybody)}")
+            table = team_table(own, strips, anchors, everybody)
+            parts.append(f"<h2>{dot}{escape(team.name or 'No team')}</h2>\n{table}")
     return [*parts, _legend()] if parts else []
 
 
