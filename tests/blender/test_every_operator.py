@@ -330,7 +330,7 @@ def a_study(places):
     return {"directory": f"{folder}/"}
 
 
-def a_shown_match():
+def a_marked_player():
     """Two seconds of a match in which nobody plays are shown."""
     ours = importlib.import_module(f"{EXTENSION}.scene.match.ours")
     scene = bpy.context.scene
@@ -408,7 +408,7 @@ ROWS = {
     "make_match": Row("imported", prepare=a_match),
     "map_bones": Row("rig", prepare=unmapped),
     "match_camera": Row("imported", lambda places: {"which": "EYES", "player": "home_7"}, a_shown_match),
-    "match_second": Row("imported", lambda places: {"seconds": 1.0, "player": "home_1"}, a_shown_match),
+    "match_second": Row("imported", lambda places: {"seconds": 1.0, "player": "home_1"}, a_marked_player),
     "mirror": Row("accepted"),
     "mirror_side": Row("imported", prepare=pick_a_moment),
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
