@@ -162,6 +162,16 @@ def test_shown_again_it_takes_its_own_place_and_leaves_the_users_things(room, sc
     assert len(bpy.data.armatures) == 0 and len(bpy.data.actions) == 0
 
 
+def test_shown_again_where_its_collections_were_excluded(room, scenery):
+    scene = shown(room, scenery)
+    room("ours").part(scene, "home").objects.link(bpy.data.objects.new("Mine", None))
+    layers = bpy.context.view_layer.layer_collection.children
+    layers["Match"].exclude = True
+    shown(room, scenery)
+    body = room("ours").bodies(scene)[0]
+    assert body.visible_get() and body.animation_data.action_slot is not None
+
+
 def test_the_stands_camera_keeps_the_ball_in_its_picture(room, scenery):
     from bpy_extras.object_utils import world_to_camera_view
 
