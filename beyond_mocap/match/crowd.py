@@ -19,13 +19,21 @@ from ..motion.motion import Motion
 from ..motion.runs import runs
 from ..polish.crowd.capsules import FAR, capsules, lines, touching
 from ..polish.crowd.correction import CURVES, Correction, carried
+from ..polish.crowd.crowd_body import CrowdBody, moved
 from ..polish.crowd.episodes import Episode, joined_spans
-from ..polish.crowd.pushing import ALLOWED, CrowdBody, moved, pushed
+from ..polish.crowd.pushing import ALLOWED, pushed
 
 REACH = 1.5
 """Seconds before and behind an overlap within which something is changed."""
 
-PASSES = 3
+PASSES = 5
+"""Times that it is looked for overlaps at most."""
+
+DONE = 0.015
+"""Metres of overlap from which on bodies are looked at once more after the first pass."""
+
+Span = tuple[int, int, tuple[int, int]]
+"""First frame, end, and the numbers of two bodies."""
 
 
 def kept_apart(
@@ -45,17 +53,25 @@ def kept_apart(
     bodies, start = _on_one_clock(motions, contacts, firsts, firm)
     curves = [np.zeros((len(body.lines), CURVES)) for body in bodies]
     done = [Correction.none(fps)] * len(bodies)
-    for _ in range(PASSES):
+    met: list[Span] = []
+    for turn in range(PASSES):
         placed = [moved(body, own) for body, own in zip(bodies, curves)]
-        found = joined_spans(_touching_spans(bodies, placed, round(REACH * fps)))
-        if not found:
+        deep = _touching_spans(bodies, placed, round(REACH * fps), DONE if turn else ALLOWED)
+        met += deep
+        again = [episode for episode in joined_spans(met) if any(_within(span, episode) for span in deep)]
+        if not again:
             break
-        for episode in found:
+        for episode in again:
             _part(episode, bodies, curves, fps)
         done = [Correction.of(own, start, fps) for own in curves]
         curves = [correction.curves(start, len(body.lines)) for correction, body in zip(done, bodies)]
         bodies = [_as_bent(*each, start) for each in zip(bodies, motions, curves, firsts)]
     return tuple(done)
+
+
+def _within(span: Span, episode: Episode) -> bool:
+    first, end, pair = span
+    return episode.first <= first and end <= episode.end and pair in episode.pairs
 
 
 def overlap_depths(motions: Sequence[Motion], firsts: Sequence[int]) -> list[np.ndarray]:
@@ -99,11 +115,12 @@ def _near_pairs(placed: Sequence[np.ndarray]) -> list[tuple[int, int, np.ndarray
     return found
 
 
-def _touching_spans(bodies, placed, reach: int) -> list[tuple[int, int, tuple[int, int]]]:
-    """(first frame, end, pair) of all times at which two bodies are in each other, with `reach` frames around."""
+def _touching_spans(bodies, placed, reach: int, least: float) -> list[Span]:
+    """(first frame, end, pair) of all times at which two bodies are at least so many metres in each other, with `reach`
+    frames around."""
     spans = []
     for one, other, frames in _near_pairs(placed):
-        found = touching(placed[one][frames], placed[other][frames], (bodies[one].radii, bodies[other].radii), ALLOWED)
+        found = touching(placed[one][frames], placed[other][frames], (bodies[one].radii, bodies[other].radii), least)
         deep = np.zeros(len(placed[one]), bool)
         deep[frames[found.frame]] = True
         low, high = (max(bodies[n].there[0] for n in (one, other)), min(bodies[n].there[1] for n in (one, other)))

@@ -52,10 +52,12 @@ class Failed:
 
 @dataclass(frozen=True, eq=False)
 class Done:
-    """A piece of work that was tried: its result, and the MB that its process has needed at most so far."""
+    """A piece of work that was tried: its result, the MB that its process has needed at most so far, and the seconds of
+    processor time that the piece took."""
 
     result: object
     memory: float = 0.0
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -80,36 +82,37 @@ def check_place(place: Workplace) -> None:
 
 def run(
     tasks: Iterable[Task], work: Work, place: Workplace, cancelled: Callable[[], bool] | None = None,
-    memory: Callable[[float], None] | None = None,
+    spent: Callable[[Done], None] | None = None,
 ) -> Iterator[tuple[object, object]]:
     """(key, result) of every task, as they end, in any order; the result is `Failed` where `work` raises.
 
     tasks: taken one by one, only as far as workers are free for them. work: a function of a module, which other
-    processes can import by its name. memory: is told, with each result, the MB that its process has needed so far.
-    Raises Cancelled soon after `cancelled()` says so, InputError where the cluster
-    does not answer, has no workers, or goes away. Closing the iterator, or an error, ends what is still being done.
+    processes can import by its name. spent: is told of each piece what it took. Raises
+    Cancelled soon after `cancelled()` says so, InputError where the cluster does not answer, has no workers, or goes
+    away. Closing the iterator, or an error, ends what is still being done.
     """
     stop = cancelled or (lambda: False)
     if place.scheduler:
         with _cluster(place.scheduler) as client:
-            yield from _told(_spread(iter(tasks), work, _Cluster(client), stop), memory)
+            yield from _told(_spread(iter(tasks), work, _Cluster(client), stop), spent)
     elif place.workers == 1:
-        yield from _told(_here(tasks, work, stop), memory)
+        yield from _told(_here(tasks, work, stop), spent)
     else:
-        yield from _told(_spread(iter(tasks), work, _Processes(place.workers), stop), memory)
+        yield from _told(_spread(iter(tasks), work, _Processes(place.workers), stop), spent)
 
 
-def _told(done: Iterator[tuple[object, Done]], memory) -> Iterator[tuple[object, object]]:
+def _told(done: Iterator[tuple[object, Done]], spent) -> Iterator[tuple[object, object]]:
     with contextlib.closing(done):
         for key, one in done:
-            if memory is not None:
-                memory(one.memory)
+            if spent is not None:
+                spent(one)
             yield key, one.result
 
 
 def attempt(work: Work, arguments: tuple) -> Done:
     """What `work` gives for `arguments`, or why it gives nothing. Errors are told as text, since not every error comes
     through to another process. Raises Cancelled."""
+    begun = time.process_time()
     try:
         result = work(*arguments)
     except Cancelled:
@@ -118,7 +121,7 @@ def attempt(work: Work, arguments: tuple) -> Done:
         result = Failed(str(error))
     except Exception as error:  # a fault of one piece must not cost the others
         result = Failed(" ".join(f"{type(error).__name__}: {error}".split()))
-    return Done(result, peak_memory())
+    return Done(result, peak_memory(), time.process_time() - begun)
 
 
 def peak_memory() -> float:
@@ -287,7 +290,8 @@ class _Cluster:
 
     def renew(self) -> None:
         """A cluster looks after its workers itself; what it loses, it loses with its scheduler. InputError."""
-        raise InputError("--scheduler", "the scheduler went away", "one that stays", "start it again; what is done is kept")
+        what = "start it and the command again; what is done is kept"
+        raise InputError("--scheduler", "the scheduler went away", "one that stays", what)
 
     def close(self, going: Iterable[Future]) -> None:
         """Takes back what nobody needs any more."""

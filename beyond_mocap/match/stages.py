@@ -63,6 +63,11 @@ class Job:
         return digest_of(FORM, self.source.key, *values)
 
 
+def _spread(job: Job, tasks, work, stage: str) -> Iterator[tuple]:
+    """(key, result) of a stage's tasks (`pool.run`)."""
+    return run(tasks, work, job.place, job.cancelled, job.state.spent(stage))
+
+
 def search(job: Job, parts: Sequence[Part]) -> dict[str, PlayerEdit]:
     """Everybody's edit list, by id, each written as soon as it is there; who fails is told in the state."""
     return _Search(job, parts).done()
@@ -86,7 +91,7 @@ class _Search:
     def done(self) -> dict[str, PlayerEdit]:
         """Searches what is missing."""
         job = self._job
-        for (player, name), result in run(self._missing(), search_unit, job.place, job.cancelled, job.state.needed):
+        for (player, name), result in _spread(job, self._missing(), search_unit, SEARCH):
             if isinstance(result, Failed):
                 self._fail(player, result.reason)
                 continue
@@ -160,7 +165,7 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
             else:
                 yield number, (job.source, cut, start, end)
 
-    for number, result in run(missing(), part_crowd, job.place, job.cancelled, job.state.needed):
+    for number, result in _spread(job, missing(), part_crowd, CROWD):
         if isinstance(result, Failed):
             start, end = windows[number]
             job.state.told["notes"].append(f"{start:g}-{end:g} s: bodies are not kept apart: {result.reason}")
@@ -183,11 +188,10 @@ def _windows(span: tuple[float, float], window: float, fps: float) -> list[tuple
 
 def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
     """Edit lists without what their motion does not depend on."""
-    return tuple(
-        replace(edit, stretches=tuple(
-            replace(stretch, plan=replace(stretch.plan, library=""), warnings=(), short=()) for stretch in edit.stretches
-        )) for edit in edits
-    )  # fmt: skip
+    def bare(stretch):
+        return replace(stretch, plan=replace(stretch.plan, library=""), warnings=(), short=())
+
+    return tuple(replace(edit, stretches=tuple(map(bare, edit.stretches))) for edit in edits)
 
 
 def _whole(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:
@@ -223,7 +227,7 @@ def finish(
             else:
                 yield player, (job.source, order)
 
-    for player, result in run(missing(), finish_player, job.place, job.cancelled, job.state.needed):
+    for player, result in _spread(job, missing(), finish_player, "figures"):
         if isinstance(result, Failed):
             job.state.player(player, status="failed", reason=result.reason)
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from .. import __version__
@@ -11,7 +11,7 @@ from ..files.match_data import Match
 from .folder import MatchFolder
 from .order import MatchOrder
 from .parts import Part
-from .pool import peak_memory
+from .pool import Done, peak_memory
 
 EVERY = 1.0
 """Seconds between two writings of a state in which only the number of done windows has changed."""
@@ -26,6 +26,7 @@ class MatchState:
     players: dict[str, dict] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     worker_memory: float = 0.0
+    worker_seconds: dict[str, float] = field(default_factory=dict)
     _written: float = 0.0
 
     def player(self, player: str, **news) -> None:
@@ -48,13 +49,19 @@ class MatchState:
         """Writes match.json."""
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
         memory = {"main": round(peak_memory(), 1), "worker": round(self.worker_memory, 1)}
-        told = {**self.told, "players": rows, "seconds": self.seconds, "peak_memory_mb": memory}
+        spent = {stage: round(seconds, 3) for stage, seconds in self.worker_seconds.items()}
+        told = {**self.told, "players": rows, "seconds": self.seconds, "worker_cpu_s": spent, "peak_memory_mb": memory}
         self.folder.tell(told)
         self._written = time.monotonic()
 
-    def needed(self, memory: float) -> None:
-        """A worker has needed so many MB."""
-        self.worker_memory = max(self.worker_memory, memory)
+    def spent(self, stage: str) -> Callable[[Done], None]:
+        """What is to be told of the pieces of a stage."""
+
+        def told(done: Done) -> None:
+            self.worker_memory = max(self.worker_memory, done.memory)
+            self.worker_seconds[stage] = self.worker_seconds.get(stage, 0.0) + done.seconds
+
+        return told
 
     def took(self, stage: str, begun: float) -> None:
         """A stage that began at `begun` (time.perf_counter) is done."""

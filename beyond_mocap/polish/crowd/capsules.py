@@ -30,7 +30,7 @@ RADII = {
 """Metres at a stature of 1.80 m."""
 
 FAR = 2.5
-"""Metres between the middles of two bodies' first capsules, the hips, from which on they cannot touch."""
+"""Metres between the middles of two bodies' hips from which on they cannot touch."""
 
 _TALL = 1.80
 
@@ -107,8 +107,8 @@ def lines_of(parts: tuple[Capsule, ...], places: np.ndarray) -> np.ndarray:
 @dataclass(frozen=True, eq=False)
 class Touching:
     """Pairs of capsules (K,) that are in each other or nearly so: frame (K,); one, other (K,) numbers of the capsules;
-    depth (K,) m; radii (K,) m, the sum of both; away (K, 3) unit vector from the other to the one; at_one, at_other (K,)
-    share of the way along either line where they are nearest."""
+    depth (K,) m; radii (K,) m, the sum of both; away (K, 3) unit vector from the other to the one; at_one, at_other
+    (K,) share of the way along either line where they are nearest."""
 
     frame: np.ndarray
     one: np.ndarray
@@ -139,7 +139,7 @@ def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, np.nda
 
 
 def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """(T, C, D) bool: whether the balls around two lines, widened so that together they reach (C, D) m further, meet."""
+    """(T, C, D) bool: whether the balls around two lines meet that together reach (C, D) m further."""
     (a, half_a), (b, half_b) = (
         (0.5 * (ends[:, :, 0] + ends[:, :, 1]), 0.5 * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2))
         for ends in (one, other)

@@ -45,7 +45,8 @@ class Correction:
     def __post_init__(self):
         knots, values = frozen_array(self.knots, np.int64), frozen_array(self.values, np.int16)
         if knots.ndim != 1 or values.shape != (len(knots), CURVES) or np.any(np.diff(knots) < self.step):
-            raise InputError("correction", f"knots {knots.shape}, values {values.shape}", f"(N,) rising and (N, {CURVES})")
+            found = f"knots {knots.shape}, values {values.shape}"
+            raise InputError("correction", found, f"(N,) rising and (N, {CURVES})")
         if not (self.step >= 1 and self.fps > 0.0):
             raise InputError("correction", f"{self.step} frames at {self.fps:g} per second", "1 or more, above 0")
         object.__setattr__(self, "knots", knots)

@@ -41,8 +41,9 @@ def leg_moved(
     swing = quaternion.between(thigh + quaternion.rotate(bend, shin), goal)
     lower = quaternion.multiply(bend, world[:, limb.lower_leg])
     carried = quaternion.multiply(swing, quaternion.multiply(bend, world[:, skeleton.parents[limb.foot]]))
+    upper = quaternion.multiply(swing, world[:, limb.upper_leg])
     return {
-        limb.upper_leg: in_parent(skeleton, world, limb.upper_leg, quaternion.multiply(swing, world[:, limb.upper_leg])),
+        limb.upper_leg: in_parent(skeleton, world, limb.upper_leg, upper),
         limb.lower_leg: in_parent(skeleton, world, limb.lower_leg, lower),
         limb.foot: quaternion.multiply(quaternion.inverse(carried), world[:, limb.foot]),
     }

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...motion import quaternion
+from ...motion.arctangent import arctan2
 from ...motion.runs import runs
 from ...motion.track import zero_phase_hann
 from .banded_squares import BandedSquares
@@ -28,7 +28,7 @@ REACH = 2.5
 STEADY = 30.0
 """How much firmer who touches the ball keeps his way."""
 
-_TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # seconds over which directions are smoothed in the first rounds
+_TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s over which directions are smoothed at first
 _ROUNDS, _STEP = 24, 0.5
 _HELD = 1e6
 
@@ -94,7 +94,9 @@ def _calm(firm: np.ndarray, fps: float) -> BandedSquares:
     return squares
 
 
-def _lacking(places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], distance: float, seconds: float, fps: float):
+def _lacking(
+    places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], distance: float, seconds: float, fps: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The rows of one pair for `BandedSquares.add`: where it is too near, which way and how far it has to part; the
     directions smoothed over `seconds`."""
     one, other = pair
@@ -104,7 +106,7 @@ def _lacking(places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], dist
     directions, needs = np.zeros(off.shape), np.zeros(len(off))
     for low, high in runs(near):
         part = off[low:high]
-        angle = np.unwrap(quaternion.angle_of(part[:, 1], part[:, 0]))
+        angle = np.unwrap(arctan2(part[:, 1], part[:, 0]))
         if seconds and high - low > 2:
             angle = zero_phase_hann(angle[:, None], fps, seconds)[:, 0]
         way = np.stack([np.cos(angle), np.sin(angle)], axis=1)

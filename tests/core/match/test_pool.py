@@ -59,10 +59,10 @@ def test_cancelling_does_not_wait_for_the_work(chores):
     assert time.monotonic() - begun < 10.0
 
 
-def test_the_memory_of_workers_is_told(chores):
+def test_what_pieces_took_is_told(chores):
     told = []
-    list(run(numbers(3), chores.square, Workplace(2), memory=told.append))
-    assert len(told) == 3 and all(5.0 < value < 1000.0 for value in told)
+    list(run(numbers(3), chores.square, Workplace(2), spent=told.append))
+    assert len(told) == 3 and all(5.0 < one.memory < 1000.0 and 0.0 <= one.seconds < 5.0 for one in told)
 
 
 def test_fewer_than_one_worker_is_told():

@@ -54,7 +54,8 @@ def test_touching_tells_how_deep_and_which_way():
     other[1] += [0.2, 0.0, 0.0]
     found = touching(one, other, (np.array([0.2]), np.array([0.1])))
     assert found.frame.tolist() == [0] and found.depth[0] == pytest.approx(0.05)
-    assert found.away[0] == pytest.approx([-1, 0, 0]) and (found.at_one[0], found.at_other[0]) == pytest.approx((0.5, 0))
+    assert found.away[0] == pytest.approx([-1, 0, 0])
+    assert (found.at_one[0], found.at_other[0]) == pytest.approx((0.5, 0))
 
 
 def test_overlap_of_bodies_side_by_side(walk):
@@ -184,7 +185,8 @@ def test_windows_join_to_what_one_would_have_given(curves):
 
 
 @pytest.mark.parametrize("knots, values, what", [
-    ([3, 0], np.zeros((2, CURVES)), "rising"), ([0, 3], np.zeros((2, 5)), "values"), ([0], np.zeros((2, CURVES)), "knots"),
+    ([3, 0], np.zeros((2, CURVES)), "rising"), ([0, 3], np.zeros((2, 5)), "values"),
+    ([0], np.zeros((2, CURVES)), "knots"),
 ])
 def test_arrays_that_are_no_correction_are_told(knots, values, what):
     with pytest.raises(InputError, match=what):
@@ -198,7 +200,8 @@ def test_rates_have_to_agree(walk):
 
 def test_heads_follow_the_ball_each_in_its_own_way(walk):
     head = identify(walk.skeleton).head
-    ball = np.column_stack([np.full(len(walk), 3.0), 8.0 * np.sin(np.arange(len(walk)) / 20.0), np.full(len(walk), 0.1)])
+    at = np.arange(len(walk)) / 20.0
+    ball = np.column_stack([3.0 + 0.0 * at, 8.0 * np.sin(at), 0.1 + 0.0 * at])
     known, look = np.ones(len(walk), bool), np.array([1.0, 0.0, 0.0])
     seen = [looking(walk, ball, known, look, seed, start=100.0) for seed in (1, 2, 1)]
     assert np.array_equal(seen[0].rotations, seen[2].rotations)
