@@ -114,7 +114,8 @@ def test_what_is_made_is_shown_where_the_ball_is(place, made):
         if who in ("home_4", "home_7") and match.start < float(time) < match.end:
             frame = match.shown_first + (float(time) - match.shown_start) * 30.0
             scene.frame_set(int(frame), subframe=frame % 1.0)
-            assert np.linalg.norm(ball.matrix_world.translation - _vector(x, y, z)) < 0.5, time  # the ball meets his foot
+            away = (ball.matrix_world.translation - _vector(x, y, z)).length
+            assert away < 0.5, time  # it is led to where his foot is
             body = next(thing for thing in bodies if thing[room("ours").PLAYER] == who)
             hips = body.matrix_world @ body.pose.bones[0].head
             assert (hips.xy - _vector(x, y, z).xy).length < 1.0, time
