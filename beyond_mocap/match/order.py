@@ -52,7 +52,7 @@ class MatchOrder:
     figures: bool = True
     window: float = 60.0
     overlap: float = 4.0
-    variety: float = 0.4
+    variety: float = 0.6
     workers: int = 1
     scheduler: str = ""
 

@@ -397,6 +397,7 @@ ROWS = {
     "make_match": Row("imported", prepare=a_match),
     "map_bones": Row("rig", prepare=unmapped),
     "match_camera": Row("imported", lambda places: {"which": "EYES", "player": "home_7"}, a_shown_match),
+    "match_second": Row("imported", lambda places: {"seconds": 3.0, "player": "home_7"}, a_shown_match),
     "mirror": Row("accepted"),
     "mirror_side": Row("imported", prepare=pick_a_moment),
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
