@@ -33,6 +33,8 @@ from .parts import parts_of
 from .pool import Workplace, check_place, ended
 from .roles import pushed_apart, roles_of, span_of
 from .state import MatchState, begun, row_of
+from .thumbnails import thumbnails
+from .thumbnails import thumbnails
 from .words import MatchWords, words_of
 from .workplace_library import LibrarySource, hold
 
@@ -202,7 +204,8 @@ def _close(job: stages.Job, crowd) -> None:
     if job.order.figures:
         from ..evaluation.match_report import page
 
-        atomic_write(job.folder.path / "report.html", page(job.folder.path))
+        path = job.folder.path
+        atomic_write(path / "report.html", page(path, thumbnails(job.library, path)))
 
 
 def _result(state: MatchState, span: tuple[float, float]) -> MatchResult:

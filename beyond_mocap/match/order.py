@@ -53,7 +53,7 @@ class MatchOrder:
     figures: bool = True
     window: float = WINDOW
     overlap: float = OVERLAP
-    variety: float = 0.4
+    variety: float = 0.6
     workers: int = 1
     scheduler: str = ""
 

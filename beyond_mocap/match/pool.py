@@ -201,6 +201,9 @@ def _result(future: Future) -> Done:
 class _Processes:
     """Processes of this machine."""
 
+    started: Executor | None = None
+    """The processes that this program has started last, and that may wait for work."""
+
     def __init__(self, workers: int):
         self._workers = workers
         self._executor: Executor | None = None
@@ -218,6 +221,7 @@ class _Processes:
                 self._workers, timeout=_IDLE, reuse=True, initializer=_follow, initargs=(os.getpid(),),
                 env={name: "1" for name in _THREADS},
             )  # fmt: skip
+            _Processes.started = self._executor
         return self._executor
 
     def check(self, moved: bool) -> None:
@@ -256,10 +260,9 @@ def _end_after(parent: int) -> None:
 
 def ended() -> None:
     """Ends the local processes that wait for more work."""
-    from joblib.externals.loky import reusable_executor
-
-    if reusable_executor._executor is not None:
-        reusable_executor._executor.shutdown(wait=True, kill_workers=True)
+    executor, _Processes.started = _Processes.started, None
+    if executor is not None:
+        executor.shutdown(wait=True, kill_workers=True)
 
 
 class _Cluster:

@@ -19,7 +19,7 @@ from ..library.library import Library
 from ..polish.crowd.correction import joined
 from ..take import BallPath
 from .content_digest import digest_of
-from .crowd_window import BEYOND, REACH, CrowdPart, cut_edit, in_turn
+from .crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn
 from .folder import MatchFolder
 from .kept_crowd import keep_parts, kept_parts
 from .kept_pieces import keep_piece, kept_piece
@@ -150,9 +150,9 @@ def _bare(plan):
 
 
 def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str, CrowdPart]:
-    """What the whole span says of each player, by id: windows of everybody on the grid of the search."""
+    """What the whole span says of each player, by id: windows of everybody on the match's clock."""
     players, names = list(edits), {}
-    windows = _windows(span, job.order.window, job.order.fps)
+    windows = _windows(span, min(job.order.window, LONGEST), job.order.fps)
     found: dict[int, tuple[CrowdPart, ...]] = {}
 
     def missing():
@@ -187,9 +187,9 @@ def _windows(span: tuple[float, float], window: float, fps: float) -> list[tuple
 
 
 def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
-    """Edit lists without what their motion does not depend on."""
+    """Edit lists without the library's place, on which their motion does not depend."""
     def bare(stretch):
-        return replace(stretch, plan=replace(stretch.plan, library=""), warnings=(), short=())
+        return replace(stretch, plan=replace(stretch.plan, library=""))
 
     return tuple(replace(edit, stretches=tuple(map(bare, edit.stretches))) for edit in edits)
 
@@ -221,7 +221,7 @@ def finish(
             write_player(job.folder.of(part.file, "take.npz"), edit)
             order = Finish(edit, part.role.measured, ball, crowd[player].frames, crowd[player].depth,
                            job.order.figures, job.order.bvh)  # fmt: skip
-            names[player] = job.named(replace(order, edit=_unnamed([edit])[0]), tuple(edit.stretches[0].warnings))
+            names[player] = job.named(replace(order, edit=_unnamed([edit])[0]))
             if _is_finished(job, part, names[player]):
                 done += 1
             else:
@@ -258,7 +258,8 @@ def _write(job: Job, part: Part, made, name: str) -> dict[str, str]:
     if made.report is not None:
         path, player = job.folder.of(part.file, "report.json"), part.role.player
         who = {"id": player.id, "team": player.team, "number": player.number, "name": player.name}
-        whole = {**made.report, **who, "warnings": [*made.report["warnings"], *part.role.notes]}
+        took = {**made.report["seconds"], "search": job.state.players[player.id]["search_s"]}
+        whole = {**made.report, **who, "seconds": took, "warnings": [*made.report["warnings"], *part.role.notes]}
         atomic_write(path, json.dumps(plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
         told["report"] = path.name
     return told

@@ -16,13 +16,16 @@ PHASE = 0.15
 APART = 0.3
 """Seconds between the lags of two players who come near each other."""
 
+BESIDE = 0.3
+"""How much somebody near who has the next lag counts against one who has the same."""
+
 
 def lags(positions: np.ndarray) -> np.ndarray:
     """(P,) s: the lag that each player is to like (`Plan.lag`), so that those who are much near each other have others.
 
     positions (P, N, 2) m at evenly spaced times, NaN where somebody is not there; a sample or a few a second will do.
-    There are PERIOD / APART lags. Whoever is near others most chooses first, and each takes the lag of those near whom
-    he is least.
+    There are PERIOD / APART lags. Whoever is near others most chooses first, and each takes the lag which, with those
+    beside it, those have near whom he is least.
     """
     count = round(PERIOD / APART)
     near = np.zeros((len(positions), len(positions)))
@@ -31,8 +34,8 @@ def lags(positions: np.ndarray) -> np.ndarray:
     np.fill_diagonal(near, 0.0)
     chosen = np.full(len(positions), -1)
     for one in np.argsort(-near.sum(axis=1), kind="stable"):
-        beside = [near[one, chosen == number].sum() for number in range(count)]
-        chosen[one] = int(np.argmin(beside))
+        taken = np.array([near[one, chosen == number].sum() for number in range(count)])
+        chosen[one] = int(np.argmin(taken + BESIDE * (np.roll(taken, 1) + np.roll(taken, -1))))
     return chosen * APART
 
 

@@ -17,7 +17,7 @@ from ..library.library import Library
 PERIOD = 3.6
 """Seconds from one liked lag to the next."""
 
-LIKED, DISLIKED = 0.15, 0.6
+LIKED, DISLIKED = 0.05, 0.45
 """Seconds from a liked lag within which all is well, and from which on it is as bad as it gets."""
 
 

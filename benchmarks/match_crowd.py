@@ -1,0 +1,100 @@
+"""Everybody of a made match together: who is in whom, what keeping them apart costs, and who is in step with whom.
+
+    python -m benchmarks.match_crowd FOLDER LIBRARY [--from S --to S]
+
+FOLDER is what the verb `match` has made, LIBRARY what it was made from. Overlaps, skate and jerk are told without and
+with the corrections that the folder has; the share in step is that of the time of all players.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from beyond_mocap.evaluation.feet import contact_speeds, foot_joints
+from beyond_mocap.evaluation.jerk import jerk
+from beyond_mocap.files.take_npz import read_player
+from beyond_mocap.library.library import Library, build
+from beyond_mocap.match.crowd import kept_apart, overlap_depths
+from beyond_mocap.match.expand import expanded
+from beyond_mocap.match.folder import read_state
+from beyond_mocap.match.variety import share_in_step
+from beyond_mocap.motion.motion import Motion, forward_kinematics
+from beyond_mocap.polish.crowd.correction import ARMS, ROOT, Correction, applied
+from beyond_mocap.take import Take
+
+
+def step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:
+    """Share of the time of all players in which they are in step with a neighbour."""
+    start, fps = min(firsts), takes[0].motion.fps
+    count = max(first + len(take.motion) for first, take in zip(firsts, takes)) - start
+    rates = {clip.path: clip.motion.fps for clip in library.extended.clips}
+    names: dict[tuple[str, bool], int] = {}
+    shown, seconds = np.full((len(takes), count), -1), np.zeros((len(takes), count))
+    places = np.zeros((len(takes), count, 2))
+    for row, (take, first) in enumerate(zip(takes, firsts)):
+        here = slice(first - start, first - start + len(take.motion))
+        what = [(take.clips[clip], bool(mirrored)) for clip, mirrored in zip(take.clip, take.mirrored)]
+        shown[row, here] = [names.setdefault(each, len(names)) for each in what]
+        seconds[row, here] = take.clip_frame / np.array([rates.get(path, fps) for path, _ in what])
+        places[row, here] = take.motion.root_positions[:, :2]
+    return share_in_step(shown, seconds, places)
+
+
+def figures(motions: list[Motion], contacts: list[np.ndarray], firsts: list[int]) -> str:
+    """One line on overlaps, skate and jerk."""
+    depth, fps = np.concatenate(overlap_depths(motions, firsts)), motions[0].fps
+    joints = [forward_kinematics(motion)[0] for motion in motions]
+    skate = np.concatenate([
+        contact_speeds(places[:, foot_joints(motion.skeleton)], stands, fps).ravel()
+        for motion, places, stands in zip(motions, joints, contacts)
+    ])
+    hard = np.concatenate([jerk(places, fps) for places in joints])
+    return (
+        f"deepest {100 * depth.max():.1f} cm, {np.sum(depth > 0.02) / fps:.1f} player seconds deeper than 2 cm of "
+        f"{len(depth) / fps:.0f}; skate {100 * np.nanmean(skate):.2f} cm/s; jerk p95 {np.percentile(hard, 95):.0f}, "
+        f"max {hard.max():.0f} m/s^3"
+    )
+
+
+def what_is_changed(corrections: list[Correction], takes: list[Take], firsts: list[int]) -> str:
+    """One line on how far roots and arms are moved, and how often."""
+    curves = np.concatenate([own.curves(at, len(take.motion)) for own, take, at in zip(corrections, takes, firsts)])
+    root, arms = np.linalg.norm(curves[:, ROOT], axis=1), np.linalg.norm(curves[:, ARMS].reshape(-1, 2, 3), axis=2)
+    knots = sum(len(own.knots) for own in corrections)
+    return (
+        f"changed {100 * curves.any(axis=1).mean():.1f}% of the time: roots by {100 * root.max():.1f} cm at most, arms by "
+        f"{np.degrees(arms.max()):.0f} degrees; {knots} knots, {knots * 32 / 1024:.0f} KiB"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("library")
+    parser.add_argument("--from", dest="start", type=float)
+    parser.add_argument("--to", dest="end", type=float)
+    asked = parser.parse_args()
+    state, library = read_state(asked.folder), build(asked.library)
+    start = state["from_s"] if asked.start is None else asked.start
+    end = state["to_s"] if asked.end is None else asked.end
+    edits = [read_player(path) for path in sorted(asked.folder.glob("*.take.npz"))]
+    pairs = [(take, edit) for edit in edits for take in expanded(library, edit, start, end)]
+    takes, fps = [take for take, _ in pairs], pairs[0][0].motion.fps
+    firsts, contacts = [round(take.start_time * fps) for take in takes], [take.contacts for take in takes]
+    motions = [take.motion for take in takes]
+    kept = [edit.correction or Correction.none(fps) for _, edit in pairs]
+    print(f"{len(takes)} takes, {start:g} to {end:g} s; in step {100 * step_share(library, takes, firsts):.2f}%")
+    print(f"without corrections: {figures(motions, contacts, firsts)}")
+    print(f"with the folder's:   {figures([applied(*each) for each in zip(motions, kept, firsts)], contacts, firsts)}")
+    print(what_is_changed(kept, takes, firsts))
+    begun = time.process_time()
+    kept_apart(motions, contacts, firsts, fps)
+    print(f"kept apart anew in {time.process_time() - begun:.1f} s of processor time")
+
+
+if __name__ == "__main__":
+    main()
