@@ -14,8 +14,8 @@ from .verb import Verb
 
 class BEYOND_MOCAP_OT_propose_words(Verb, bpy.types.Operator):
     """Propose words for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
-headers, turns, getting up; and all that was learned from annotated clips. Look through them; what neither knows is yours
-to add"""
+headers, turns, getting up; and all that was learned from annotated clips. Look through them; what neither knows is
+yours to add"""
 
     bl_idname = "beyond_mocap.propose_words"
     bl_label = "Propose Words"

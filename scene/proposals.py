@@ -1,7 +1,8 @@
 """Words that were proposed for a clip, on the armature that shows it: looked through one by one, accepted or refused.
 
 Each is listed with how sure it is and why. One that is accepted becomes an ordinary strip or key moment, which can be
-changed like any; the list remembers who said it, so that it is written with the words as long as nobody has changed them.
+changed like any; the list remembers who said it, so that it is written with the words as long as nobody has changed
+them.
 """
 
 from __future__ import annotations
@@ -67,7 +68,9 @@ def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OP
     group.active = 0
 
 
-def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str, why: str = "") -> None:
+def add(
+    target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str, why: str = ""
+) -> None:
     """List one more."""
     one = target.beyond_mocap_proposals.listed.add()
     one.name, one.source, one.why = " ".join(row.words), source, why
