@@ -237,7 +237,7 @@ def check_words_are_judged_by_keys():
     yield from drawn()
     window.picture(PICTURES / "library-proposals.png")
     view = window.area("VIEW_3D")
-    yield from window.arrive(view.x + view.width // 3, view.y + view.height // 2)
+    yield from window.move(view.x + view.width // 3, view.y + view.height // 2)
     run("beyond_mocap.review_proposals")
     yield 0.5
     for index in range(len(group.listed)):
