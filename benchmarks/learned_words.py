@@ -2,10 +2,10 @@
 
     python -m benchmarks.learned_words [--seeds 3]
 
-A moment counts as found within 0.1 s of the labelled key frame, and is proposed from a confidence of 0.5 on. "rules" are
-those of `library.proposals` alone, "learned" the classifier that hears nothing of them, "both" what users get. Ten clips
-are drawn by seed from one player's (or five and five from two players'), kicks and others as they come; all figures are
-of players that were kept back.
+A moment counts as found within 0.1 s of the labelled key frame, and is proposed from a confidence of 0.5 on. "rules"
+are those of `library.proposals` alone, "learned" the classifier that hears nothing of them, "both" what users get. Ten
+clips are drawn by seed from one player's (or five and five from two players'), kicks and others as they come; all
+figures are of players that were kept back.
 """
 
 from __future__ import annotations
@@ -126,7 +126,8 @@ def kicks(clips: Clips, seeds: int) -> None:
         for players, number in sets:
             for seed in range(seeds) if len(players) == size else ():
                 taught = drawn(clips, [f"lmd/{p}/" for p in players], number, seed)
-                kept = [n for n in clips if n.startswith("lmd/") and not n.startswith(tuple(f"lmd/{p}/" for p in players))]
+                own = tuple(f"lmd/{p}/" for p in players)
+                kept = [n for n in clips if n.startswith("lmd/") and not n.startswith(own)]
                 for way, proposer in proposers(clips, taught).items():
                     found.setdefault(way, []).append(count(clips, kept, "kick", proposer))
                     others = count(clips, [n for n in clips if n.startswith(WITHOUT_KICKS)], "kick", proposer)

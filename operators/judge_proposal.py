@@ -43,7 +43,8 @@ class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
 
     what: EnumProperty(name="What", items=WHAT, default="ACCEPT", description="What becomes of it")
     index: IntProperty(
-        name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"}, description="Its place in the list; -1: the chosen one"
+        name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
+        description="Its place in the list; -1: the chosen one",
     )
 
     @classmethod

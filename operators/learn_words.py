@@ -25,8 +25,8 @@ class Order:
 
 
 class BEYOND_MOCAP_OT_learn_words(BackgroundVerb, bpy.types.Operator):
-    """Learn from the library's clips that have words, ten are enough to begin with, so that Propose Words finds the same
-acts in others. What is learned is kept in a file, which serves any library"""
+    """Learn from the library's clips that have words, ten are enough to begin with, so that Propose Words finds the
+same acts in others. What is learned is kept in a file, which serves any library"""
 
     bl_idname = "beyond_mocap.learn_words"
     bl_label = "Learn from Words"

@@ -14,8 +14,8 @@ from .verb import Verb
 
 class BEYOND_MOCAP_OT_propose_words(Verb, bpy.types.Operator):
     """Propose words for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
-headers, turns, getting up; and all that was learned from annotated clips. Look through them; what neither knows is yours
-to add"""
+headers, turns, getting up; and all that was learned from annotated clips. Look through them; what neither knows is
+yours to add"""
 
     bl_idname = "beyond_mocap.propose_words"
     bl_label = "Propose Words"
@@ -65,7 +65,7 @@ to add"""
         if before is not None:
             told = Timeline((*before.spans, *told.spans), (*before.keys, *told.keys))
         clip_annotation.lay(rig, context.scene, motion, told)
-        proposals.keep(rig, found, "ACCEPTED")
+        proposals.keep(rig, found, "ACCEPTED", beside=not self.replace)
         for one in found:
             row = one.annotation
             if row.key is not None or one.confidence < 0.6:
@@ -76,12 +76,11 @@ to add"""
 
     def list_them(self, rig, scene, motion, found):
         """List what is not among the clip's words already."""
-        said = set(lanes.read(rig).keys) if lanes.has(rig) else set()
-        if not lanes.has(rig):
-            from ..beyond_mocap.annotation import Timeline
+        from ..beyond_mocap.annotation import Timeline
 
+        if not lanes.has(rig):
             clip_annotation.lay(rig, scene, motion, Timeline())
-        taken = {(round(key.time * motion.fps), key.words) for key in said}
-        new = [one for one in found if (one.annotation.key, one.annotation.words) not in taken]
+        said = lanes.read(rig)
+        new = [one for one in found if not proposals.said_already(said, one.annotation, motion.fps)]
         proposals.keep(rig, new)
         self.report({"INFO"}, f"{rig.name}: {len(new)} proposals to look through")

@@ -40,8 +40,8 @@ The classes are registered in the order of CLASSES: what others point to comes f
 import bpy
 
 from . import (
-    background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, proposals, result, rig,
-    session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
+    background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, proposals,
+    result, rig, session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
 from .aimed import live as aimed_live
 from .aimed import settings as aimed

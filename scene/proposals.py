@@ -1,7 +1,8 @@
 """Words that were proposed for a clip, on the armature that shows it: looked through one by one, accepted or refused.
 
 Each is listed with how sure it is and why. One that is accepted becomes an ordinary strip or key moment, which can be
-changed like any; the list remembers who said it, so that it is written with the words as long as nobody has changed them.
+changed like any; the list remembers who said it, so that it is written with the words as long as nobody has changed
+them.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.annotation import ClipAnnotation
+from ..beyond_mocap.annotation import ClipAnnotation, Timeline
 from ..beyond_mocap.errors import InputError
 from . import lanes, lay_strips
 from .clip_annotation import RATE
@@ -20,6 +21,9 @@ from .clip_annotation import RATE
 if TYPE_CHECKING:
     from ..beyond_mocap.library.proposals import Proposal
     from ..beyond_mocap.library.word_sources import Sources
+
+SAME = 0.1
+"""Seconds within which two key moments are the same one."""
 
 STATES = (
     ("OPEN", "Open", "Nobody has looked at it yet"),
@@ -58,21 +62,37 @@ class BeyondMocapProposals(bpy.types.PropertyGroup):
 CLASSES = (BeyondMocapProposal, BeyondMocapProposals)
 
 
-def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN") -> None:
-    """List proposals in place of those before; the first one is chosen."""
+def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN", beside: bool = True) -> None:
+    """List proposals in place of those before, the first one chosen. beside: those that were accepted stay listed, since
+    their strips do."""
     group = target.beyond_mocap_proposals
-    group.listed.clear()
+    for index in reversed(range(len(group.listed))):
+        if not beside or group.listed[index].state != "ACCEPTED":
+            group.listed.remove(index)
+    first = len(group.listed)
     for one in found:
         add(target, one.annotation, one.source, one.confidence, state, one.why)
-    group.active = 0
+    group.active = first if first < len(group.listed) else 0
 
 
-def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str, why: str = "") -> None:
+def add(
+    target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str, why: str = ""
+) -> None:
     """List one more."""
     one = target.beyond_mocap_proposals.listed.add()
     one.name, one.source, one.why = " ".join(row.words), source, why
     one.start, one.end, one.key = int(row.start), int(row.end), -1 if row.key is None else int(row.key)
     one.confidence, one.state = confidence, state
+
+
+def said_already(told: Timeline, row: ClipAnnotation, fps: float) -> bool:
+    """Whether a timeline has a key moment of the same first word within SAME seconds of a row's key, or a span of the
+    same words over half of a row that has none."""
+    if row.key is not None:
+        return any(key.words[:1] == row.words[:1] and abs(key.time - row.key / fps) <= SAME for key in told.keys)
+    start, end = row.start / fps, row.end / fps
+    same = (span for span in told.spans if span.words == row.words)
+    return any(min(span.end, end) - max(span.start, start) >= 0.5 * (end - start) for span in same)
 
 
 def chosen(target: bpy.types.Object) -> BeyondMocapProposal | None:

@@ -155,7 +155,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     words_model: StringProperty(
         name="Learned Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="What Learn from Words has kept, of this library or another one; empty: Propose Words goes by rules",
+        description="What Learn from Words has kept, of this library or another; empty: Propose Words goes by rules",
     )
     library_watch: BoolProperty(
         name="Watch Folder", default=False,

@@ -129,7 +129,8 @@ def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float, s
     first = next((number for number, row in enumerate(old) if row["file"].strip() == name), len(old))
     kept = [row for row in old if row["file"].strip() != name]
     new = [{"file": name, "fps": f"{fps:g}", "start_frame": row.start, "end_frame": row.end,
-            "key_frame": "" if row.key is None else row.key, "labels": " ".join(row.words), **cells(row, sources)} for row in rows]
+            "key_frame": "" if row.key is None else row.key, "labels": " ".join(row.words),
+            **cells(row, sources)} for row in rows]
     before = len([row for row in old[:first] if row["file"].strip() != name])
     writer.writerows([*kept[:before], *new, *kept[before:]])
     return out.getvalue()

@@ -6,8 +6,8 @@ speed, the side the faster foot's), a body that falls freely for longer than a r
 head that strikes forward in the air (a header), a body that turns on the spot, one that gets up from the ground. There is
 no ball in a recording, so what only a ball shows (dribbling, receiving) is not proposed.
 
-`propose` is all that others call. With a classifier that has learned from annotated clips (`library.classify`) the rules
-are what it starts from: it weighs them with what it has seen, and they stay for all acts that it does not know.
+`propose` is all that others call. With a classifier that has learned from annotated clips (`library.classify`) the
+rules are what it starts from: it weighs them with what it has seen, and they stay for all acts that it does not know.
 """
 
 from __future__ import annotations

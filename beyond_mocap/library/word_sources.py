@@ -1,7 +1,7 @@
 """Who said a clip's words, where it was not a person: each automatic row's source and how sure it was.
 
-In a text it stands behind a line as a comment, `156f kick right low  # learned 0.93`, in a table in the columns `source`
-and `confidence`, where it has them. Nothing else reads it; a row that a person has changed has none.
+In a text it stands behind a line as a comment, `156f kick right low  # learned 0.93`, in a table in the columns
+`source` and `confidence`, where it has them. Nothing else reads it; a row that a person has changed has none.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from pathlib import Path
 from ..annotation import ClipAnnotation, clip_annotations, parse_timeline
 from ..annotation.text import read_text
 
+Found = dict[ClipAnnotation, tuple[str, float]]
 Sources = Mapping[ClipAnnotation, tuple[str, float]]
 """A row -> what proposed it, and its confidence from 0 to 1."""
 
 _COMMENT = re.compile(r"#\s*([A-Za-z_]+)\s+([01](?:\.\d+)?)\s*$")
 COLUMNS = ("source", "confidence")
+_ROW = ("start_frame", "end_frame", "key_frame", "labels")
 
 
 def comment(row: ClipAnnotation, sources: Sources) -> str:
@@ -34,7 +36,7 @@ def cells(row: ClipAnnotation, sources: Sources) -> dict[str, str]:
     return {"source": source, "confidence": f"{confidence:.2f}" if source else ""}
 
 
-def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> dict[ClipAnnotation, tuple[str, float]]:
+def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Found:
     """The sources of rows that were read from a text file; of a row with two lines the key moment's counts.
 
     fps: the clip's rate. InputError where the file cannot be read.
@@ -52,15 +54,13 @@ def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) ->
     return out
 
 
-def sources_in_table(path: Path, name: str, rows: tuple[ClipAnnotation, ...]) -> dict[ClipAnnotation, tuple[str, float]]:
+def sources_in_table(path: Path, name: str, rows: tuple[ClipAnnotation, ...]) -> Found:
     """The sources of a clip's rows in a table that has the columns; `name` as its column `file` spells it."""
+    spelled = {(str(row.start), str(row.end), "" if row.key is None else str(row.key), " ".join(row.words)): row
+               for row in rows}
     out = {}
     for line in csv.DictReader(io.StringIO(read_text(path), newline="")):
-        source, sure = (line.get("source") or "").strip(), (line.get("confidence") or "").strip()
-        if (line.get("file") or "").strip() == name and source and re.fullmatch(r"[01](\.\d+)?", sure):
-            for row in rows:
-                key = "" if row.key is None else str(row.key)
-                there = (str(row.start), str(row.end), key, " ".join(row.words))
-                if there == tuple((line.get(c) or "").strip() for c in ("start_frame", "end_frame", "key_frame", "labels")):
-                    out[row] = (source, min(1.0, float(sure)))
+        file, source, sure, *there = ((line.get(column) or "").strip() for column in ("file", *COLUMNS, *_ROW))
+        if file == name and source and re.fullmatch(r"[01](\.\d+)?", sure) and tuple(there) in spelled:
+            out[spelled[tuple(there)]] = (source, min(1.0, float(sure)))
     return out

@@ -139,3 +139,12 @@ def test_what_cannot_be_done_is_told(library, listed):
         (library / f"{name}.txt").unlink()
     with pytest.raises(RuntimeError, match="no clip with words"):
         bpy.ops.beyond_mocap.learn_words()
+
+
+def test_what_is_said_already_is_not_proposed_again(rooms, library):
+    bpy.ops.beyond_mocap.annotate_clip(path="new.bvh")
+    bpy.ops.beyond_mocap.propose_words()
+    before = rooms["proposals"].sources(bpy.context.object)
+    bpy.ops.beyond_mocap.propose_words(review=True)
+    assert {one.state for one in bpy.context.object.beyond_mocap_proposals.listed} == {"ACCEPTED"}
+    assert rooms["proposals"].sources(bpy.context.object) == before != {}

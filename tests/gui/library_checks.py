@@ -218,6 +218,47 @@ def check_a_clip_is_annotated():
     del rig
 
 
+def check_words_are_judged_by_keys():
+    folder = yield from opened("judged")
+    (folder / "kick_low_top.txt").unlink()
+    run("beyond_mocap.list_clips", "EXEC_DEFAULT")
+    run("beyond_mocap.learn_words")
+    yield from settled()
+    yield from until(lambda: settings().words_model, what="words are learned")
+    run("beyond_mocap.annotate_clip", path="kick_low_top.bvh")
+    yield from settled()
+    run("beyond_mocap.propose_words", review=True)
+    yield from settled()
+    group = bpy.context.object.beyond_mocap_proposals
+    kick = next(index for index, one in enumerate(group.listed) if "kick" in one.name)
+    assert group.listed[kick].source == "learned", group.listed[kick].source
+    group.active = 0
+    fold = unfolded()
+    yield from drawn()
+    window.picture(PICTURES / "library-proposals.png")
+    view = window.area("VIEW_3D")
+    yield from window.move(view.x + view.width // 3, view.y + view.height // 2)
+    run("beyond_mocap.review_proposals")
+    yield 0.5
+    for index in range(len(group.listed)):
+        group = bpy.context.object.beyond_mocap_proposals
+        before = group.active
+        yield from window.press("A" if "kick" in group.listed[before].name else "X")
+        yield 0.3
+    group = bpy.context.object.beyond_mocap_proposals
+    told = [(one.name, one.state) for one in group.listed]
+    assert [state for name, state in told] == [
+        "ACCEPTED" if "kick" in name else "REFUSED" for name, _ in told], told
+    yield from drawn()
+    window.picture(PICTURES / "library-judged.png")
+    yield from press("save_words")
+    yield from until((folder / "kick_low_top.txt").is_file)
+    assert "# learned" in (folder / "kick_low_top.txt").read_text()
+    run("beyond_mocap.remove_clip")
+    settings().words_model = ""
+    fold()
+
+
 def check_assets_have_pictures():
     yield from opened("assets")
     run("beyond_mocap.list_clips", "EXEC_DEFAULT")

@@ -25,9 +25,10 @@ _AROUND = 0.12  # seconds around a candidate in which its strike is looked for
 @dataclass(frozen=True, eq=False)
 class Act:
     """word: what is done; moment: whether it has key moments, else it is a stretch. kernel: its looks; weights (3,): of
-    its confidence (`confidence.sure`). silent: what counts as the rules'
-    confidence where they say nothing. shown: by how many moments or seconds it was learned. strike: index of STRIKES whose peak tells the key frame, -1 for the score's own;
-    lead: seconds by which the key comes after that peak. before, after: seconds of a row around its key."""
+    its confidence (`confidence.sure`). silent: what counts as the rules' confidence where they say nothing. shown: by
+    how many moments or seconds it was learned. strike: index of STRIKES whose peak tells the key frame, -1 for the
+    score's own; lead: seconds by which the key comes after that peak. before, after: seconds of a row around its
+    key."""
 
     word: str
     moment: bool
@@ -90,7 +91,7 @@ def rule_sure(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.nd
 
 
 def struck(signals: Signals, strike: int, time: float) -> float:
-    """Seconds of the strike's peak nearest to a time, within a few frames of it; the time itself where there is none."""
+    """Seconds of the strike's peak within a few frames of a time; the time itself where there is none."""
     fps = signals.fps
     first = max(0, int(np.ceil((time - _AROUND) * fps)))
     part = signals.strikes[first : int((time + _AROUND) * fps) + 1, strike]

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 PRIOR = {True: (5.0, 2.5, 1.3), False: (5.0, 0.0, 1.0)}
-"""Weights of score, rule (its confidence; where it is silent minus `silence`) and 1; of acts that the rules know, and of
-others."""
+"""Weights of score, rule (its confidence; where it is silent minus `silence`) and 1; of acts that the rules know, and
+of others."""
 
 _SPREAD = np.array([0.7, 0.7, 0.3])
 
@@ -23,13 +23,14 @@ def sure(weights: np.ndarray, score: np.ndarray, rule: np.ndarray) -> np.ndarray
 
 
 def silence(found: int, shown: int) -> float:
-    """How much it says against an act that the rules see none: 1 where they have found all of the `shown` examples, next
-    to nothing where they have found none. Half of -log of their share of misses, Laplace's estimate."""
+    """How much it says against an act that the rules see none: 1 where they have found all of the `shown` examples,
+    next to nothing where they have found none. Half of -log of their share of misses, Laplace's estimate."""
     return float(min(1.0, -0.5 * np.log((shown - found + 1.0) / (shown + 2.0))))
 
 
 def calibrated(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, ruled: bool) -> np.ndarray:
-    """(3,) weights from candidates that the scores had not seen: score (N,), rule (N,), whether each is the act (N,)."""
+    """(3,) weights from candidates that the scores had not seen: score (N,), rule (N,), whether each is the act
+    (N,)."""
     from scipy.optimize import minimize
 
     start = np.array(PRIOR[ruled])

@@ -26,15 +26,15 @@ _FOLDS, _BETTER = 5, 0.1  # of the clips; share of the examples by which the cla
 
 @dataclass(frozen=True, eq=False)
 class Details:
-    """choices: for each group its words, "" for none of them. planes: for each group (C, K + 1), scores of its C choices
-    from a window's K components and 1. by_rule: for each group, whether the rules are asked first."""
+    """choices: for each group its words, "" for none of them. planes: for each group (C, K + 1), scores of its C
+    choices from a window's K components and 1. by_rule: for each group, whether the rules are asked first."""
 
     choices: tuple[tuple[str, ...], ...]
     planes: tuple[np.ndarray, ...]
     by_rule: tuple[bool, ...]
 
     def said(self, rows: np.ndarray, rule: Proposal | None) -> tuple[str, ...]:
-        """The words for one act that is shown by these windows in their space (N, K); rule: what the rules say of it."""
+        """The words for one act that is shown by these windows in their space (N, K); rule: what the rules say."""
         mean = _told(rows).mean(axis=0)
         found = []
         for group, plane, asked in zip(self.choices, self.planes, self.by_rule):

@@ -54,7 +54,7 @@ def examples_of(
     read = _clips(folder, True, unit, progress, cache_dir, cancelled)
     out = tuple(Example.of(name, motion, rows) for name, motion, rows in read)
     if not out:
-        raise InputError(folder, "no clip with words", "some ten annotated clips", "annotate a few, then learn from them")
+        raise InputError(folder, "no clip with words", "some ten annotated clips", "annotate a few, then learn")
     return out
 
 

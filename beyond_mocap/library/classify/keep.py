@@ -68,7 +68,8 @@ def read(path: str | os.PathLike) -> Classifier:
 def _header(act: Act) -> dict:
     return {
         "word": act.word, "moment": act.moment, "shift": act.kernel.shift, "gamma": act.kernel.gamma,
-        "silent": act.silent, "shown": act.shown, "strike": act.strike, "lead": act.lead, "before": act.before, "after": act.after,
+        "silent": act.silent, "shown": act.shown, "strike": act.strike, "lead": act.lead,
+        "before": act.before, "after": act.after,
         "choices": act.details.choices, "by_rule": act.details.by_rule,
     }
 
@@ -98,7 +99,8 @@ def _act(number: int, header: dict, arrays: dict, components: int) -> Act:
         raise ValueError("header")
     lead, before, after = (_number(header[name]) for name in ("lead", "before", "after"))
     return Act(_word(header["word"]), bool(header["moment"]), kernel, _array(arrays, f"{number}.sure", (3,)),
-               _number(header["silent"]), _number(header["shown"]), strike, lead, before, after, Details(choices, planes, by_rule))
+               _number(header["silent"]), _number(header["shown"]), strike, lead, before, after,
+               Details(choices, planes, by_rule))
 
 
 def _array(arrays: dict, name: str, shape: tuple[int, ...]) -> np.ndarray:

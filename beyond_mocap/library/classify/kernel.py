@@ -20,8 +20,8 @@ LIMIT = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """f(z) = sum_i weights_i k_i + shift with k_i = exp(-gamma |z - supports_i|^2); with m = min(1, max_i k_i / 0.25) the
-    score is m f(z) + m - 1. supports (S, K) float32; weights (S,)."""
+    """f(z) = sum_i weights_i k_i + shift with k_i = exp(-gamma |z - supports_i|^2); with m = min(1, max_i k_i / 0.25)
+    the score is m f(z) + m - 1. supports (S, K) float32; weights (S,)."""
 
     supports: np.ndarray
     weights: np.ndarray

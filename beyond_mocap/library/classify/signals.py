@@ -1,8 +1,7 @@
 """A recording as signals that no longer tell whose body it is: at one rate, in the facing frame, in lengths of a leg.
 
-Positions and velocities of thirteen points that every humanoid has, the pelvis's height, speed and turning, the trunk's
-lean, and what the rules of `proposals` look at. The mirrored body's signals come from these by exchanging sides, so that
-one example teaches both.
+Positions and velocities of twelve points that every humanoid has, the pelvis's height, speed and turning, and the
+trunk's lean. The mirrored body's signals come from these by exchanging sides, so that one example teaches both.
 """
 
 from __future__ import annotations
@@ -54,7 +53,8 @@ class Signals:
     def mirrored(self) -> "Signals":
         """The same with left and right exchanged."""
         across, trunk = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]), np.array([1, 1, -1, 1, -1, 1, -1, 1.0])
-        return replace(self, middle=self.middle * across, paired=self.paired[:, ::-1] * across, trunk=self.trunk * trunk)
+        middle, paired = self.middle * across, self.paired[:, ::-1] * across
+        return replace(self, middle=middle, paired=paired, trunk=self.trunk * trunk)
 
 
 def signals(motion: Motion) -> Signals:

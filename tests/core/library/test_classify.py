@@ -1,4 +1,4 @@
-"""Acts learned from ten made clips of one body are found on another body: what, when, which side; and kept in a file."""
+"""Acts learned from ten made clips of one body are found on another: what, when, which side; and kept in a file."""
 
 from dataclasses import replace
 from pathlib import Path
