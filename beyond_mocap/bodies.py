@@ -28,6 +28,7 @@ from .library.automatic import automatic_words
 from .library.keys import Key
 from .library.library import Library
 from .motion import quaternion
+from .motion.arctangent import arctan2
 from .motion.motion import Motion
 from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
@@ -238,7 +239,7 @@ class _Body:
         own_speed = np.linalg.norm(shown.velocity, axis=1)
         moving = [np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0) for speed in (track.speed, own_speed)]
         going = moving[0] ** 2 * moving[1] ** 2
-        travel = track.direction - quaternion.angle_of(shown.velocity[:, 1], shown.velocity[:, 0])
+        travel = track.direction - arctan2(shown.velocity[:, 1], shown.velocity[:, 0])
         watch = track.direction + wanted_offset(track)
         weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
         goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)

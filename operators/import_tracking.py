@@ -8,7 +8,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
-from ..beyond_mocap.files.tracking import PROVIDERS
+from ..beyond_mocap.files.providers import PROVIDERS
 from ..scene import bake, dots, plans, strips, tracks, word_checks
 from ..scene.settings import as_setting
 from .verb import ImportVerb

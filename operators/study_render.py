@@ -30,9 +30,10 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
 
     directory: StringProperty(name="Study", subtype="DIR_PATH", description="Folder with study.json")
     engine: EnumProperty(
-        name="Engine", default="EEVEE", description="What renders",
-        items=(("EEVEE", "EEVEE", "Needs a graphics card"), ("CYCLES", "Cycles", "Works without a window, slowly"),
-               ("WORKBENCH", "Workbench", "Fast and plain")),
+        name="Engine", default="AUTO", description="What renders",
+        items=(("AUTO", "EEVEE or Cycles", "EEVEE in a window, Cycles where Blender runs without one"),
+               ("EEVEE", "EEVEE", "Fast with a graphics card, very slow without"),
+               ("CYCLES", "Cycles", "Works everywhere, slowly"), ("WORKBENCH", "Workbench", "Fast and plain")),
     )  # fmt: skip
     width: IntProperty(name="Width", default=960, min=16, max=7680, description="Pixels of the picture")
     height: IntProperty(name="Height", default=540, min=16, max=4320, description="Pixels of the picture")

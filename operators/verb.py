@@ -73,6 +73,7 @@ class BackgroundVerb(Verb):
     """
 
     kind = ""
+    left = "cancelled, nothing has changed"  # what is told after ESC
 
     def do(self, context):
         """Order, work and apply in one go."""
@@ -120,7 +121,7 @@ class BackgroundVerb(Verb):
         self.ended(context)
         scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self.scene), None)
         if background.cancelled(self.job) or scene is None:
-            self.report({"WARNING"}, f"{self.bl_label}: cancelled, nothing has changed")
+            self.report({"WARNING"}, f"{self.bl_label}: {self.left}")
             return {"CANCELLED"}
         return self.attempt(lambda: self.finish(scene))
 

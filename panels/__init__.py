@@ -6,8 +6,8 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, ball, library, markers, menus, path, players, preferences, presets, quality, result, rig, synthesis, throws,
-    timeline, video, view,
+    annotate, ball, library, markers, match, menus, path, players, preferences, presets, quality, result, rig, synthesis,
+    throws, timeline, video, view,
 )
 
 CLASSES = (
@@ -29,6 +29,8 @@ CLASSES = (
     ball.BEYOND_MOCAP_UL_touches,
     ball.BEYOND_MOCAP_PT_ball,
     throws.BEYOND_MOCAP_PT_throws,
+    match.BEYOND_MOCAP_UL_match,
+    match.BEYOND_MOCAP_PT_match,
     markers.BEYOND_MOCAP_UL_markers,
     markers.BEYOND_MOCAP_PT_markers,
     view.BEYOND_MOCAP_PT_view,

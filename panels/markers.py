@@ -31,7 +31,7 @@ class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
     """Recordings of optical markers, and the way from them to a body."""
 
     bl_label = "Optical Markers"
-    bl_order = 10
+    bl_order = 11
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):

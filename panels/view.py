@@ -18,7 +18,7 @@ class BEYOND_MOCAP_PT_view(Step, bpy.types.Panel):
     """Overlays and error curves."""
 
     bl_label = "View"
-    bl_order = 11
+    bl_order = 12
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):

@@ -4,7 +4,7 @@
 - `armature`, `action`   skeletons and motions, both ways
 - `linked`    refuses what belongs to another file
 - `channels`    curves in bulk; alone knows slots and channelbags
-- `body`, `ball`, `curve`, `stage`, `material`   what is seen
+- `body`, `ball`, `curve`, `pitch`, `stage`, `material`   what is seen
 - `settings`    what the panels show, per scene; `session` what lives as long as Blender runs
 - `preferences` what the user sets once for all files
 - `tracks`, `plans`   the settings as tracks and plans of the core; `drawn_track` curves and moving objects as tracks,
@@ -29,6 +29,7 @@
 - `throws`      throws and kicks at a target, made by a network
 - `stream`      a body that arrives over this machine's own network while it moves
 - `markers`     a recording of optical markers as a cloud that plays, and the way from it to a body
+- `match`       a stretch of a whole match: everybody in kit, pitch, ball, cameras, and the process that makes it
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 
@@ -46,6 +47,8 @@ from .aimed import settings as aimed
 from .markers import kept as kept_markers
 from .markers import labels as marker_labels
 from .markers import settings as markers
+from .match import child as match_child
+from .match import settings as match
 from .passes import hits_shown
 from .passes import live as passes_live
 from .passes import settings as passes
@@ -66,6 +69,7 @@ CLASSES = (
     aimed.BeyondMocapAim,
     throws.BeyondMocapThrow,
     *markers.CLASSES,
+    *match.CLASSES,
     video.BeyondMocapVideo,
     view_settings.BeyondMocapView,
     view_settings.BeyondMocapPlayhead,
@@ -96,6 +100,7 @@ KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
     ("Object", "beyond_mocap_cloud", markers.BeyondMocapCloud),
     ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
     ("Scene", "beyond_mocap_markers", markers.BeyondMocapMarkers),
+    ("Scene", "beyond_mocap_match", match.BeyondMocapMatch),
     ("Scene", "beyond_mocap_passes", passes.BeyondMocapPasses),
     ("Scene", "beyond_mocap_stream", stream.BeyondMocapStream),
     ("WindowManager", "beyond_mocap_streaming", stream.BeyondMocapStreaming),
@@ -150,6 +155,7 @@ def unregister():
     freshness.unregister()
     overlays.unregister()
     background.stop()
+    match_child.end_all()
     video.unregister()
     migrate.unregister()
     moment_names.unregister()

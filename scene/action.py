@@ -30,6 +30,17 @@ def write(
     start: scene frame (may be fractional) at which the motion's first frame is played; the scene's first if None. The
     armature needs a bone for every joint. generated: as for `channels.animate`. Returns the action.
     """
+    frames, curves = keyed(body, motion, scene, start)
+    action = channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
+    action[PLACED] = [number for row in body.matrix_world for number in row]
+    return action
+
+
+def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None):
+    """What `write` writes, as `channels.animate` takes it: whole scene frames (F,), and the values of every curve.
+
+    InputError where the armature cannot play it.
+    """
     linked.refuse(body)
     channels.check_free(body)
     if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
@@ -52,9 +63,7 @@ def write(
     for joint, bone in enumerate(motion.skeleton.names):
         body.pose.bones[bone].rotation_mode = "QUATERNION"
         curves[_path(bone, "rotation_quaternion")] = (bone, pose[:, joint])
-    action = channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
-    action[PLACED] = [number for row in body.matrix_world for number in row]
-    return action
+    return frames, curves
 
 
 def read(

@@ -1,5 +1,6 @@
 """A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, and a camera
-that keeps at the same distance (Faustino §5.1.1). Shadows and, where there is one, the ball are what his study lacked."""
+that keeps at the same distance (Faustino §5.1.1). Shadows and, where there is one, the ball are what his study
+lacked."""
 
 from __future__ import annotations
 
@@ -17,7 +18,6 @@ from .aside import scene_aside
 from .material import colour
 from .measure import frames_per_second, whole_frames
 
-ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT", "CYCLES", "BLENDER_WORKBENCH")
 SHIRT = (0.30, 0.32, 0.35)  # linear RGB, no team's
 CAMERA_FROM = (-1.1, -5.2, 0.75)  # metres from the middle of the body
 HIGH = 0.95  # metres of that middle above the floor
@@ -58,7 +58,10 @@ def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> 
 
 
 def engine_here(wanted: str) -> str:
-    """Blender's name of an engine in this version: EEVEE has had two."""
+    """Blender's name of an engine in this version: EEVEE has had two. AUTO is Cycles where there is no window, for
+    EEVEE is very slow where there is no graphics card."""
+    if wanted == "AUTO":
+        wanted = "CYCLES" if bpy.app.background else "EEVEE"
     names = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
     if wanted == "EEVEE":
         return "BLENDER_EEVEE" if "BLENDER_EEVEE" in names else "BLENDER_EEVEE_NEXT"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.track import SampledTrack, zero_phase_hann
 from .gaits import without_short_runs
 
@@ -29,12 +30,12 @@ def wanted_offset(track: SampledTrack) -> np.ndarray:
     known = np.isfinite(away).all(axis=1)
     distance = np.linalg.norm(np.where(known[:, None], away, 1.0), axis=1)
     share = np.where(known, np.clip((distance - _AT_FEET[0]) / (_AT_FEET[1] - _AT_FEET[0]), 0.0, 1.0), 0.0)
-    to_ball = quaternion.angle_of(away[:, 1], away[:, 0])
+    to_ball = arctan2(away[:, 1], away[:, 0])
     offset = np.where(known, quaternion.wrapped(to_ball - track.direction), 0.0) * share
     most = np.interp(track.speed, _SPEEDS, _MOST_TURNED)
     offset = np.clip(offset, -most, most)
     steady = zero_phase_hann(np.stack([np.cos(offset), np.sin(offset)], axis=1), track.fps, _WINDOW)
-    return quaternion.angle_of(steady[:, 1], steady[:, 0])
+    return arctan2(steady[:, 1], steady[:, 0])
 
 
 def direction_words(offset: np.ndarray, fps: float) -> list[str]:

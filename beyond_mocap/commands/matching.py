@@ -47,7 +47,7 @@ def _add_work(verb) -> None:
 
 def _add_results(verb) -> None:
     """What comes out, and how."""
-    verb.add_argument("--no-solve-touches", action="store_true", help="the ball as the feed has it, and no touches of it")
+    verb.add_argument("--no-solve-touches", action="store_true", help="the ball as the feed has it, and no touches")
     verb.add_argument("--annotations", type=Path, metavar="DIR", help="words of players as DIR/ID.txt, not found ones")
     verb.add_argument("--bvh", action="store_true", help="every player as BVH too")
     verb.add_argument("--no-figures", action="store_true", help="no reports, no provenance, no page")
@@ -57,7 +57,7 @@ def _add_results(verb) -> None:
         "--exact", dest="nearest", action="store_false",
         help="a player whose words the library lacks fails, instead of going on with the nearest it has",
     )
-    verb.add_argument("--nearest", dest="nearest", action="store_true", help="go on with the nearest words; the default")
+    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words; the default")
 
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:

@@ -25,6 +25,7 @@ _TABLE_KINDS = {  # of plain tables -> kind
     "ball lost": "touch", "ball out": "out", "set piece": "other", "fault received": "foul", "card": "other",
     "header": "pass", "reception": "receive", "throw-in": "pass", "kick": "pass",
 }  # fmt: skip
+_METRICA_SUBTYPES = {"clearance": "clearance", "aerial": "aerial"}
 _HEAD = {"header", "head"}
 
 
@@ -185,13 +186,14 @@ def _metrica_csv(path: Path, match: Match | None):
         time = number(row["Start Time [s]"], "Start Time [s]", place)
         time -= begins.setdefault(period, 0.0 if period == 1 else time)
         said = f"{row['Type']} {row['Subtype']}".strip().lower()
-        kind = _TABLE_KINDS.get(row["Type"].lower(), row["Type"].lower())
-        part = "head" if "head" in said.split("-") or "head" in said else "hand" if "throw in" in said else ""
+        named = (row["Type"].lower(), "other")[row["Type"].lower() not in (*KINDS, *_TABLE_KINDS)]
+        kind = next((kind for word, kind in _METRICA_SUBTYPES.items() if word in said), _TABLE_KINDS.get(named, named))
+        part = "head" if "head" in said else "hand" if "throw in" in said else ""
+        details = ("throw-in",) * (part == "hand") + ("lost",) * (kind == "aerial" and "lost" in said)
         x, y = (number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
         team = row["Team"].lower() if row["Team"].lower() in ("home", "away") else ""
         event = MatchEvent(
-            time, period, "", team, kind if kind in KINDS else "other", part, "", ("throw-in",) * (part == "hand"),
-            said, None, ((x - 0.5) * length, (0.5 - y) * width),
+            time, period, "", team, kind, part, "", details, said, None, ((x - 0.5) * length, (0.5 - y) * width),
         )
         rows.append((event, Who.spelled(row["From"], team) if row["From"] else None))
     return rows

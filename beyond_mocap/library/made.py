@@ -28,6 +28,7 @@ import numpy as np
 
 from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
 from ..motion import contacts, gestures, quaternion
+from ..motion.arctangent import arctan2
 from ..motion.course import GaitStyle
 from ..motion.gait import gait
 from ..motion.humanoid import heading_from_positions, identify
@@ -158,13 +159,13 @@ def _elbow_and_lean(motion: Motion) -> np.ndarray:
     ]
     facing = heading_from_positions(motion.skeleton, places)
     trunk = places[:, body.chest if body.neck is None else body.neck] - places[:, body.hips]
-    lean = quaternion.angle_of(quaternion.turned_level(trunk[:, :2], -facing)[:, 0], trunk[:, 2])
+    lean = arctan2(quaternion.turned_level(trunk[:, :2], -facing)[:, 0], trunk[:, 2])
     return np.array([np.mean(bends) if bends else 0.0, np.mean(lean)])
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The angle (T,) in radians between vectors (T, 3)."""
-    return np.arctan2(np.linalg.norm(quaternion.cross(a, b), axis=1), np.sum(a * b, axis=1))
+    return arctan2(np.linalg.norm(quaternion.cross(a, b), axis=1), np.sum(a * b, axis=1))
 
 
 def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: dict[str, float]) -> Iterator[Made]:
@@ -203,7 +204,7 @@ def _neighbours(clips, frames: Frames, fps: float, low: float, high: float) -> t
 
 def _straight(frames: Frames, part: np.ndarray, fps: float) -> bool:
     """Whether frames `part` (K,) go on at one speed, forward, and hardly turn."""
-    speed, off = frames.speed[part], quaternion.angle_of(frames.velocity[part, 1], frames.velocity[part, 0])
+    speed, off = frames.speed[part], arctan2(frames.velocity[part, 1], frames.velocity[part, 0])
     steady = speed.std() < _STEADY * speed.mean() and np.mean(np.abs(off)) < 0.35
     return steady and np.ptp(frames.heading[part]) < 0.5 + 0.3 * len(part) / fps
 

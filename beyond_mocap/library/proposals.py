@@ -21,6 +21,7 @@ from scipy.signal import find_peaks
 from ..annotation import ClipAnnotation, automatic_gaits
 from ..annotation.gaits import without_short_runs
 from ..motion import contacts, quaternion
+from ..motion.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.runs import runs
@@ -118,7 +119,7 @@ def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
     limits = np.array([speed for _, speed in gaits][1:])
     middle = np.concatenate([[0.0], 0.5 * (limits[1:] + limits[:-1]), [limits[-1] + 1.0]]) if len(limits) else [0.0]
     gait = automatic_gaits(seen.speed, fps, middle, limits, hysteresis=0.1, minimum=_SHORTEST)
-    off = quaternion.wrapped(quaternion.angle_of(seen.path[:, 1], seen.path[:, 0]) - seen.facing)
+    off = quaternion.wrapped(arctan2(seen.path[:, 1], seen.path[:, 0]) - seen.facing)
     quarter = without_short_runs(np.round(off / (np.pi / 2.0)).astype(int) % 4, int(_SHORTEST * fps))
     way = np.where(np.array([words[g] == "standing" for g in gait]), -1, quarter)
     kind = without_short_runs(gait * 5 + way + 1, int(_SHORTEST * fps))
@@ -180,7 +181,7 @@ def _inner_share(seen: _Seen, side: str, key: int) -> float:
 def _kicked_way(seen: _Seen, toe: np.ndarray, key: int) -> int:
     """Index into _WAYS: where the foot swings, against the body's facing."""
     way = _velocity(toe, seen.motion.fps, _FOOT_SECONDS)[key]
-    off = quaternion.wrapped(np.arctan2(way[1], way[0]) - seen.facing[key])
+    off = quaternion.wrapped(arctan2(way[1], way[0]) - seen.facing[key])
     return int(np.round(off / (np.pi / 2.0))) % 4
 
 

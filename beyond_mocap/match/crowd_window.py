@@ -70,9 +70,9 @@ def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, en
         flat = [take for own in takes for take in own]
         fps = flat[0].motion.fps if flat else 1.0
         firsts = [round(take.start_time * fps) for take in flat]
-        corrections = kept_apart(
-            [take.motion for take in flat], [take.contacts for take in flat], firsts, fps, [_firm(take) for take in flat]
-        )
+        firm = [_firm(take) for take in flat]
+        own, contacts = [take.motion for take in flat], [take.contacts for take in flat]
+        corrections = kept_apart(own, contacts, firsts, fps, firm)
         motions = [applied(take.motion, *own) for take, own in zip(flat, zip(corrections, firsts))]
         before = overlap_depths([take.motion for take in flat], firsts)
         after = overlap_depths(motions, firsts)
@@ -91,7 +91,8 @@ def _firm(take: Take) -> np.ndarray:
 
 def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
     """One player's part, out of his takes with what was found of each."""
-    frames, depth, before, led_frames, led = [np.zeros(0, int)], [np.zeros(0)], 0.0, [np.zeros(0, int)], [np.zeros((0, 3))]
+    frames, depth, before = [np.zeros(0, int)], [np.zeros(0)], 0.0
+    led_frames, led = [np.zeros(0, int)], [np.zeros((0, 3))]
     for take, _, first, deep, deep_after in rows:
         own = np.flatnonzero(deep_after > 0.0) + first
         mine = (own >= inside[0]) & (own < inside[1])

@@ -29,6 +29,7 @@ _BIN = 0.1  # s of lag that are told apart
 _SPREAD = 0.5  # s by which lags of one period scatter
 _MOST_DRIFT = 0.002  # s a second
 _FEWEST = 8  # events whose players touch the ball, below which nothing can be told
+_INSIDE = 4  # passes and shots within what was solved, below which a lag may be chance
 _SURE = 30  # pairs from which a drift is told from scatter
 _LEAST_MATCHED, _ABOVE_CHANCE = 0.3, 1.6  # share of the certain events that must fit, and how much more than by chance
 _SENDING = {"pass", "shot", "clearance"}
@@ -57,7 +58,7 @@ class PeriodClock:
 @dataclass(frozen=True)
 class AlignedEvents:
     """The events of a match on the tracking's clock. events: as given. times: s of each on the match's clock, lag taken
-    out. touches: the index of each one's solved touch, -1 where it has none. clocks: period -> its clock. notes: lines
+    out; NaN in halves whose clock cannot be set. touches: the index of each one's solved touch, -1 where it has none. clocks: period -> its clock. notes: lines
     for people."""
 
     events: tuple[MatchEvent, ...]
@@ -84,16 +85,12 @@ def aligned(
         own = [touch for touch in touches if half.start <= touch.time <= half.end]
         found = _half_clock([events.events[i] for i in members], own, half, span)
         if found is None:
-            times[members] = half.zero + np.array([events.events[i].time for i in members])
             if members and own:
-                notes.append(f"period {half.number}: too few events of players who touch the ball to set its clock")
+                told = "too few events of players who touch the ball to set its clock: they are left out"
+                notes.append(f"period {half.number}: {told}")
             continue
         clocks[half.number], times[members] = found
     _check(events, clocks)
-    usual = next(iter(clocks.values()), None)
-    for half in halves if usual else ():
-        if half.number not in clocks:
-            times[[i for i, event in enumerate(events.events) if event.period == half.number]] -= usual.lag
     pairs = _pairs(events.events, times, touches)
     notes += [_told(number, clock) for number, clock in clocks.items()]
     return AlignedEvents(events.events, times, pairs, clocks, tuple(notes))
@@ -141,6 +138,9 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
         (time, event.player) for event, time in zip(events, since) if event.kind in CERTAIN and event.player
     ]
     rest = early - late * (1.0 + drift) - lag
+    there = [start + (time - lag) / (1.0 + drift) for time, _ in certain_events]
+    if sum(span[0] <= time <= span[1] for time in there) < _INSIDE:
+        return None
     near = rest[np.abs(rest) < 3.0 * _SPREAD]
     spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
 

@@ -21,8 +21,8 @@ from .words_text import edited, read_words, write_words
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A role with its orders. file: what the player's files are called; plans: one for each stretch, as files keep them;
-    () where he cannot be made (`role.reason`)."""
+    """A role with its orders. file: what the player's files are called; plans: one for each stretch, as files keep
+    them; () where he cannot be made (`role.reason`)."""
 
     role: Role
     file: str
@@ -73,7 +73,8 @@ def _plan(role: Role, number: int, moments, solved: SolvedBall | None, order: Ma
     start, end = float(track.times[0]), float(track.times[-1])
     timeline: Timeline = timeline_of(moments, start, end)
     plan = Plan(
-        track=track, timeline=timeline, library=str(order.library), nearest=order.nearest, seed=order.seed + role.number,
-        fps=order.fps, solve_touches=solved is not None, variety=order.variety, lag=role.lag,
+        track=track, timeline=timeline, library=str(order.library), nearest=order.nearest,
+        seed=order.seed + role.number, fps=order.fps, solve_touches=solved is not None, variety=order.variety,
+        lag=role.lag,
     )
     return kept(plan if solved is None else replace(plan, solved=course_of(solved, role.player.id, plan)))

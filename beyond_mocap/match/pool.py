@@ -87,8 +87,9 @@ def run(
     """(key, result) of every task, as they end, in any order; the result is `Failed` where `work` raises.
 
     tasks: taken one by one, only as far as workers are free for them. work: a function of a module, which other
-    processes can import by its name. spent: is told of each piece what it took. Raises Cancelled soon after `cancelled()` says so, InputError where the cluster
-    does not answer, has no workers, or goes away. Closing the iterator, or an error, ends what is still being done.
+    processes can import by its name. spent: is told of each piece what it took. Raises
+    Cancelled soon after `cancelled()` says so, InputError where the cluster does not answer, has no workers, or goes
+    away. Closing the iterator, or an error, ends what is still being done.
     """
     stop = cancelled or (lambda: False)
     if place.scheduler:
@@ -200,6 +201,9 @@ def _result(future: Future) -> Done:
 class _Processes:
     """Processes of this machine."""
 
+    started: Executor | None = None
+    """The processes that this program has started last, and that may wait for work."""
+
     def __init__(self, workers: int):
         self._workers = workers
         self._executor: Executor | None = None
@@ -217,6 +221,7 @@ class _Processes:
                 self._workers, timeout=_IDLE, reuse=True, initializer=_follow, initargs=(os.getpid(),),
                 env={name: "1" for name in _THREADS},
             )  # fmt: skip
+            _Processes.started = self._executor
         return self._executor
 
     def check(self, moved: bool) -> None:
@@ -255,10 +260,9 @@ def _end_after(parent: int) -> None:
 
 def ended() -> None:
     """Ends the local processes that wait for more work."""
-    from joblib.externals.loky import reusable_executor
-
-    if reusable_executor._executor is not None:
-        reusable_executor._executor.shutdown(wait=True, kill_workers=True)
+    executor, _Processes.started = _Processes.started, None
+    if executor is not None:
+        executor.shutdown(wait=True, kill_workers=True)
 
 
 class _Cluster:
@@ -289,7 +293,8 @@ class _Cluster:
 
     def renew(self) -> None:
         """A cluster looks after its workers itself; what it loses, it loses with its scheduler. InputError."""
-        raise InputError("--scheduler", "the scheduler went away", "one that stays", "start it again; what is done is kept")
+        what = "start it and the command again; what is done is kept"
+        raise InputError("--scheduler", "the scheduler went away", "one that stays", what)
 
     def close(self, going: Iterable[Future]) -> None:
         """Takes back what nobody needs any more."""

@@ -63,6 +63,11 @@ class Job:
         return digest_of(FORM, self.source.key, *values)
 
 
+def _spread(job: Job, tasks, work, stage: str) -> Iterator[tuple]:
+    """(key, result) of a stage's tasks (`pool.run`)."""
+    return run(tasks, work, job.place, job.cancelled, job.state.spent(stage))
+
+
 def search(job: Job, parts: Sequence[Part]) -> dict[str, PlayerEdit]:
     """Everybody's edit list, by id, each written as soon as it is there; who fails is told in the state."""
     return _Search(job, parts).done()
@@ -86,7 +91,7 @@ class _Search:
     def done(self) -> dict[str, PlayerEdit]:
         """Searches what is missing."""
         job = self._job
-        for (player, name), result in run(self._missing(), search_unit, job.place, job.cancelled, job.state.spent(SEARCH)):
+        for (player, name), result in _spread(job, self._missing(), search_unit, SEARCH):
             if isinstance(result, Failed):
                 self._fail(player, result.reason)
                 continue
@@ -160,7 +165,7 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
             else:
                 yield number, (job.source, cut, start, end)
 
-    for number, result in run(missing(), part_crowd, job.place, job.cancelled, job.state.spent(CROWD)):
+    for number, result in _spread(job, missing(), part_crowd, CROWD):
         if isinstance(result, Failed):
             start, end = windows[number]
             job.state.told["notes"].append(f"{start:g}-{end:g} s: bodies are not kept apart: {result.reason}")
@@ -182,12 +187,11 @@ def _windows(span: tuple[float, float], window: float, fps: float) -> list[tuple
 
 
 def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
-    """Edit lists without what their motion does not depend on."""
-    return tuple(
-        replace(edit, stretches=tuple(
-            replace(stretch, plan=replace(stretch.plan, library=""), warnings=(), short=()) for stretch in edit.stretches
-        )) for edit in edits
-    )  # fmt: skip
+    """Edit lists without the library's place, on which their motion does not depend."""
+    def bare(stretch):
+        return replace(stretch, plan=replace(stretch.plan, library=""))
+
+    return tuple(replace(edit, stretches=tuple(map(bare, edit.stretches))) for edit in edits)
 
 
 def _whole(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:
@@ -217,13 +221,13 @@ def finish(
             write_player(job.folder.of(part.file, "take.npz"), edit)
             order = Finish(edit, part.role.measured, ball, crowd[player].frames, crowd[player].depth,
                            job.order.figures, job.order.bvh)  # fmt: skip
-            names[player] = job.named(replace(order, edit=_unnamed([edit])[0]), tuple(edit.stretches[0].warnings))
+            names[player] = job.named(replace(order, edit=_unnamed([edit])[0]))
             if _is_finished(job, part, names[player]):
                 done += 1
             else:
                 yield player, (job.source, order)
 
-    for player, result in run(missing(), finish_player, job.place, job.cancelled, job.state.spent("figures")):
+    for player, result in _spread(job, missing(), finish_player, "figures"):
         if isinstance(result, Failed):
             job.state.player(player, status="failed", reason=result.reason)
             continue
@@ -254,7 +258,8 @@ def _write(job: Job, part: Part, made, name: str) -> dict[str, str]:
     if made.report is not None:
         path, player = job.folder.of(part.file, "report.json"), part.role.player
         who = {"id": player.id, "team": player.team, "number": player.number, "name": player.name}
-        whole = {**made.report, **who, "warnings": [*made.report["warnings"], *part.role.notes]}
+        took = {**made.report["seconds"], "search": job.state.players[player.id]["search_s"]}
+        whole = {**made.report, **who, "seconds": took, "warnings": [*made.report["warnings"], *part.role.notes]}
         atomic_write(path, json.dumps(plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
         told["report"] = path.name
     return told

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import quaternion, structure
+from .arctangent import arctan2
 from .motion import Motion, forward_kinematics, pose_kinematics
 from .skeleton import Skeleton
 
@@ -242,7 +243,7 @@ def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndar
     across = positions[..., body.left.upper_leg, :] - positions[..., body.right.upper_leg, :]
     if body.left.upper_arm is not None and body.right.upper_arm is not None:
         across = across + positions[..., body.left.upper_arm, :] - positions[..., body.right.upper_arm, :]
-    return quaternion.angle_of(-across[..., 0], across[..., 1])
+    return arctan2(-across[..., 0], across[..., 1])
 
 
 def heading(motion: Motion) -> np.ndarray:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arctangent import arctan2
+
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)
 _AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -97,7 +99,7 @@ def to_rotation_vector(q: np.ndarray) -> np.ndarray:
     q = np.asarray(q, dtype=float)
     q = np.where(q[..., :1] < 0.0, -q, q)
     length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    angle = 2.0 * angle_of(length, q[..., :1])
+    angle = 2.0 * arctan2(length, q[..., :1])
     scale = np.where(length > 1e-9, angle / np.maximum(length, 1e-9), 2.0)
     return scale * q[..., 1:]
 
@@ -127,13 +129,13 @@ def to_euler(q: np.ndarray, order: str) -> np.ndarray:
     sine = np.clip(sign * m[..., i, k], -1.0, 1.0)
     # the middle angle from both its sine and cosine: arcsin alone loses half the digits near 90 degrees
     cosine = np.hypot(m[..., i, i], m[..., i, j])
-    middle = np.arctan2(sine, cosine)
-    first = angle_of(-sign * m[..., j, k], m[..., k, k])
+    middle = arctan2(sine, cosine)
+    first = arctan2(-sign * m[..., j, k], m[..., k, k])
     pole = cosine < 1e-9
-    first = np.where(pole, angle_of(sign * m[..., k, j], m[..., j, j]), first)
+    first = np.where(pole, arctan2(sign * m[..., k, j], m[..., j, j]), first)
     # from what is left when the first turn is taken back: near the pole both outer angles are noise, their sum is not
     left = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
-    third = np.where(pole, 0.0, angle_of(sign * left[..., i], left[..., j]))
+    third = np.where(pole, 0.0, arctan2(sign * left[..., i], left[..., j]))
     return np.stack([first, middle, third], axis=-1)
 
 
@@ -216,16 +218,7 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
 def yaw(q: np.ndarray) -> np.ndarray:
     """The turn about Z that is nearest to the rotation (its twist): (..., 4) -> (...,) radians."""
     q = np.asarray(q)
-    return 2.0 * angle_of(q[..., 3], q[..., 0])
-
-
-def angle_of(y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Radians from the x axis to (x, y) (...,), as arctan2.
-
-    numpy goes another way, to another last bit, where an input with gaps (such as a column) happens to lie beside the
-    output in memory; without gaps the same values always give the same bits.
-    """
-    return np.arctan2(np.asarray(y, order="C"), np.asarray(x, order="C"))
+    return 2.0 * arctan2(q[..., 3], q[..., 0])
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:

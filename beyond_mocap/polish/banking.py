@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.humanoid import identify
 from ..motion.motion import world_rotation
 from ..motion.skeleton import Skeleton
@@ -40,7 +41,7 @@ def missing_lean(
     says nothing; slow: as SLOW.
     """
     own_speed = np.linalg.norm(velocity, axis=1)
-    own_turn = turn + np.diff(quaternion.angle_of(velocity[:, 1], velocity[:, 0]), prepend=np.arctan2(*velocity[:1, ::-1].T))
+    own_turn = turn + np.diff(arctan2(velocity[:, 1], velocity[:, 0]), prepend=arctan2(*velocity[:1, ::-1].T))
     own_turn[seams] = own_turn[np.minimum(seams + 1, len(turn) - 1)]
     asked = speed * quaternion.wrapped(np.diff(direction, prepend=direction[:1]))
     fast = np.clip((np.minimum(speed, own_speed) - slow[0]) / (slow[1] - slow[0]), 0.0, 1.0)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 
 
 def share(through: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -59,5 +60,5 @@ def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
     np.add.at(middle, fade, turn[..., 0])
     turn = turn * np.where(middle < 0.0, -1.0, 1.0)[fade][..., None]
     length = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
-    angle = 2.0 * quaternion.angle_of(length, turn[..., :1])
+    angle = 2.0 * arctan2(length, turn[..., :1])
     return np.where(length > 1e-9, angle / np.maximum(length, 1e-9), 2.0) * turn[..., 1:]

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..motion import quaternion
 from ..motion.arc_length import ArcLength
+from ..motion.arctangent import arctan2
 from ..motion.path import Path, SplinePath
 
 RISE = 0.4
@@ -65,7 +65,7 @@ def _heading(along, spacing):
     level = np.hypot(along[:, 0], along[:, 1]) > 1e-3 * spacing
     if not level.any():
         return np.zeros(len(along))
-    yaw = np.unwrap(quaternion.angle_of(along[level, 1], along[level, 0]))
+    yaw = np.unwrap(arctan2(along[level, 1], along[level, 0]))
     return np.interp(np.arange(len(along)), np.flatnonzero(level), yaw)
 
 

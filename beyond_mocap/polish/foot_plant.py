@@ -18,6 +18,7 @@ from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.contacts import sole_height
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
@@ -157,7 +158,7 @@ def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndar
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
     own = length - np.linalg.norm(heel - hip, axis=1)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
-    yaw = quaternion.angle_of(along[:, 1], along[:, 0])
+    yaw = arctan2(along[:, 1], along[:, 0])
     left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
     return Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length, own)
 
@@ -174,7 +175,7 @@ def firmness(stands: np.ndarray) -> np.ndarray:
 
 def turned_flat(foot: Foot, scale: float) -> Foot:
     """The foot turned about its heel and the vertical so that it keeps its direction while it lies flat."""
-    yaw = np.unwrap(quaternion.angle_of(-foot.left[:, 0], foot.left[:, 1]))
+    yaw = np.unwrap(arctan2(-foot.left[:, 0], foot.left[:, 1]))
     flat = np.minimum(foot.weight[:, 0] / HEEL_SHARE, foot.weight[:, 1]).clip(0.0, 1.0)
     spin = quaternion.about_up(shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0])
     toe = foot.heel + quaternion.rotate(spin, foot.toe - foot.heel)
@@ -207,7 +208,7 @@ def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     length = foot.longest
     asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
     most = np.hypot(even, odd)
-    rise = np.arctan2(odd, even) - np.arccos(np.clip(asked / np.maximum(most, 1e-9), -1.0, 1.0))
+    rise = arctan2(odd, even) - np.arccos(np.clip(asked / np.maximum(most, 1e-9), -1.0, 1.0))
     return np.where((asked > even) & (odd > 0.0), np.clip(rise, 0.0, MOST_RISE), 0.0)
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.track import zero_phase_hann
@@ -67,9 +68,9 @@ def head_angles(seen: np.ndarray) -> np.ndarray:
     unit = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
-    side = quaternion.angle_of(unit[:, 1], np.maximum(unit[:, 0], back))
+    side = arctan2(unit[:, 1], np.maximum(unit[:, 0], back))
     yaw = _limited(side, MOST_YAW) * _smooth(level / _OVERHEAD)
-    pitch = quaternion.angle_of(unit[:, 2], level)
+    pitch = arctan2(unit[:, 2], level)
     return np.column_stack([yaw, np.where(pitch > 0.0, _limited(pitch, MOST_UP), _limited(pitch, MOST_DOWN))])
 
 

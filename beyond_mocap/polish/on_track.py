@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.runs import runs
 from ..motion.track import zero_phase_hann
 
@@ -53,7 +54,7 @@ def facing(
     """
     count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
-    offset = quaternion.angle_of(velocity[:, 1], velocity[:, 0])
+    offset = arctan2(velocity[:, 1], velocity[:, 0])
     goal = direction - offset
     trust = _moving(speed) ** 2 * _moving(own_speed) ** 2
     goal, trust = _with_aim(goal, trust, speed, aim, turn)

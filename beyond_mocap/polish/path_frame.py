@@ -14,6 +14,7 @@ from scipy.linalg import solveh_banded
 
 from ..errors import InputError
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 
@@ -125,7 +126,7 @@ def moving_frame(
     pace = np.abs(np.gradient(arc)) * fps if len(arc) > 1 else np.zeros(1)
     level = np.linalg.norm(along[:, :2], axis=1)
     return MovingFrame(
-        origin, heading(along, pace * level, fps, otherwise), quaternion.angle_of(along[:, 2], np.maximum(level, 1e-12))
+        origin, heading(along, pace * level, fps, otherwise), arctan2(along[:, 2], np.maximum(level, 1e-12))
     )
 
 
@@ -141,7 +142,7 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
     """
     mean = zero_phase_hann(along[:, :2] * speed[:, None], fps, _COMES) if len(along) > 2 else along[:, :2]
     speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURELY)
-    raw = quaternion.angle_of(along[:, 1], along[:, 0])
+    raw = arctan2(along[:, 1], along[:, 0])
     clear = speed >= min(CLEAR, 0.5 * speed.max(initial=0.0))
     if len(raw) < 3 or speed.max(initial=0.0) < _STILL:
         return np.full(len(raw), raw[0] if otherwise is None else otherwise)

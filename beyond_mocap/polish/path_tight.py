@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..errors import TimedLine
+from ..motion.arctangent import arctan2
 from ..motion.path import Path
 from ..motion.runs import runs
 
@@ -34,7 +35,7 @@ def tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: flo
 def steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
     """(T,) bool: frames within a steep stretch; tangent (T, 3) of any length, own (T,) radians the slope of the
     motion's own path."""
-    slope = np.arctan2(np.abs(tangent[:, 2]), np.linalg.norm(tangent[:, :2], axis=1))
+    slope = arctan2(np.abs(tangent[:, 2]), np.linalg.norm(tangent[:, :2], axis=1))
     return _lasting((slope > np.radians(STEEP)) & (slope > _AS_OWN * np.abs(own)), arc, fps)
 
 

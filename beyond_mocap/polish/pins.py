@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify
 from ..motion.motion import Motion, pose_kinematics
 from ..motion.runs import runs
@@ -365,8 +366,8 @@ class _Part:
         sight = quaternion.rotate(self.world[:, head], np.broadcast_to(look, (len(self.root), 3)))
         away = found.place - self.places[:, head]
         facing = heading_from_positions(self.skeleton, self.places)
-        yaw = np.clip(quaternion.wrapped(quaternion.angle_of(away[:, 1], away[:, 0]) - facing), -MOST_YAW, MOST_YAW) + facing
-        pitch = np.clip(quaternion.angle_of(away[:, 2], np.hypot(away[:, 0], away[:, 1])), -MOST_PITCH, MOST_PITCH)
+        yaw = np.clip(quaternion.wrapped(arctan2(away[:, 1], away[:, 0]) - facing), -MOST_YAW, MOST_YAW) + facing
+        pitch = np.clip(arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])), -MOST_PITCH, MOST_PITCH)
         wanted = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
         return quaternion.to_rotation_vector(quaternion.between(sight, wanted))
 

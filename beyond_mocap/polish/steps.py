@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
 from ..motion.runs import runs
@@ -150,7 +151,7 @@ class _Foot:
         self.limb, self.places, self.world = limb, places[:, limb.foot], world[:, limb.foot]
         toe = places[:, limb.toe_or_foot]
         along = toe - self.places if limb.toe is not None else quaternion.rotate(self.world, np.array([1.0, 0.0, 0.0]))
-        self.yaw = np.unwrap(quaternion.angle_of(along[:, 1], along[:, 0]))
+        self.yaw = np.unwrap(arctan2(along[:, 1], along[:, 0]))
         self.stands, self.flat = standing.any(axis=1), standing.all(axis=1)
         self.held = np.zeros(len(root), bool)
         self.before, self.behind, self.through = np.zeros(len(root), int), np.zeros(len(root), int), np.zeros(len(root))

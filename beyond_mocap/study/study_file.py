@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -15,6 +16,7 @@ NAME = "study.json"
 VERSION = 1
 COLUMNS = ("file", "system", "scenario")
 _LARGEST = 20_000_000
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")  # of clips and raters: files are called so
 
 
 def read_clips(path: Path) -> tuple[Clip, ...]:
@@ -48,6 +50,8 @@ def read_study(folder: Path) -> Study:
         orders = {str(rater): tuple(_shown(row, names) for row in rows) for rater, rows in told["orders"].items()}
         if told["version"] != VERSION or not isinstance(told["pairs"], bool) or len(names) != len(clips):
             raise ValueError("another version")
+        if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
+            raise ValueError(f"{odd!r} is no name")
         return Study(str(told["study"]), int(told["seed"]), told["pairs"], clips, orders)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         found = f"not of the form of a study ({type(error).__name__}: {error})"

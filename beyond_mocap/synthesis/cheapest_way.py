@@ -7,8 +7,7 @@ that may still be kept. What is kept is what weighing every pair would keep.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -25,6 +24,10 @@ class Offered:
     rate: np.ndarray
     cost: np.ndarray
     piece: np.ndarray
+
+    def only(self, which: np.ndarray) -> "Offered":
+        """The frames `which`, by index."""
+        return Offered(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 class Ways:
@@ -53,6 +56,9 @@ class Ways:
         Of frames that begin no piece those are left out that cannot be among the `most` cheapest of them and of `known`
         (L,) costs of other ways to fill the slot.
         """
+        most_above = np.partition(known, most - 1)[most - 1] - self.base if len(known) >= most else np.inf
+        near = np.flatnonzero((to.piece >= 0) | (to.cost <= most_above))
+        to = to.only(near)
         least = self._least(to)
         count = least.shape[1]
         first = np.arange(len(least)) * count + np.argmin(least, axis=1)
@@ -67,7 +73,7 @@ class Ways:
         begins = np.flatnonzero(np.diff(offer, prepend=-1))
         at = _cheapest_of_each(cost, begins)
         at = at[cost[at] <= bound[offer[at]]]
-        return offer[at], self.base + cost[at].astype(float), pairs[at] % count
+        return near[offer[at]], self.base + cost[at].astype(float), pairs[at] % count
 
     def _least(self, to: Offered) -> np.ndarray:
         """(K, B) float32 above the base: what each way costs at least."""

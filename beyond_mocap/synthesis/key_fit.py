@@ -14,6 +14,7 @@ import numpy as np
 from ..library.keys import Key
 from ..library.library import Library
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from ..motion.motion import at_frames, pose_kinematics
 from ..motion.striking import faster_middle, surfaces
 from ..motion.track import SampledTrack
@@ -86,7 +87,7 @@ def _around(library: Library, key: Key):
 def _travel(library: Library, frame: np.ndarray) -> np.ndarray:
     """(K,) radians in the clips' own world: the way they go at library frames (K,), or face where they stand."""
     velocity = library.frames.velocity[frame]
-    aside = quaternion.angle_of(velocity[:, 1], velocity[:, 0])
+    aside = arctan2(velocity[:, 1], velocity[:, 0])
     return library.frames.heading[frame] + np.where(np.linalg.norm(velocity, axis=1) > 0.5, aside, 0.0)
 
 
@@ -108,7 +109,7 @@ def misfit(found: Strikes, ball: Ball) -> np.ndarray:
     cost = PLACE_COST * np.clip(apart - _NOISE, 0.0, _FARTHEST)
     cost = np.nan_to_num(cost)
     cost += np.nan_to_num(HEIGHT_COST * np.maximum(np.abs(found.height - ball.height) - _NOISE, 0.0))
-    turned = quaternion.angle_of(*found.velocity.T[::-1]) - np.arctan2(ball.leaving[1], ball.leaving[0])
+    turned = arctan2(*found.velocity.T[::-1]) - arctan2(ball.leaving[1], ball.leaving[0])
     turned = np.abs(quaternion.wrapped(turned))
     fast = (np.linalg.norm(found.velocity, axis=1) > _FAST_PART) & (np.linalg.norm(ball.leaving) > _FAST_BALL)
     return cost + ANGLE_COST * np.where(fast, turned, 0.0)

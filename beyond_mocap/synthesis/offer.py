@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter1d
 
 from ..annotation import DISCRETE
 from ..library.library import Library
-from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from .annotation_cost import AnnotationCost
 
 SLOT = 8
@@ -69,7 +69,7 @@ class Offer:
         self.valid = lasts & allowed[library.frames.clip]
         usable = np.flatnonzero(self.valid)
         self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
-        self.offset = -quaternion.angle_of(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
+        self.offset = -arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
         self.long_stance = np.clip(library.stance_seconds - _USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
         self.stands = library.feet_standing
         self.wild_before, self.wild_after = wildness(library)

@@ -252,8 +252,17 @@ class PathCosts:
 
 def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(B, K) distances between points (B, D) and (K, D)."""
-    square = (a * a).sum(1)[:, None] + (b * b).sum(1) - 2.0 * (a @ b.T)
+    square = _with_square(a, -2.0 * a, 1) @ _with_square(b, b, 0).T
     return np.sqrt(np.maximum(square, 0.0, out=square), out=square)
+
+
+def _with_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarray:
+    """(K, D + 2) `scaled` (K, D) points with their squared lengths and ones behind, or the other way round, so that one
+    product is |a|^2 + |b|^2 - 2 a b."""
+    out = np.ones((len(points), points.shape[1] + 2), points.dtype)
+    out[:, :-2] = scaled
+    np.einsum("kd,kd->k", points, points, out=out[:, -2 + place])
+    return out
 
 
 def _added(terms: Iterator[Term]) -> np.ndarray:

@@ -6,6 +6,7 @@ well. A new operator without a row fails here.
 
 import importlib
 import json
+import pathlib
 import re
 import shutil
 import socket
@@ -22,6 +23,7 @@ from conftest import EXTENSION
 from throw_models import model_file
 from undo import press, state
 
+SMALL = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "match" / "small"
 SAYS_NOTHING = re.compile(
     r"Traceback|failed, context is incorrect|\w+Error: '|has no attribute|NoneType|StructRNA|<bpy|^\W*$|Errno|"
     r"object is not"
@@ -288,6 +290,33 @@ def saved_map(places):
     return places.out / "map.json"
 
 
+def a_match():
+    """Three seconds of two players of the sample's match are chosen."""
+    scene = bpy.context.scene
+    match, top = scene.beyond_mocap_match, pathlib.Path(scene.beyond_mocap.library_folder).parent
+    for name in ("small.dat", "small_meta.xml"):
+        shutil.copy(SMALL / name, top / "match")
+    bpy.ops.beyond_mocap.read_match(filepath=str(top / "match" / "small.dat"))
+    match.start, match.end, match.workers, match.folder = 2.0, 5.0, 1, str(top / "out" / "match")
+    for player in match.players:
+        player.use = player.feed_id in ("home_4", "home_7")
+
+
+def a_made_match():
+    """The same, made: once, then it is there. A part of it is to be shown."""
+    a_match()
+    match = bpy.context.scene.beyond_mocap_match
+    if not pathlib.Path(match.folder, "match.json").exists():
+        bpy.ops.beyond_mocap.make_match()
+    match.end = 4.0
+
+
+def a_shown_match():
+    """The same, shown."""
+    a_made_match()
+    bpy.ops.beyond_mocap.show_match()
+
+
 def a_study(places):
     """A study of four movies, none of them at its place yet."""
     folder = places.out / "study"
@@ -365,7 +394,10 @@ ROWS = {
     "load_marker_set": Row("imported", lambda places: {"filepath": f"{marker_set_file(places)}"}),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "make_assets": Row("imported", prepare=list_clips),
+    "make_match": Row("imported", prepare=a_match),
     "map_bones": Row("rig", prepare=unmapped),
+    "match_camera": Row("imported", lambda places: {"which": "EYES", "player": "home_7"}, a_shown_match),
+    "match_second": Row("imported", lambda places: {"seconds": 3.0, "player": "home_7"}, a_shown_match),
     "mirror": Row("accepted"),
     "mirror_side": Row("imported", prepare=pick_a_moment),
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),
@@ -388,6 +420,7 @@ ROWS = {
     "player_from_dot": Row("imported", prepare=lose_a_player),
     "preview": Row("synthesized", lambda places: {"number": 2}, two_variants),
     "propose_words": Row("clip"),
+    "read_match": Row("imported", lambda places: {"filepath": str(SMALL / "small_Home.csv")}, a_match),
     "read_words": Row("imported", prepare=forget_dots),
     "reconstruct_markers": Row("imported", prepare=a_cloud),
     "reduce_keys": Row("rig", prepare=bake_it),
@@ -407,6 +440,7 @@ ROWS = {
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
     "set_static": Row("imported", prepare=two_clouds),
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
+    "show_match": Row("imported", prepare=a_made_match),
     "show_timeline": Row("imported", changes=False),
     "show_video": Row("video", changes=False),
     "solve_ball": Row("imported"),
@@ -422,6 +456,7 @@ ROWS = {
     "synthesize": Row("imported"),
     "take_ball": Row("accepted", lambda places: {"first": 3, "last": 8}, a_ball),
     "throw_at_target": Row("accepted", prepare=a_target),
+    "tick_match": Row("imported", lambda places: {"whom": "home"}, a_match),
     "track_object": Row("imported", prepare=draw),
     "unbake": Row("rig", prepare=bake_it),
     "update": Row("synthesized"),

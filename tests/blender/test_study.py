@@ -93,6 +93,15 @@ def test_what_is_missing_is_told_before_anything_is_rendered(study, spoil, words
     assert not (folder / "clips").exists()
 
 
+@pytest.mark.parametrize("engine", ["AUTO", "EEVEE", "CYCLES", "WORKBENCH"])
+def test_every_engine_of_this_blender_takes_the_settings(extension, engine):
+    study = importlib.import_module(f"{extension.__name__}.scene.study")
+    scene, name = bpy.context.scene, study.engine_here(engine)
+    study._settings(scene, study.Look(name, (64, 36), 25, 3))
+    assert scene.render.engine == name and (scene.render.fps, scene.render.resolution_x) == (25, 64)
+    assert engine != "AUTO" or name == "CYCLES"  # there is no window here
+
+
 def test_the_camera_glides_without_lag(extension):
     followed = importlib.import_module(f"{extension.__name__}.scene.study").followed
     time = np.arange(90) / 30.0

@@ -35,6 +35,7 @@ def state():
         "settings": plain(scene.beyond_mocap),
         "markers of": plain(scene.beyond_mocap_markers),
         "passes": plain(scene.beyond_mocap_passes),
+        "match": plain(scene.beyond_mocap_match),
         "stream": plain(scene.beyond_mocap_stream),
         "constraints": sorted((o.name, c.name, round(c.influence, 6)) for o in bpy.data.objects for c in o.constraints),
         "players": [(p.name, p.tracking_file, p.annotation_file, p.take, p.quality, p.body.name if p.body else None)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .results import MatchResults, PlayerResult, read_match_results
 from .strips import heat_strip, png
-from .tables import team_table
+from .tables import own_warnings, shared_warnings, team_table
 from .worst import LIMITS, WorstSecond, badness, worst_seconds
 
 Thumbnail = Callable[[str, float], "np.ndarray | None"]
@@ -56,8 +56,10 @@ def page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
     match = read_match_results(Path(folder))
     anchors = {player.id: f"player-{number}" for number, player in enumerate(match.players, 1)}
     worst, span = worst_seconds(match.players), _span(match)
-    parts = [_head(match, span), _worst(match, worst, anchors, thumbnail), *_teams(match, span, anchors)]
-    parts += [_lines("The data", match.lines), _took(match), _players(match, worst, span, anchors)]
+    everybody = shared_warnings(match.players)
+    parts = [_head(match, span), _worst(match, worst, anchors, thumbnail), *_teams(match, span, anchors, everybody)]
+    parts += [_lines("The data", (*match.lines, *everybody)), _took(match)]
+    parts.append(_players(match, worst, span, anchors, everybody))
     title = escape(match.title)
     head = (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
             f'<meta name="viewport" content="width=device-width"><style>{_STYLE}</style></head>\n')  # fmt: skip
@@ -122,14 +124,15 @@ def _figures_at(one: WorstSecond) -> list[str]:
     return [_TOLD[figure][0].format(_TOLD[figure][1] * values[figure]) for figure in order]
 
 
-def _teams(match: MatchResults, span: tuple[float, float], anchors: Mapping[str, str]) -> list[str]:
+def _teams(match: MatchResults, span: tuple[float, float], anchors, everybody: tuple[str, ...]) -> list[str]:
     strips = {player.id: _strip(player, span) for player in match.players}
     parts = []
     for team in match.teams:
         own = [player for player in match.players if player.team == team.name]
         dot = f'<span class=dot style="background:{team.colour}"></span>' if team.colour else ""
         if own:
-            parts.append(f"<h2>{dot}{escape(team.name or 'No team')}</h2>\n{team_table(own, strips, anchors)}")
+            table = team_table(own, strips, anchors, everybody)
+            parts.append(f"<h2>{dot}{escape(team.name or 'No team')}</h2>\n{table}")
     return [*parts, _legend()] if parts else []
 
 
@@ -138,7 +141,7 @@ def _legend() -> str:
             "beyond, grey where the player has no motion. Green and red figures: target met or not.</p>")  # fmt: skip
 
 
-def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span: tuple[float, float], anchors) -> str:
+def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span, anchors, everybody: tuple[str, ...]) -> str:
     parts = ["<h2>Every player</h2>"] if match.players else []
     for player in match.players:
         lines = [f"<p class=missed>{escape(player.status)}{escape(': ' + player.reason if player.reason else '')}</p>"
@@ -151,8 +154,7 @@ def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span: tuple[fl
         own = [one for one in worst if one.player is player]
         lines += [f'<p><a href="#{_moment_anchor(one, anchors)}">{_clock(one.time)}: one of the worst seconds</a></p>'
                   for one in own]  # fmt: skip
-        warnings = map(str, player.report.get("warnings") or ())
-        lines.append(_lines("", tuple(dict.fromkeys((*warnings, *player.data)))))
+        lines.append(_lines("", own_warnings(player, everybody) + player.data))
         parts.append(f'<details id="{anchors[player.id]}"{" open" if own else ""}><summary>{escape(player.called)} '
                      f"<span class=quiet>{escape(player.team)}</span></summary>{''.join(lines)}</details>")  # fmt: skip
     return "\n".join(parts)
@@ -205,7 +207,7 @@ def _frame(match: MatchResults, time: float) -> str:
 
 
 def _go_to(one: WorstSecond) -> str:
-    return escape(f"bpy.ops.beyond_mocap.jump_to(seconds={one.time:g})")
+    return escape(f"bpy.ops.beyond_mocap.match_second(seconds={one.time:g}, player={one.player.id!r})")
 
 
 def _clock(seconds: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,10 +21,10 @@ _LONGEST = 6 * 3600  # seconds of one match
 
 @dataclass(frozen=True, eq=False)
 class PlayerResult:
-    """One player. id: in the feed, and in the names of his files. team: name of his team. status: "done", or how far he
-    came; reason: why he came no further, "" where that is not told. data: lines on what was read of him. report: his
-    report, {} where there is none. start: seconds on the match clock of the first row of per_second, which has one array (S,) for each of FIGURES, NaN where
-    nothing is known, empty where the report tells nothing by the second."""
+    """One player. id: in the feed. team: name of his team. status: "done", or how far he came; reason: why he came no
+    further, "" where that is not told. data: lines on what was read of him. report: his report, {} where there is none.
+    start: seconds on the match clock of the first row of per_second, which has one array (S,) for each of FIGURES, NaN
+    where nothing is known, empty where the report tells nothing by the second."""
 
     id: str
     name: str
@@ -43,8 +44,9 @@ class PlayerResult:
 
     @property
     def called(self) -> str:
-        """Number and name, as the page says it."""
-        return " ".join(part for part in (self.number, self.name or self.id) if part)
+        """Number and name, as the page says it; where the name has the number in it, the name alone."""
+        name = self.name or self.id
+        return name if not self.number or self.number in re.findall(r"\d+", name) else f"{self.number} {name}"
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,23 @@ COLUMNS = (
 _OVERLAP = 0.02  # metres that two bodies may be in each other
 
 
-def team_table(players: Sequence[PlayerResult], strips: Mapping[str, str], anchors: Mapping[str, str]) -> str:
+def shared_warnings(players: Sequence[PlayerResult]) -> tuple[str, ...]:
+    """Lines that all reports have, which are about the library and not about a player; none for a single player."""
+    told = [own_warnings(player, ()) for player in players if player.report]
+    return tuple(line for line in told[0] if all(line in other for other in told)) if len(told) > 1 else ()
+
+
+def own_warnings(player: PlayerResult, everybody: tuple[str, ...]) -> tuple[str, ...]:
+    """A player's warnings, each once, without those that `everybody` has."""
+    lines = dict.fromkeys(map(str, player.report.get("warnings") or ()))
+    return tuple(line for line in lines if line not in everybody)
+
+
+def team_table(
+    players: Sequence[PlayerResult], strips: Mapping[str, str], anchors: Mapping[str, str], everybody: tuple[str, ...]
+) -> str:
     """The table as HTML: a row for each player, then their mean and the worst of them. strips: HTML of each player's
-    strip by his id; anchors: of his own part of the page."""
+    strip by his id; anchors: of his own part of the page; everybody: warnings that are not counted."""
     head = "".join(f"<th class=n>{column.title}<br><span class=quiet>{column.unit}</span>" for column in COLUMNS)
     lines = [f"<tr><th>player{head}<th class=n>warnings<th>second by second"]
     for player in players:
@@ -49,10 +63,10 @@ def team_table(players: Sequence[PlayerResult], strips: Mapping[str, str], ancho
             continue
         found = flat({key: value for key, value in player.report.items() if key != "per_second"})
         cells = "".join(_cell(column, _value(player, column.figure, found), player, found) for column in COLUMNS)
-        count = len(player.report.get("warnings") or ())
+        count = len(own_warnings(player, everybody))
         note = "" if player.made else f"<br><span class=missed>{_why(player)}</span>"
         lines.append(f"{who}{note}{cells}<td class=n>{count}<td>{strips[player.id]}")
-    lines += _summary(players)
+    lines += _summary(players, everybody)
     return f"<div class=scroll><table>{chr(10).join(lines)}</table></div>"
 
 
@@ -60,7 +74,7 @@ def _why(player: PlayerResult) -> str:
     return escape(f"{player.status}: {player.reason}" if player.reason else player.status)
 
 
-def _summary(players: Sequence[PlayerResult]) -> list[str]:
+def _summary(players: Sequence[PlayerResult], everybody: tuple[str, ...]) -> list[str]:
     """The mean and the largest over all players with a report; nothing for a single one."""
     made = [player for player in players if player.report]
     if len(made) < 2:
@@ -70,7 +84,7 @@ def _summary(players: Sequence[PlayerResult]) -> list[str]:
     for title, measure in (("mean", lambda known: sum(known) / len(known)), ("worst", max)):
         known = [[value for value in values if math.isfinite(value)] for values in columns]
         cells = [_plain(column, measure(values) if values else math.nan) for column, values in zip(COLUMNS, known)]
-        counts = [len(player.report.get("warnings") or ()) for player in made]
+        counts = [len(own_warnings(player, everybody)) for player in made]
         lines.append(f"<tr class=sum><td>{title}{''.join(cells)}<td class=n>{measure(counts):.0f}<td>")
     return lines
 

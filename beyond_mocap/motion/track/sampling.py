@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from .. import quaternion
+from ..arctangent import arctan2
 from .data import BALL_RADIUS, SampledTrack, Track
 
 SMOOTHING_SECONDS = 1.2
@@ -93,7 +93,7 @@ def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     moving = np.flatnonzero(speed >= min(MOVING_SPEED, speed.max(initial=0.0)))
     if not len(moving) or not speed.any():
         return np.zeros(len(velocity))
-    angles = np.unwrap(quaternion.angle_of(velocity[moving, 1], velocity[moving, 0]))
+    angles = np.unwrap(arctan2(velocity[moving, 1], velocity[moving, 0]))
     frames = np.arange(len(velocity))
     before = np.clip(np.searchsorted(moving, frames, side="right") - 1, 0, None)
     after = np.clip(np.searchsorted(moving, frames), None, len(moving) - 1)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...motion import quaternion
+from ...motion.arctangent import arctan2
 from ...motion.runs import runs
 from ...motion.track import zero_phase_hann
 from .banded_squares import BandedSquares
@@ -106,7 +106,7 @@ def _lacking(
     directions, needs = np.zeros(off.shape), np.zeros(len(off))
     for low, high in runs(near):
         part = off[low:high]
-        angle = np.unwrap(quaternion.angle_of(part[:, 1], part[:, 0]))
+        angle = np.unwrap(arctan2(part[:, 1], part[:, 0]))
         if seconds and high - low > 2:
             angle = zero_phase_hann(angle[:, None], fps, seconds)[:, 0]
         way = np.stack([np.cos(angle), np.sin(angle)], axis=1)

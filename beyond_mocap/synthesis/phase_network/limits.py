@@ -19,6 +19,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...motion import quaternion
+from ...motion.arctangent import arctan2
 from ...motion.humanoid import identify
 from ...motion.skeleton import Skeleton, frozen_array
 
@@ -116,7 +117,7 @@ class JointLimits:
         parts = m.reshape(*m.shape[:-2], 9) @ _PARTS  # twice the sine times the axis, and the trace
         sine = 0.5 * parts[..., :3]
         length = np.sqrt((sine * sine) @ _ONES)
-        angle = np.arctan2(length, 0.5 * (parts[..., 3] - 1.0))
+        angle = arctan2(length, 0.5 * (parts[..., 3] - 1.0))
         scale = np.where(length > 1e-7, angle / np.maximum(length, 1e-7), 1.0)
         offsets = scale[..., None] * sine
         return self._other_way_round(offsets, angle) if angle.max() > _LONG else offsets
@@ -176,7 +177,7 @@ class JointLimits:
         """Bends (..., H) rad of `hinges` in local rotations (..., J, 3, 3): 0 straight, negative backwards."""
         bones = local[..., self._joints, :, :] @ self._bones
         shares = self._axes @ bones
-        return np.arctan2(shares[..., 0, 0], shares[..., 1, 0])
+        return arctan2(shares[..., 0, 0], shares[..., 1, 0])
 
     def _backwards(self, local: np.ndarray, most: float | np.ndarray = _BACK) -> np.ndarray:
         """Radians (..., H) by which hinges bend further back than `most`."""

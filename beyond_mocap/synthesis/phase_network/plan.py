@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...motion import quaternion
+from ...motion.arctangent import arctan2
 from ...motion.between_frames import cubic_at
 from ...motion.motion import pose_kinematics
 from .chains import chains_of
@@ -92,7 +93,7 @@ def unlike(launches: np.ndarray, impacts: np.ndarray, wish: Wish) -> np.ndarray:
     """(E,) how unlike examples are to what is wished, squared: by speed and steepness of the launches (E, 3) m/s most,
     by distance and height of the impacts (E, 3) m a little."""
     speed, level = np.linalg.norm(launches, axis=1), np.hypot(launches[:, 0], launches[:, 1])
-    steep = (np.arctan2(launches[:, 2], level) - wish.elevation) / _STEEP
+    steep = (arctan2(launches[:, 2], level) - wish.elevation) / _STEEP
     fast = (speed - wish.speed) / np.maximum(_FAST, 0.08 * speed)
     far = np.log(np.maximum(np.hypot(impacts[:, 0], impacts[:, 1]), 0.1) / max(wish.distance, 0.1)) / _FAR
     return steep**2 + fast**2 + 0.1 * far**2 + 0.1 * ((impacts[:, 2] - wish.height) / _HIGH) ** 2

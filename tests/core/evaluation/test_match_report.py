@@ -37,7 +37,8 @@ def column(quiet, **bad):
 def written(folder, reports, **changed):
     """A folder with these reports by player id; None: he failed."""
     players = [
-        {"id": name, "file": f"file-{name}", "name": f"Player <{name}>", "number": 7 + order, "team": "home" if order % 2 == 0 else "away",
+        {"id": name, "file": f"file-{name}", "name": f"Player <{name}>", "number": 7 + order,
+         "team": "home" if order % 2 == 0 else "away",
          **({"status": "done"} if one else {"status": "failed", "reason": "no <bones> & no luck"})}
         for order, (name, one) in enumerate(reports.items())
     ]
@@ -105,7 +106,7 @@ def test_the_page_tells_who_when_and_which_frame(tmp_path):
     text = page(folder)
     assert "110 s (1:50)" in text and "frame 300" in text
     assert "30.0 cm off the track" in text and "ball 20.0 m away" in text
-    assert "bpy.ops.beyond_mocap.jump_to(seconds=110)" in text
+    assert "bpy.ops.beyond_mocap.match_second(seconds=110, player=&#x27;a&#x27;)" in text
     assert "2 of 2 players made" in text and "Partial" not in text
     assert "0.21" in text and "12.3 s" in text and "ball &lt;measured&gt; in 80 %" in text
 
@@ -126,7 +127,16 @@ def test_failed_and_unreadable_players_are_marked_and_the_rest_is_told(tmp_path)
     (folder / "file-d.report.json").unlink()
     text = page(folder)
     assert "1 of 4 players made" in text and "Partial: 3 not made" in text
-    assert "no &lt;bones&gt; &amp; no luck" in text and "cannot be read" in text and "file-d.report.json is missing" in text
+    assert "no &lt;bones&gt; &amp; no luck" in text and "cannot be read" in text
+    assert "file-d.report.json is missing" in text
+
+
+def test_what_all_reports_say_is_told_once_and_not_counted(tmp_path):
+    reports = {name: report() for name in ("a", "b", "c")}
+    for name, one in reports.items():
+        one["warnings"] = ["unit guessed", f"only {name} slides"]
+    text = page(written(tmp_path, reports))
+    assert text.count("unit guessed") == 1 and all(text.count(f"only {name} slides") == 1 for name in reports)
 
 
 def test_a_player_who_comes_late_and_unknown_values(tmp_path):

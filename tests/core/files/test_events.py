@@ -153,10 +153,12 @@ def test_metrica_s_table_of_events_is_read(tmp_path):
     head = "Team,Type,Subtype,Period,Start Frame,Start Time [s],End Frame,End Time [s],From,To,Start X,Start Y,End X,End Y"
     one = "Away,PASS,HEAD,1,1,2.5,2,2.6,Player7,Player3,0.6,0.25,0.7,0.2"
     other = "Home,BALL LOST,,2,9,2800,9,2800,Player9,,,,,"
-    (tmp_path / "e.csv").write_text("\n".join([head, one, other, ""]))
-    first, second = read_events(tmp_path / "e.csv", match=made_match()).events
+    duel = "Away,CHALLENGE,AERIAL-LOST,1,3,3.5,3,3.5,Player3,,0.5,0.5,,"
+    (tmp_path / "e.csv").write_text("\n".join([head, one, duel, other, ""]))
+    first, aerial, second = read_events(tmp_path / "e.csv", match=made_match()).events
     assert (first.player, first.kind, first.part, first.time) == ("a7", "pass", "head", 2.5)
     np.testing.assert_allclose(first.place, (10.0, 16.0))
+    assert (aerial.player, aerial.kind, aerial.details) == ("a3", "aerial", ("lost",))
     assert (second.player, second.period, second.time) == ("h9", 2, 0.0)
 
 

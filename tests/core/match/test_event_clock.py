@@ -91,7 +91,9 @@ def test_too_few_events_are_told_and_left():
     touches, events, _ = planted()
     few = MatchEvents(events.events[:4], "made")
     found = aligned(few, touches, HALVES)
-    assert not found.clocks and "too few" in found.notes[0]
+    assert not found.clocks and "too few" in found.notes[0] and (found.touches == -1).all()
+    short = aligned(events, [touch for touch in touches if 300.0 < touch.time < 305.0], HALVES, (300.0, 305.0))
+    assert not short.clocks and (short.touches == -1).all()
     assert aligned(MatchEvents((), "made"), touches, HALVES).touches.size == 0
 
 

@@ -1,4 +1,4 @@
-"""A match from file to folder: what is in it, and that neither workers, kills, edits nor a bad player change the rest."""
+"""A match from file to folder: what is in it, and that neither workers, kills, edits nor a bad player change others."""
 
 import json
 import os

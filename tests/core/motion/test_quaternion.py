@@ -132,16 +132,3 @@ def test_slerp_goes_the_short_way_at_constant_speed():
 
 def test_zero_becomes_the_identity():
     assert np.array_equal(quaternion.normalized(np.zeros((2, 4))), quaternion.identity(2))
-
-
-def test_angles_of_columns_have_the_same_bits_wherever_they_lie_in_memory():
-    places = np.random.default_rng(4).normal(size=(701, 3))
-    wanted = quaternion.angle_of(places[:, 1].copy(), places[:, 0].copy())
-    assert np.array_equal(wanted, np.arctan2(places[:, 1].copy(), places[:, 0].copy()))
-    assert quaternion.angle_of(np.float64(1.0), 1.0).shape == () and quaternion.angle_of(0.0, -1.0) == np.pi
-    held = []
-    for number in range(400):  # copies that come to lie beside each other now and then
-        held.append(np.empty(200 + 37 * number % 9000, np.uint8))
-        beside = places.copy()
-        assert np.array_equal(quaternion.angle_of(beside[:, 1], beside[:, 0]), wanted)
-        del held[:: max(number % 7, 2)]

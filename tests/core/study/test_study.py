@@ -1,6 +1,8 @@
 """A study from table to analysis: orders that are fair, answers that come back, effects that were planted."""
 
 import json
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -106,7 +108,8 @@ def test_a_study_comes_back_from_its_file(tmp_path):
 
 @pytest.mark.parametrize("change", [
     {"version": 2}, {"pairs": 1}, {"clips": []}, {"clips": 3}, {"orders": {"R01": ["ab"]}}, {"orders": {"R01": [[]]}},
-    {"orders": []}, {"seed": "x"},
+    {"orders": []}, {"seed": "x"}, {"orders": {"../R01": []}},
+    {"clips": [{"name": "../a", "file": "a", "system": "b", "scenario": "c"}], "orders": {}},
 ])
 def test_a_broken_study_file_is_told(tmp_path, change):
     write_study(tmp_path, ordered(CLIPS, 2))
@@ -297,3 +300,16 @@ def test_what_is_wrong_is_one_line(tmp_path, capfd, argv, words):
     assert main(["study", *(f"{word}/".replace("T/", f"{tmp_path}/").rstrip("/") for word in argv)]) == 2
     told = capfd.readouterr().err.strip().splitlines()
     assert len(told) == 1 and words in told[0] and not (tmp_path / "o").exists() and not (tmp_path / "r.json").exists()
+
+
+def test_the_forms_script_is_javascript(tmp_path):
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not here to read the script")
+    study = ordered(CLIPS, 1)
+    page = form_page(study, "R01", {clip.name: "a.mp4" for clip in study.clips})
+    (tmp_path / "form.js").write_text(page.split("<script>")[1].split("</script>")[0], "utf-8")
+    read = subprocess.run([node, "--check", str(tmp_path / "form.js")], capture_output=True, text=True)
+    assert read.returncode == 0, read.stderr
+    told = json.loads(page.split('id="study">')[1].split("</script>")[0])
+    assert told["questions"] == questions_of(study, "R01") and told["study"] == study.id

@@ -1,0 +1,106 @@
+"""Match: a whole match from a provider's files, everybody at once."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.match.settings import active_of
+from .tab import Step, paragraph, section, split
+
+LINES = 12  # of the data report that the panel shows
+TEAM_ICONS = {"home": "EVENT_H", "away": "EVENT_A", "referee": "EVENT_R"}
+
+
+class BEYOND_MOCAP_UL_match(bpy.types.UIList):
+    """Everybody in the match, with team and number; a tick for those who are made and shown."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One player."""
+        row = layout.row(align=True)
+        row.prop(item, "use", text="")
+        row.label(text="", icon=TEAM_ICONS[item.team])
+        number = row.row()
+        number.ui_units_x = 1.4
+        number.label(text=str(item.number) if item.number >= 0 else "")
+        row.label(text=item.name or item.feed_id)
+
+
+class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
+    """Which match, which minute, who, and what it becomes."""
+
+    bl_label = "Match"
+    bl_order = 10
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """Files, the list, the stretch, the buttons."""
+        layout, match = self.layout, context.scene.beyond_mocap_match
+        column = split(layout)
+        column.prop(match, "tracking_file")
+        section(layout, "match_files", "More Files", lambda opened: more_files(opened, match))
+        layout.operator("beyond_mocap.read_match", icon="FILE_REFRESH")
+        self.progress(context, "match file")
+        if not match.tracking_file:
+            paragraph(layout, "Choose a provider's tracking of a match, or drop it into the view", "INFO")
+        if match.players:
+            people(layout, match)
+        if match.report:
+            section(layout, "match_data", "Data", lambda opened: told(opened, match.report))
+        column = split(layout)
+        for name in ("start", "end", "folder"):
+            column.prop(match, name)
+        section(layout, "match_work", "Work", lambda opened: work(opened, context.scene))
+        row = layout.row(align=True)
+        row.scale_y = 1.3
+        row.operator("beyond_mocap.make_match", icon="PLAY")
+        row.operator("beyond_mocap.show_match", icon="HIDE_OFF")
+        self.progress(context, "match")
+        if match.shown:
+            look(layout, match)
+
+
+def more_files(layout, match) -> None:
+    """What the tracking file's name does not lead to."""
+    column = split(layout)
+    for name in ("metadata_file", "events_file", "provider"):
+        column.prop(match, name)
+
+
+def people(layout, match) -> None:
+    """The list, ticks for many at once, and the teams' colours."""
+    layout.template_list("BEYOND_MOCAP_UL_match", "", match, "players", match, "active", rows=5)
+    row = layout.row(align=True)
+    for whom, text in (("ALL", "All"), ("NONE", "None"), ("home", "Home"), ("away", "Away"), ("ONE", "Chosen")):
+        row.operator("beyond_mocap.tick_match", text=text).whom = whom
+    row = layout.row(align=True)
+    for team in ("home", "away", "referee"):
+        row.prop(match, f"{team}_colour", text="")
+
+
+def told(layout, lines: str) -> None:
+    """What was guessed and put right."""
+    found = lines.splitlines()
+    for line in found[:LINES]:
+        paragraph(layout, line, "DOT")
+    if len(found) > LINES:
+        layout.label(text=f"... and {len(found) - LINES} more lines")
+
+
+def work(layout, scene) -> None:
+    """Who does it, and how."""
+    match = scene.beyond_mocap_match
+    column = split(layout)
+    for name in ("solve_touches", "workers", "scheduler", "first_frame"):
+        column.prop(match, name)
+    column.prop(scene.beyond_mocap, "rate")
+
+
+def look(layout, match) -> None:
+    """The cameras, and lines about what is shown."""
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.match_camera", text="Broadcast", icon="VIEW_CAMERA").which = "STAND"
+    chosen = active_of(match)
+    name = f"Eyes of {chosen.name or chosen.feed_id}" if chosen is not None else "Eyes"
+    row.operator("beyond_mocap.match_camera", text=name, icon="HIDE_OFF").which = "EYES"
+    for line in match.told.splitlines()[:LINES]:
+        paragraph(layout, line, "INFO")

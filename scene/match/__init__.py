@@ -1,0 +1,1 @@
+"""Matches in the scene: everybody in kit, pitch, ball and cameras."""

@@ -1,0 +1,169 @@
+"""Cameras of a match: one from the stand that follows the ball, and one in the head of any player.
+
+The stand's camera turns on an aim that glides after the ball, and zooms so that it always shows about the same stretch
+of pitch. The player's one sits where his eyes are and looks where they look: the way his face is turned, and from there
+towards the ball as far as eyes turn in a head.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.humanoid import identify
+from ...beyond_mocap.motion.motion import Motion, forward_kinematics
+from .. import action, channels
+from ..measure import frames_per_second, units_per_metre
+from . import ours
+
+STAND, EYES = "Match Broadcast", "Match Eyes"
+FROM = (0.0, 26.0, 17.0)  # metres: along the pitch, behind the touch line, above the ground
+SEEN, NEAREST = 33.0, 55.0  # metres across that the stand's camera shows; how near the ball may come to it
+GLIDE = 0.9  # s, of the bell by which its aim is smoothed
+SENSOR = 36.0  # mm
+EYE = (0.115, 0.04)  # metres from the head joint's middle of the eyes, ahead and up, for 1.80 m
+NEAR = 0.1  # metres from the eyes that are not seen: brows and nose
+WIDE = 18.0  # mm of the player's lens: 90 degrees, as much as one notices
+EYES_TURN = np.radians(35.0)  # that eyes turn in a head, more than that is the head's own
+STEADY = 0.12  # s, of the bell by which the gaze is smoothed
+UP = np.tan(np.radians(18.0))  # how steeply a gaze rises at most: higher things are in the picture's upper half
+RESTS = np.radians(12.0)  # that a gaze without a ball looks below the face's axis
+
+
+def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndarray, seen: np.ndarray):
+    """The camera from the stand over scene frames (F,), whose middle follows `seen` (F, 2) m; size: of the pitch."""
+    units, home = units_per_metre(scene), ours.part(scene, "cameras")
+    aim = ours.mark(bpy.data.objects.new("Match Broadcast aim", None))
+    aim.empty_display_size = 0.5 * units
+    home.objects.link(aim)
+    camera = bpy.data.objects.new(STAND, bpy.data.cameras.new(STAND))
+    camera[ours.MARK] = STAND
+    home.objects.link(camera)
+    stand = np.array([FROM[0], -size[1] / 2.0 - FROM[1], FROM[2]])
+    camera.location = stand * units
+    camera.data.clip_start, camera.data.clip_end, camera.data.sensor_width = units, 400.0 * units, SENSOR
+    look = camera.constraints.new("TRACK_TO")
+    look.target, look.track_axis, look.up_axis = aim, "TRACK_NEGATIVE_Z", "UP_Y"
+    middle = smooth(seen, GLIDE * frames_per_second(scene))
+    middle = np.clip(middle, *(np.outer([-1.0, 1.0], np.array(size) / 2.0 - [14.0, 14.0])))
+    places = np.column_stack([middle, np.full(len(middle), 0.6)])
+    away = np.linalg.norm(places - stand, axis=1)
+    lens = (SENSOR * np.maximum(away, NEAREST) / SEEN)[:, None]
+    group = "Object Transforms"
+    ours.mark(channels.animate(aim, aim.name, frames, {"location": (group, places * units)}))
+    ours.mark(channels.animate(camera.data, f"{STAND} lens", frames, {"lens": ("Lens", lens)}))
+    return camera
+
+
+def stand_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The camera in the stand; None where there is none."""
+    home = ours.part(scene, "cameras")
+    return next((thing for thing in home.objects if thing.type == "CAMERA" and thing.get(ours.MARK) == STAND), None)
+
+
+def eyes(scene: bpy.types.Scene, who: bpy.types.Object, ball: bpy.types.Object | None) -> bpy.types.Object:
+    """The camera in the head of the armature `who`, made or moved there. InputError where it plays nothing, or has no
+    head."""
+    first = action.first_frame(who)
+    if first is None:
+        raise InputError(who.name, "it plays no action", "a player of a shown match", "press Show Match")
+    motion = action.read(who, scene)
+    frames = first + np.arange(len(motion))
+    target = _ball_places(scene, ball, frames)
+    place, turn = view_of(motion, target)
+    units, camera = units_per_metre(scene), _eyes_camera(scene)
+    channels.discard(camera, ours.MARK)
+    group = "Object Transforms"
+    curves = {"location": (group, place * units), "rotation_quaternion": (group, turn)}
+    ours.mark(channels.animate(camera, f"{EYES} of {who.name}", frames, curves))
+    camera["beyond_mocap_eyes_of"] = who
+    return camera
+
+
+def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Place (T, 3) m and rotation (T, 4) of a camera at a body's eyes. target: (T, 3) m of what it would look at, NaN
+    where there is nothing."""
+    from ...beyond_mocap.motion.neutral import neutral_stance  # brings scipy, which is slow to import
+
+    skeleton = motion.skeleton
+    body, neutral = identify(skeleton), neutral_stance(skeleton, motion)
+    head = next((joint for joint in (body.head, body.neck, body.chest) if joint is not None), None)
+    if head is None:
+        raise InputError("skeleton", "no head, neck or chest", "a person")
+    places, world = forward_kinematics(motion)
+    face = quaternion.multiply(world[:, head], quaternion.inverse(neutral.rotations[head]))
+    scale = neutral.leg / 0.88  # an adult's leg of 1.80 m
+    eye = places[:, head] + quaternion.rotate(face, np.array([EYE[0], 0.0, EYE[1]]) * scale)
+    ahead = _unit(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
+    gaze = smooth(_towards(ahead, eye, target), STEADY * motion.fps)
+    gaze[:, 2] = np.minimum(gaze[:, 2], UP * np.linalg.norm(gaze[:, :2], axis=1))
+    return eye, _looking(_unit(gaze))
+
+
+def smooth(values: np.ndarray, width: float) -> np.ndarray:
+    """Values (T, n) through a bell of standard deviation `width` frames, their ends held."""
+    reach = int(3.0 * width)
+    if reach < 1 or len(values) < 2:
+        return values
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    held = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
+    return np.stack([np.convolve(column, bell / bell.sum(), "valid") for column in held.T], axis=1)
+
+
+def _towards(ahead: np.ndarray, eye: np.ndarray, target: np.ndarray | None) -> np.ndarray:
+    """Directions (T, 3): `ahead`, turned towards the target as far as eyes turn; a little down where there is none."""
+    down = _unit(ahead - [0.0, 0.0, np.tan(RESTS)])
+    if target is None:
+        return down
+    known = np.isfinite(target).all(axis=1)
+    wanted = np.where(known[:, None], _unit(np.where(known[:, None], target, eye + ahead) - eye), down)
+    cosine = np.clip(np.sum(ahead * wanted, axis=1), -1.0, 1.0)
+    angle = np.arccos(cosine)
+    share = np.minimum(1.0, EYES_TURN / np.maximum(angle, 1e-6))
+    behind = smooth(np.clip((np.radians(150.0) - angle) / np.radians(40.0), 0.0, 1.0)[:, None], 5.0)
+    turned = _between(ahead, wanted, angle, share)
+    return _unit(behind * turned + (1.0 - behind) * down)
+
+
+def _between(first: np.ndarray, second: np.ndarray, angle: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Unit vectors a share of the way along the arc between two rows of unit vectors (T, 3) that are `angle` apart."""
+    sine = np.maximum(np.sin(angle), 1e-6)
+    a, b = np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine
+    near = angle < 1e-4
+    return np.where(near[:, None], second, a[:, None] * first + b[:, None] * second)
+
+
+def _looking(gaze: np.ndarray) -> np.ndarray:
+    """Rotations (T, 4) of cameras that look along `gaze` (T, 3), upright."""
+    right = _unit(np.cross(gaze, [0.0, 0.0, 1.0]))
+    up = np.cross(right, gaze)
+    return quaternion.continuous(quaternion.from_matrix(np.stack([right, up, -gaze], axis=-1)))
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+
+
+def _ball_places(scene: bpy.types.Scene, ball: bpy.types.Object | None, frames: np.ndarray) -> np.ndarray | None:
+    """(F, 3) m of the ball's keys; None where there is no ball with keys."""
+    found = channels.curves(*channels.playing(ball)) if ball is not None and channels.playing(ball)[0] else {}
+    if not all(("location", axis) in found for axis in range(3)):
+        return None
+    places = [channels.sample(found["location", axis], frames) for axis in range(3)]
+    return np.stack(places, axis=1) / units_per_metre(scene)
+
+
+def _eyes_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    home = ours.part(scene, "cameras")
+    found = next((thing for thing in home.objects if thing.type == "CAMERA" and thing.get(ours.MARK) == EYES), None)
+    if found is None:
+        found = bpy.data.objects.new(EYES, bpy.data.cameras.new(EYES))
+        found[ours.MARK] = EYES
+        found.rotation_mode = "QUATERNION"
+        home.objects.link(found)
+        units = units_per_metre(scene)
+        found.data.lens, found.data.sensor_width = WIDE, SENSOR
+        found.data.clip_start, found.data.clip_end = NEAR * units, 400.0 * units
+    return found

@@ -1,0 +1,114 @@
+"""A folder of a made match as what the scene shows of a stretch of it; in any thread, never touching bpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...beyond_mocap.errors import Cancelled, InputError
+from .people import TEAMS, Person, Scenery
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.take import BallPath
+
+LIBRARYS_SHARE = 0.1  # of the bar
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be shown: the match's folder, seconds of its clock (end 0: to its end), players by id (empty:
+    everybody), colours of the teams' shirts; the library's folder, its unit, and how it is built."""
+
+    folder: str
+    start: float
+    end: float
+    players: tuple[str, ...]
+    colours: dict[str, str]
+    library: str
+    unit: float | None
+    build: dict = field(default_factory=dict)
+
+
+def scenery(
+    wanted: Wanted, library: "Library | None", progress: Callable[[float, str], None], cancelled: Callable[[], bool]
+) -> tuple["Library", Scenery, tuple[str, ...]]:
+    """The library (built where it is None), everybody's motion, and lines about whoever cannot be shown.
+
+    InputError where the folder holds no match, nobody of it is there in that time, or the library is another one.
+    """
+    from ...beyond_mocap.files.tables import read_ball
+    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.match.folder import read_state
+
+    state = read_state(wanted.folder)
+    if library is None:
+        library = build(
+            wanted.library, unit=wanted.unit, **wanted.build, cancelled=cancelled,
+            progress=lambda done, text: progress(LIBRARYS_SHARE * done, text),
+        )
+    start, end = _span(wanted, state)
+    course = Path(wanted.folder) / "ball.csv"
+    ball = read_ball(course) if course.is_file() else None
+    people, lines = _people(wanted, state, library, ball, (start, end), progress, cancelled)
+    if not people:
+        raise InputError(wanted.folder, f"nobody is there from {start:g} to {end:g} s", "a time of play", *lines[:1])
+    length, width = map(float, state["pitch_m"])
+    seen = Scenery(start, end, length, width, wanted.colours, tuple(people), _between(ball, start, end))
+    return library, seen, tuple(lines)
+
+
+def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
+    first, last = float(state["from_s"]), float(state["to_s"])
+    start, end = max(wanted.start, first), min(wanted.end or last, last)
+    if end - start < 0.2:
+        found, expected = f"{wanted.start:g} to {wanted.end:g} s", f"a time within {first:g} to {last:g} s"
+        raise InputError(wanted.folder, found, expected, "press Make Match for another")
+    return start, end
+
+
+def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[list[Person], list[str]]:
+    """Everybody who is there and was made, and lines about the others."""
+    from ...beyond_mocap.files.take_npz import read_player
+    from ...beyond_mocap.match.shown import shown
+
+    people, lines = [], []
+    asked = [player for player in state["players"] if not wanted.players or player["id"] in wanted.players]
+    for number, player in enumerate(asked):
+        if cancelled():
+            raise Cancelled("cancelled")
+        progress(LIBRARYS_SHARE + (1.0 - LIBRARYS_SHARE) * number / len(asked), f"expanding {player['id']}")
+        if player.get("status") != "done":
+            lines.append(f"{player['id']} was not made: {player.get('reason') or player.get('status')}")
+            continue
+        edit = read_player(Path(wanted.folder) / f"{player['file']}.take.npz")
+        takes = shown(library, edit, ball, *span)
+        if takes:
+            people.append(_person(player, tuple((take.start_time, take.motion) for take in takes)))
+    return people, lines
+
+
+def _person(player: dict, motions: tuple) -> Person:
+    number = int(player.get("number", -1))
+    team = player.get("team") if player.get("team") in TEAMS else "home"
+    position = str(player.get("position") or "")
+    keeper = "keeper" in position.lower() or (not position and number == 1)
+    return Person(player["id"], str(player.get("name") or ""), number, team, keeper, motions)
+
+
+def _between(ball: "BallPath | None", start: float, end: float) -> "BallPath | None":
+    """Its way from `start` to `end` s, gaps in it drawn straight; None where it is nowhere known."""
+    if ball is None:
+        return None
+    inside = (ball.times >= start - 1e-6) & (ball.times <= end + 1e-6)
+    known = inside & np.isfinite(ball.positions).all(axis=1)
+    if np.count_nonzero(known) < 2:
+        return None
+    part = slice(*(np.flatnonzero(known)[[0, -1]] + [0, 1]))
+    times = ball.times[part]
+    columns = [np.interp(times, ball.times[known], ball.positions[known, axis]) for axis in range(3)]
+    return replace(ball, times=times, positions=np.stack(columns, axis=1), measured=ball.measured[part])

@@ -1,0 +1,89 @@
+"""The settings of a match as what its two steps need: the command line that makes it, and what is shown of it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import bpy
+
+from ...beyond_mocap.errors import InputError
+from .. import preferences
+from ..settings import absolute
+from .load import Wanted
+from .settings import AUTO, BeyondMocapMatch, colours_of
+
+
+def command(scene: bpy.types.Scene) -> list[str]:
+    """The arguments of the verb `match`. InputError where something is missing."""
+    settings, match = scene.beyond_mocap, scene.beyond_mocap_match
+    out = ["match", *_asked(scene), "--out", folder_to_make(scene)]
+    if match.scheduler:
+        out += ["--scheduler", match.scheduler]
+    elif match.workers:
+        out += ["--workers", str(match.workers)]
+    cache = preferences.cache_folder(_library(settings))
+    return out + (["--cache", cache] if cache else [])
+
+
+def _asked(scene: bpy.types.Scene) -> list[str]:
+    """The arguments that decide what comes out."""
+    settings, match = scene.beyond_mocap, scene.beyond_mocap_match
+    if not match.tracking_file:
+        raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
+    out = ["--tracking", absolute(match.tracking_file), "--library", _library(settings)]
+    for option, path in (("--meta", match.metadata_file), ("--events", match.events_file)):
+        out += [option, absolute(path)] if path else []
+    out += ["--provider", match.provider] if match.provider != AUTO else []
+    out += ["--from", f"{match.start:g}"] + (["--to", f"{match.end:g}"] if match.end > match.start else [])
+    out += _players(match)
+    out += [] if match.solve_touches else ["--no-solve-touches"]
+    out += ["--fps", f"{settings.rate:g}", "--seed", str(settings.seed)]
+    return out + (["--unit", f"{settings.library_unit:g}"] if settings.library_unit else [])
+
+
+def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
+    """What is to be shown of a match's folder."""
+    settings, match = scene.beyond_mocap, scene.beyond_mocap_match
+    library = _library(settings)
+    ticked = tuple(player.feed_id for player in match.players if player.use)
+    ticked = ticked if len(ticked) < len(match.players) else ()
+    unit, build = settings.library_unit or None, preferences.for_build(library)
+    return Wanted(folder, match.start, match.end, ticked, colours_of(match), library, unit, build)
+
+
+def folder_to_make(scene: bpy.types.Scene) -> str:
+    """Where the match is kept: the chosen folder, or one beside the file that is saved, or else beside the tracking,
+    named after the stretch and, by a few digits, all else that is asked for."""
+    match = scene.beyond_mocap_match
+    if match.folder:
+        return absolute(match.folder)
+    tracking = Path(absolute(match.tracking_file))
+    home = Path(bpy.data.filepath).parent if bpy.data.is_saved else tracking.parent
+    if not os.access(home, os.W_OK):
+        home = Path(bpy.app.tempdir)
+    asked = hashlib.sha256("\0".join(_asked(scene)).encode()).hexdigest()[:6]
+    return str(home / f"{tracking.stem} {match.start:g}-{match.end:g} s {asked}")
+
+
+def folder_to_show(scene: bpy.types.Scene) -> str:
+    """The chosen folder; where none is, the one made last."""
+    match = scene.beyond_mocap_match
+    found = match.folder or match.made
+    if not found:
+        raise InputError("match", "no folder", "the folder of a made match", "press Make Match, or choose one")
+    return absolute(found)
+
+
+def _players(match: BeyondMocapMatch) -> list[str]:
+    ticked = [player.feed_id for player in match.players if player.use]
+    if match.players and not ticked:
+        raise InputError("match", "nobody is ticked", "players", "tick some in the list")
+    return ["--players", *ticked] if len(ticked) < len(match.players) else []
+
+
+def _library(settings) -> str:
+    if not settings.library_folder:
+        raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1")
+    return absolute(settings.library_folder)

@@ -1,0 +1,78 @@
+"""What a shown match has put into the file: a tree of collections, and objects with a mark. Shown again, or taken away,
+only these go; what the user has put beside them stays."""
+
+from __future__ import annotations
+
+import bpy
+
+from .people import TEAMS
+
+MARK = "beyond_mocap_match"
+PLAYER = "beyond_mocap_match_player"
+"""Custom property of a player's armature: his id."""
+
+ROOT = "Match"
+PARTS = {"home": "Match Home", "away": "Match Away", "referee": "Match Referees", "ball": "Match Ball",
+         "pitch": "Match Pitch", "cameras": "Match Cameras"}
+
+
+def mark(thing):
+    """Let an object or action be known as ours; returns it."""
+    thing[MARK] = True
+    return thing
+
+
+def root(scene: bpy.types.Scene) -> bpy.types.Collection | None:
+    """The collection "Match"; None where no match is shown."""
+    return next((one for one in scene.collection.children if one.get(MARK) == "root"), None)
+
+
+def part(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
+    """One of PARTS, made where it is missing, with the tree above it."""
+    whole = root(scene)
+    if whole is None:
+        whole = bpy.data.collections.new(ROOT)
+        whole[MARK] = "root"
+        scene.collection.children.link(whole)
+    found = next((one for one in whole.children if one.get(MARK) == name), None)
+    if found is None:
+        found = bpy.data.collections.new(PARTS[name])
+        found[MARK] = name
+        whole.children.link(found)
+    return found
+
+
+def include(layer: bpy.types.ViewLayer) -> None:
+    """Let a view layer have our collections again that somebody has excluded: only what is in it can be animated."""
+    for one in layer.layer_collection.children:
+        if one.collection.get(MARK):
+            for part in (one, *one.children):
+                part.exclude = False
+
+
+def bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The armatures that are shown, team by team."""
+    whole = root(scene)
+    found = [one for one in whole.children if one.get(MARK) in TEAMS] if whole is not None else []
+    return [thing for one in found for thing in one.objects if thing.type == "ARMATURE" and thing.get(MARK)]
+
+
+def clear(scene: bpy.types.Scene) -> None:
+    """Take away all that is ours, with the actions and data that nothing else uses; emptied collections go too."""
+    whole = root(scene)
+    if whole is None:
+        return
+    gone = [thing for thing in whole.all_objects if thing.get(MARK)]
+    actions = {_action(owner) for thing in gone for owner in (thing, thing.data)} - {None}
+    data = {thing.data for thing in gone} - {None}
+    bpy.data.batch_remove(gone)
+    bpy.data.batch_remove([one for one in data if not one.users])
+    bpy.data.batch_remove([one for one in actions if one.get(MARK) and one.users - one.use_fake_user <= 0])
+    for one in [*whole.children, whole]:
+        if not one.all_objects and not one.children:
+            bpy.data.collections.remove(one)
+
+
+def _action(owner) -> bpy.types.Action | None:
+    found = getattr(owner, "animation_data", None)
+    return found.action if found is not None else None

@@ -1,0 +1,109 @@
+"""What the panel "Match" shows: files, the minute that is wanted, who is in it, and what is shown of it. Saved with the
+file, known to undo."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import (
+    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty,
+)
+
+from ...beyond_mocap.files.providers import PROVIDERS
+from .kits import USUAL, linear, repaint, written
+
+FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
+AUTO = "AUTO"
+GIVEN = [(AUTO, "Guess", "By what the file looks like"), *((name, name.capitalize(), name) for name in PROVIDERS)]
+KINDS = (
+    ("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"),
+)
+FIRST = 60.0
+"""Seconds that are chosen when a match has been read."""
+
+
+def show_colours(match, _context) -> None:
+    """New colours are seen at once on those who are shown."""
+    if match.shown:
+        repaint(colours_of(match))
+
+
+class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
+    """One player of a match; `name` is what he is called."""
+
+    feed_id: StringProperty(name="ID", description="As the feed has it")
+    use: BoolProperty(name="Use", default=True, description="Make and show this player")
+    number: IntProperty(name="Number", default=-1, description="On the shirt; -1 where the feed has none")
+    team: EnumProperty(name="Team", items=KINDS, description="Whom he belongs to")
+    position: StringProperty(name="Position", description="Where he plays, where the feed tells")
+
+
+class BeyondMocapMatch(bpy.types.PropertyGroup):
+    """A match: what it is made from, what is wanted of it, and what is shown."""
+
+    tracking_file: StringProperty(name="Tracking", description="A provider's tracking of a whole match", **FILE)
+    metadata_file: StringProperty(
+        name="Metadata", description="The provider's second file; empty: one beside the first whose name fits", **FILE
+    )
+    events_file: StringProperty(
+        name="Events", description="What happened, from a provider or as CSV; empty: found in the ball's course", **FILE
+    )
+    provider: EnumProperty(name="Provider", items=GIVEN, description="Whose form the files have")
+    folder: StringProperty(
+        name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        description="Where everybody's motion is kept, some megabytes a match. Empty: one for each stretch and choice, "
+        "beside the saved file or the tracking",
+    )
+    start: FloatProperty(
+        name="From", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1, description="Second of the match's clock"
+    )
+    end: FloatProperty(
+        name="To", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1,
+        description="Second of the match's clock; 0: to its end",
+    )
+    first_frame: IntProperty(name="First Frame", default=1, description="Scene frame on which the stretch begins")
+    solve_touches: BoolProperty(
+        name="Solve Touches", default=True,
+        description="Find out of the ball's course who touches it and when, and have it go as physics has it",
+    )
+    workers: IntProperty(
+        name="Processes", default=0, min=0, max=256,
+        description="How many work at once, beside Blender; 0: one for each processor core",
+    )
+    scheduler: StringProperty(
+        name="Scheduler", description="Address of a Dask cluster that does the work instead, such as tcp://host:8786"
+    )
+    home_colour: FloatVectorProperty(
+        name="Home Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["home"]),
+        description="Colour of the home team's shirts", update=show_colours,
+    )
+    away_colour: FloatVectorProperty(
+        name="Away Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["away"]),
+        description="Colour of the away team's shirts", update=show_colours,
+    )
+    referee_colour: FloatVectorProperty(
+        name="Referees", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["referee"]),
+        description="Colour of the referees' shirts", update=show_colours,
+    )
+    players: CollectionProperty(type=BeyondMocapMatchPlayer, description="Who is in the match")
+    active: IntProperty(name="Player", min=0, description="The player that is chosen in the list")
+    read_of: StringProperty(options={"HIDDEN"}, description="The tracking file that the list was read from")
+    length_s: FloatProperty(options={"HIDDEN"}, description="Seconds that the match lasts on its clock")
+    report: StringProperty(options={"HIDDEN"}, description="Lines about the data: guessed, put right, who is there")
+    told: StringProperty(options={"HIDDEN"}, description="Lines about what was made")
+    made: StringProperty(options={"HIDDEN"}, description="The folder made last where none is chosen")
+    shown_start: FloatProperty(options={"HIDDEN"}, description="Second of the match's clock at the first shown frame")
+    shown_first: IntProperty(options={"HIDDEN"}, description="That frame")
+    shown: StringProperty(options={"HIDDEN"}, description="The folder that is shown; empty where none is")
+
+
+CLASSES = (BeyondMocapMatchPlayer, BeyondMocapMatch)
+
+
+def colours_of(match: BeyondMocapMatch) -> dict[str, str]:
+    """Team -> "#RRGGBB" of its shirts."""
+    return {team: written(getattr(match, f"{team}_colour")) for team in USUAL}
+
+
+def active_of(match: BeyondMocapMatch) -> BeyondMocapMatchPlayer | None:
+    """The player chosen in the list; None while it is empty."""
+    return match.players[match.active] if 0 <= match.active < len(match.players) else None
