@@ -193,10 +193,10 @@ def check_optical_markers():
 
 
 def check_a_match():
-    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    """From a saved file, so that paths are shown as they are kept."""
+    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"), load_ui=False)
     yield 1
     scene = bpy.context.scene
-    scene.render.fps, scene.beyond_mocap.library_folder = 30, str(sample() / "library")
     bpy.ops.beyond_mocap.read_match(filepath=str(sample() / "match" / "small" / "small.dat"))
     match = scene.beyond_mocap_match
     match.start, match.end, match.active = 6.0, 11.0, 3
