@@ -34,7 +34,7 @@ class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
         row.active = one.state != "REFUSED"
         names = row.split(factor=0.72, align=True)
         names.label(text=one.name.replace("_", " "), icon=STATES[one.state])
-        names.label(text=f"{one.confidence:.0%}")
+        names.label(text=f"{min(one.confidence, 0.99):.0%}")
         for what, icon in (("ACCEPT", "CHECKMARK"), ("REFUSE", "X")):
             button = row.operator("beyond_mocap.judge_proposal", text="", icon=icon, emboss=False)
             button.what, button.index = what, index
@@ -147,9 +147,11 @@ def draw_proposals(layout, group) -> None:
     layout.template_list("BEYOND_MOCAP_UL_proposals", "", group, "listed", group, "active", rows=4)
     if 0 <= group.active < len(group.listed):
         one = group.listed[group.active]
+        paragraph(layout, one.name.replace("_", " "), "BOOKMARKS")
         paragraph(layout, f"{one.source}: {one.why}" if one.why else one.source, "INFO")
-    row = layout.row(align=True)
-    row.operator("beyond_mocap.review_proposals", icon="EVENT_A")
+    column = layout.column(align=True)
+    column.operator("beyond_mocap.review_proposals", icon="EVENT_A")
+    row = column.row(align=True)
     row.operator("beyond_mocap.judge_proposal", text="All", icon="CHECKMARK").what = "ACCEPT_ALL"
     row.operator("beyond_mocap.judge_proposal", text="None", icon="X").what = "REFUSE_ALL"
 
