@@ -40,7 +40,7 @@ def extrapolated(state: dict) -> list[str]:
     """Lines on a half and a season, out of one state."""
     span = state["to_s"] - state["from_s"]
     players = sum(end - start for one in state["players"] for start, end in one["stretches_s"]) / span
-    cpu, alone = state["worker_cpu_s"], state["seconds"]["ball"] + state["seconds"]["words"]
+    cpu, alone = state["worker_cpu_s"], state["main_cpu_s"]["ball"] + state["main_cpu_s"]["words"]
     share = HALF / span * 22.0 / players
     lists = cpu["search"] * share / 2.0 + alone * HALF / span
     whole = sum(cpu.values()) * share + alone * HALF / span

@@ -6,6 +6,7 @@ import bpy
 from bpy.props import FloatProperty, StringProperty
 
 from ..beyond_mocap.errors import InputError
+from ..scene import channels
 from ..scene.match import ours
 from ..scene.match.baked import frame_of
 from ..scene.measure import frames_per_second
@@ -36,8 +37,9 @@ seconds"""
         """Set the frame, select the body."""
         scene, shown = context.scene, context.scene.beyond_mocap_match
         frame = round(frame_of(scene, shown.shown_start, shown.shown_first, self.seconds))
-        if not shown.shown_first <= frame <= scene.frame_end:
-            end = shown.shown_start + (scene.frame_end - shown.shown_first) / frames_per_second(scene)
+        last = _last(scene)
+        if not shown.shown_first <= frame <= last:
+            end = shown.shown_start + (last - shown.shown_first) / frames_per_second(scene)
             raise InputError("match", f"{self.seconds:g} s is not shown", f"{shown.shown_start:g} to {end:g} s",
                              "choose From and To around it and press Show Match")
         body = self.body(scene)
@@ -55,3 +57,9 @@ seconds"""
             raise InputError("match", f"{self.player} is not shown", f"one of {', '.join(map(str, known))}",
                              "tick the player and press Show Match")
         return known.get(self.player)
+
+
+def _last(scene: bpy.types.Scene) -> int:
+    """The last frame in which somebody moves; the scene's last one where nobody does."""
+    actions = [channels.playing(body)[0] for body in ours.bodies(scene)]
+    return round(max((action.frame_range[1] for action in actions if action is not None), default=scene.frame_end))

@@ -9,7 +9,6 @@ order goes on where it was, and comes to the same bits.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -32,7 +31,7 @@ from .order import MatchOrder, identity
 from .parts import parts_of
 from .pool import Workplace, check_place, ended
 from .roles import pushed_apart, roles_of, span_of
-from .state import MatchState, begun, row_of
+from .state import MatchState, begun, now, row_of
 from .thumbnails import thumbnails
 from .thumbnails import thumbnails
 from .words import MatchWords, words_of
@@ -74,24 +73,27 @@ def make_match(
     and the result say why. InputError for what is wrong with the order, its files or its cluster; Cancelled. What was
     done till then is kept and found again by the next run.
     """
+    from threadpoolctl import threadpool_limits
+
     report = progress or (lambda fraction, text: None)
     check_folder(order.out)
     place = Workplace(order.workers, order.scheduler)
     check_place(place)
-    clock = time.perf_counter()
+    clock = now()
     report(0.0, f"Reading {order.tracking.name}")
     match = read_match(order.tracking, order.meta, order.provider or None)
     span = span_of(match, order)
-    read = time.perf_counter()
+    read = now()
     library, source = _library(order, _part(report, "library"), cancelled)
     known = identity(order, source.key)
     with opened(order.out, known) as folder:
         state = begun(folder, order, known, match, span)
-        state.seconds["read"] = round(read - clock, 3)
+        state.seconds["read"] = round(read[0] - clock[0], 3)
         state.took("library", read)
         job = stages.Job(order, folder, state, source, library, place, report, cancelled)
         try:
-            _make(job, match, span, report)
+            with threadpool_limits(limits=1):  # more threads add up in another order
+                _make(job, match, span, report)
         except BeyondMocapError as error:
             if state.players:  # else nothing was begun
                 state.tell(status="cancelled" if isinstance(error, Cancelled) else "failed", reason=str(error))
@@ -117,11 +119,11 @@ def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, L
 
 def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> None:
     """All stages behind the reading."""
-    state, begin = job.state, time.perf_counter()
+    state, begin = job.state, now()
     roles = roles_of(match, job.order, span)
     solved = _solved(job, match, span, _part(report, "ball"))
     state.took("ball", begin)
-    clock = time.perf_counter()
+    clock = now()
     words = _words(job, match, solved)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
@@ -130,14 +132,14 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     state.players = {part.role.player.id: row_of(part) for part in parts}
     state.took("words", clock)
     state.write()
-    clock = time.perf_counter()
+    clock = now()
     edits = stages.search(job.told(_part(report, "search")), parts)
     state.took("search", clock)
-    clock = time.perf_counter()
+    clock = now()
     crowd = stages.keep_apart(job.told(_part(report, "crowd")), edits, span) if edits else {}
     ball = _ball(job, match, solved, span, crowd)
     state.took("crowd", clock)
-    clock = time.perf_counter()
+    clock = now()
     stages.finish(job.told(_part(report, "figures")), parts, edits, crowd, ball)
     state.took("figures", clock)
     state.took("total", begin)

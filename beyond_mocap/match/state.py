@@ -25,6 +25,7 @@ class MatchState:
     told: dict
     players: dict[str, dict] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    own_seconds: dict[str, float] = field(default_factory=dict)
     worker_memory: float = 0.0
     worker_seconds: dict[str, float] = field(default_factory=dict)
     _written: float = 0.0
@@ -50,7 +51,10 @@ class MatchState:
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
         memory = {"main": round(peak_memory(), 1), "worker": round(self.worker_memory, 1)}
         spent = {stage: round(seconds, 3) for stage, seconds in self.worker_seconds.items()}
-        told = {**self.told, "players": rows, "seconds": self.seconds, "worker_cpu_s": spent, "peak_memory_mb": memory}
+        told = {
+            **self.told, "players": rows, "seconds": self.seconds, "main_cpu_s": self.own_seconds,
+            "worker_cpu_s": spent, "peak_memory_mb": memory,
+        }  # fmt: skip
         self.folder.tell(told)
         self._written = time.monotonic()
 
@@ -63,14 +67,19 @@ class MatchState:
 
         return told
 
-    def took(self, stage: str, begun: float) -> None:
-        """A stage that began at `begun` (time.perf_counter) is done."""
-        self.seconds[stage] = round(time.perf_counter() - begun, 3)
+    def took(self, stage: str, begun: tuple[float, float]) -> None:
+        """A stage that began at `begun` (`now`) is done."""
+        self.seconds[stage], self.own_seconds[stage] = (round(b - a, 3) for a, b in zip(begun, now()))
 
     @property
     def failed(self) -> list[dict]:
         """The rows of those who could not be made."""
         return [row for row in self.players.values() if row["status"] == "failed"]
+
+
+def now() -> tuple[float, float]:
+    """Seconds of the clock, and of this process's time on processors."""
+    return time.perf_counter(), time.process_time()
 
 
 def begun(

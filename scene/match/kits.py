@@ -19,6 +19,9 @@ KEEPERS = ("#F2C200", "#1FA34A", "#F07A13", "#8A3FB5")
 """Shirts to choose a keeper's from: yellow, green, orange, violet."""
 
 WHITE, DARK = (0.8, 0.8, 0.8), (0.012, 0.016, 0.03)
+OWN = ("shirt", "shorts", "socks", "number")
+"""Parts whose colour is the kit's."""
+
 BRIGHT = 0.35  # luminance from which a shirt takes a dark number and dark shorts
 
 
@@ -77,12 +80,26 @@ def luminance(rgb) -> float:
     return float(np.dot(rgb, (0.2126, 0.7152, 0.0722)))
 
 
+def repaint(colours: dict[str, str]) -> None:
+    """Let whoever is dressed already wear these colours of shirts: team -> "#RRGGBB"."""
+    for team in USUAL:
+        for keeper in (False, True):
+            kit = kit_of(Person("", "", -1, team, keeper, ()), colours)
+            for part in OWN:
+                if _name(kit, part) in bpy.data.materials:
+                    cloth(kit, part)
+
+
+def _name(kit: Kit, part: str) -> str:
+    return f"Match {kit.name} {part}"
+
+
 def cloth(kit: Kit, part: str) -> bpy.types.Material:
     """The material of one part of a kit ("shirt", "number", or one of the body's), in the kit's present colour."""
-    own = {"shirt": kit.shirt, "shorts": kit.shorts, "socks": kit.socks, "number": kit.ink}
+    own = dict(zip(OWN, (kit.shirt, kit.shorts, kit.socks, kit.ink)))
     if part not in own:
         return colour(part.capitalize(), LOOKS[part])
-    material = colour(f"Match {kit.name} {part}", own[part])
+    material = colour(_name(kit, part), own[part])
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = (*own[part], 1.0)
     material.diffuse_color = (*(channel**0.6 for channel in own[part]), 1.0)

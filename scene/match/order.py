@@ -11,10 +11,8 @@ import bpy
 from ...beyond_mocap.errors import InputError
 from .. import preferences
 from ..settings import absolute
-from .kits import written
 from .load import Wanted
-from .people import TEAMS
-from .settings import AUTO, BeyondMocapMatch
+from .settings import AUTO, BeyondMocapMatch, colours_of
 
 
 def command(scene: bpy.types.Scene) -> list[str]:
@@ -49,11 +47,10 @@ def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
     """What is to be shown of a match's folder."""
     settings, match = scene.beyond_mocap, scene.beyond_mocap_match
     library = _library(settings)
-    colours = {team: written(getattr(match, f"{team}_colour")) for team in TEAMS}
     ticked = tuple(player.feed_id for player in match.players if player.use)
     ticked = ticked if len(ticked) < len(match.players) else ()
     unit, build = settings.library_unit or None, preferences.for_build(library)
-    return Wanted(folder, match.start, match.end, ticked, colours, library, unit, build)
+    return Wanted(folder, match.start, match.end, ticked, colours_of(match), library, unit, build)
 
 
 def folder_to_make(scene: bpy.types.Scene) -> str:

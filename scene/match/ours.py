@@ -42,6 +42,14 @@ def part(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     return found
 
 
+def include(layer: bpy.types.ViewLayer) -> None:
+    """Let a view layer have our collections again that somebody has excluded: only what is in it can be animated."""
+    for one in layer.layer_collection.children:
+        if one.collection.get(MARK):
+            for part in (one, *one.children):
+                part.exclude = False
+
+
 def bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The armatures that are shown, team by team."""
     whole = root(scene)

@@ -9,7 +9,7 @@ from bpy.props import (
 )
 
 from ...beyond_mocap.files.providers import PROVIDERS
-from .kits import USUAL, linear
+from .kits import USUAL, linear, repaint, written
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
@@ -19,6 +19,12 @@ KINDS = (
 )
 FIRST = 60.0
 """Seconds that are chosen when a match has been read."""
+
+
+def show_colours(match, _context) -> None:
+    """New colours are seen at once on those who are shown."""
+    if match.shown:
+        repaint(colours_of(match))
 
 
 class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
@@ -68,15 +74,15 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     )
     home_colour: FloatVectorProperty(
         name="Home Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["home"]),
-        description="Colour of the home team's shirts",
+        description="Colour of the home team's shirts", update=show_colours,
     )
     away_colour: FloatVectorProperty(
         name="Away Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["away"]),
-        description="Colour of the away team's shirts",
+        description="Colour of the away team's shirts", update=show_colours,
     )
     referee_colour: FloatVectorProperty(
         name="Referees", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["referee"]),
-        description="Colour of the referees' shirts",
+        description="Colour of the referees' shirts", update=show_colours,
     )
     players: CollectionProperty(type=BeyondMocapMatchPlayer, description="Who is in the match")
     active: IntProperty(name="Player", min=0, description="The player that is chosen in the list")
@@ -91,6 +97,11 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
 
 
 CLASSES = (BeyondMocapMatchPlayer, BeyondMocapMatch)
+
+
+def colours_of(match: BeyondMocapMatch) -> dict[str, str]:
+    """Team -> "#RRGGBB" of its shirts."""
+    return {team: written(getattr(match, f"{team}_colour")) for team in USUAL}
 
 
 def active_of(match: BeyondMocapMatch) -> BeyondMocapMatchPlayer | None:

@@ -23,6 +23,7 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
     scene, took = context.scene, {}
     looked = scene.camera is None or bool(scene.camera.get(ours.MARK))
     ours.clear(scene)
+    ours.include(context.view_layer)
     last = int(np.floor(baked.frame_of(scene, scenery.start, first, scenery.end) + 1e-4))
     with _clock(took, "pitch"):
         _pitch(scene, scenery)

@@ -330,17 +330,6 @@ def a_study(places):
     return {"directory": f"{folder}/"}
 
 
-def a_marked_player():
-    """Two seconds of a match in which nobody plays are shown."""
-    ours = importlib.import_module(f"{EXTENSION}.scene.match.ours")
-    scene = bpy.context.scene
-    scene.beyond_mocap_match.shown_first, scene.frame_end = scene.frame_current, scene.frame_current + 60
-    body = ours.mark(bpy.data.objects.new("Somebody", bpy.data.armatures.new("Somebody")))
-    body[ours.PLAYER] = "home_1"
-    ours.part(scene, "home").objects.link(body)
-    bpy.context.view_layer.update()
-
-
 def moved(folder):
     """A second copy of a folder, beside it."""
     other = folder.with_name(f"{folder.name} moved")
@@ -408,7 +397,7 @@ ROWS = {
     "make_match": Row("imported", prepare=a_match),
     "map_bones": Row("rig", prepare=unmapped),
     "match_camera": Row("imported", lambda places: {"which": "EYES", "player": "home_7"}, a_shown_match),
-    "match_second": Row("imported", lambda places: {"seconds": 1.0, "player": "home_1"}, a_marked_player),
+    "match_second": Row("imported", lambda places: {"seconds": 3.0, "player": "home_7"}, a_shown_match),
     "mirror": Row("accepted"),
     "mirror_side": Row("imported", prepare=pick_a_moment),
     "move_moment": Row("imported", lambda places: {"frames": 5}, pick_a_moment),

@@ -50,9 +50,9 @@ def scenery(room, core, walk):
     return room("people").Scenery(START, START + 6.0, 100.0, 64.0, colours, people, ball)
 
 
-def shown(room, scenery, first=11):
+def shown(room, scenery, first=11, fps=(FPS, 1.0)):
     scene = bpy.context.scene
-    scene.render.fps = FPS
+    scene.render.fps, scene.render.fps_base = fps
     room("show").show(bpy.context, scenery, first)
     return scene
 
@@ -62,19 +62,26 @@ def at(thing, frame):
     return thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
 
 
-def test_everybody_is_where_he_is_in_the_match(room, scenery):
-    scene = shown(room, scenery)
+@pytest.mark.parametrize("fps", [(30, 1.0), (24, 1.001)])
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+def test_everybody_is_where_he_is_in_the_match(room, scenery, fps, scale):
+    bpy.context.scene.unit_settings.scale_length = scale
+    scene = shown(room, scenery, fps=fps)
+    rate = fps[0] / fps[1]
     bodies = {thing[room("ours").PLAYER]: thing for thing in room("ours").bodies(scene)}
     assert set(bodies) == {"h1", "h10", "a7", "r"}
     assert bodies["h10"].name == "Home 10 Dan"
     for person in scenery.people:
         begins, motion = person.motions[0]
-        frame = 11 + round((begins - START) * FPS) + 60
+        frame = round(11 + (begins - START + 2.0) * rate)
+        played = (frame - 11) / rate - (begins - START)  # seconds
+        place = [np.interp(played * FPS, np.arange(len(motion)), axis) for axis in motion.root_positions.T]
         hips = at(bodies[person.id], frame).pose.bones[0]
-        assert np.allclose(hips.matrix.translation, motion.root_positions[60], atol=2e-4)
+        assert np.allclose(np.array(hips.matrix.translation) * scale, place, atol=2e-3)
     ball = room("show").ball_shown(scene)
-    assert np.allclose(at(ball, 11 + 30).matrix_world.translation, (10.0, 0.0, 0.11), atol=1e-3)
-    assert scene.frame_end >= 11 + 5.5 * FPS
+    there = np.array(at(ball, 35).matrix_world.translation) * scale
+    assert np.allclose(there, (10.0 * 24 / rate, 0.0, 0.11), atol=1e-3)
+    assert scene.frame_end >= int(11 + 5.5 * rate)
 
 
 def test_who_is_away_is_hidden(room, scenery):
@@ -160,6 +167,16 @@ def test_shown_again_it_takes_its_own_place_and_leaves_the_users_things(room, sc
     room("ours").clear(scene)
     assert own.name in scene.objects and not room("ours").bodies(scene)
     assert len(bpy.data.armatures) == 0 and len(bpy.data.actions) == 0
+
+
+def test_shown_again_where_its_collections_were_excluded(room, scenery):
+    scene = shown(room, scenery)
+    room("ours").part(scene, "home").objects.link(bpy.data.objects.new("Mine", None))
+    layers = bpy.context.view_layer.layer_collection.children
+    layers["Match"].exclude = True
+    shown(room, scenery)
+    body = room("ours").bodies(scene)[0]
+    assert body.visible_get() and body.animation_data.action_slot is not None
 
 
 def test_the_stands_camera_keeps_the_ball_in_its_picture(room, scenery):

@@ -192,6 +192,25 @@ def check_optical_markers():
     yield from picture_of_view("markers")
 
 
+def check_a_match():
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    scene = bpy.context.scene
+    scene.render.fps, scene.beyond_mocap.library_folder = 30, str(sample() / "library")
+    bpy.ops.beyond_mocap.read_match(filepath=str(sample() / "match" / "small" / "small.dat"))
+    match = scene.beyond_mocap_match
+    match.start, match.end, match.active = 6.0, 11.0, 3
+    assert bpy.ops.beyond_mocap.make_match() == {"FINISHED"}
+    panel, = (cls for cls in panels("VIEW_3D") if "PT_match" in cls.__name__)
+    area = window.area("VIEW_3D")
+    solo([panel], "VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    fold = unfold(panel)
+    yield 1
+    yield from picture_of_tab("panel-match", area)
+    fold()
+
+
 def check_the_preferences():
     before = set(bpy.context.window_manager.windows.values())
     bpy.ops.screen.userpref_show()
