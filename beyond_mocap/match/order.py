@@ -27,7 +27,7 @@ class MatchOrder:
     of every random choice. nearest: whether words that the library lacks give way to the nearest it has. solve_touches:
     whether the ball is solved. annotations: folder with a text for players (ID.txt), instead of automatic words.
     bvh: whether every player is written as BVH too; figures: whether reports, provenance and the page are made. window,
-    overlap: seconds that a piece of the search has, and that it shares with the next. variety: as a plan has it. workers,
+    overlap: seconds that a piece of the search has, and shares with the next. variety: as a plan has it. workers,
     scheduler: `pool.Workplace`.
     InputError for numbers outside their limits and a span that ends before it begins.
     """

@@ -19,10 +19,10 @@ from ..synthesis.offer import SLOT
 from .cut_plan import cut_plan
 from .player_edit import kept
 
-WINDOW = 60.0
+WINDOW = 300.0
 """Seconds of a window's own part."""
 
-OVERLAP = 8.0
+OVERLAP = 12.0
 """Seconds that two neighbours share: two thirds before the edge between them, which the later one needs to find onto
 the way of who comes from further back, and one third behind it."""
 
