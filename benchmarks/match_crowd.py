@@ -66,8 +66,8 @@ def what_is_changed(corrections: list[Correction], takes: list[Take], firsts: li
     root, arms = np.linalg.norm(curves[:, ROOT], axis=1), np.linalg.norm(curves[:, ARMS].reshape(-1, 2, 3), axis=2)
     knots = sum(len(own.knots) for own in corrections)
     return (
-        f"changed {100 * curves.any(axis=1).mean():.1f}% of the time: roots by {100 * root.max():.1f} cm at most, arms by "
-        f"{np.degrees(arms.max()):.0f} degrees; {knots} knots, {knots * 32 / 1024:.0f} KiB"
+        f"changed {100 * curves.any(axis=1).mean():.1f}% of the time: roots by {100 * root.max():.1f} cm at most, arms "
+        f"by {np.degrees(arms.max()):.0f} degrees; {knots} knots, {knots * 32 / 1024:.0f} KiB"
     )
 
 

@@ -19,6 +19,7 @@ from ..motion.track import Track
 from ..plan import METHODS, Pin, Plan, SolvedCourse, Touched
 from ..polish.crowd.correction import Correction
 from .content import content
+from .differences import packed, packed_places, places, unpacked
 from .json_values import check_names, entries, number, numbers, object_of, shown, text, truth, whole_number
 from .plain_npz import HEADER, header_text, plain_arrays
 from .whole import atomic_write
@@ -32,7 +33,6 @@ UNPACKED = 1_000_000_000
 _KIND = "a player of a match (ID.take.npz)"
 _PAGE = "docs/match.md"
 _TYPES = tuple(np.dtype(name) for name in ("<f8", "<i8", "<i4", "<i2", "|i1", "|u1"))
-_UNKNOWN = -(2**31)
 
 _LONGEST = 24 * 3600.0
 """Seconds of a stretch above which it is none of ours."""
@@ -95,25 +95,11 @@ def _stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
     flags = track.ball_height_known + 2 * track.filled + 4 * track.outlier
     arrays = {name: getattr(stretch.edit, name).astype(kind) for name, kind in _RUN_TYPES.items()}
     arrays |= {"flags": flags.astype(np.uint8)}
-    arrays |= {"times": _packed(np.round(track.times * 1e6)[:, None])}
-    arrays |= {"positions": _packed(_whole(track.positions)), "ball": _packed(_whole(track.ball))}
+    arrays |= {"times": packed(np.round(track.times * 1e6)[:, None])}
+    arrays |= {"positions": packed_places(track.positions), "ball": packed_places(track.ball)}
     if course is not None:
-        arrays |= {"course": _packed(_whole(course.ball)), "course_filled": course.filled.astype(np.uint8)}
+        arrays |= {"course": packed_places(course.ball), "course_filled": course.filled.astype(np.uint8)}
     return arrays
-
-
-def _whole(places: np.ndarray) -> np.ndarray:
-    """Millimetres, _UNKNOWN where there is none."""
-    return np.where(np.isnan(places), _UNKNOWN, np.round(np.nan_to_num(places) * 1000.0))
-
-
-def _packed(values: np.ndarray) -> np.ndarray:
-    """Whole numbers (N, k) as differences of differences, in the smallest type that holds them."""
-    once = np.diff(values.astype(np.int64), axis=0, prepend=0)
-    twice = once.copy()
-    twice[2:] = np.diff(once[1:], axis=0)
-    most = np.abs(twice).max(initial=0)
-    return twice.astype(next(kind for kind in ("<i2", "<i4", "<i8") if most <= np.iinfo(kind).max))
 
 
 # -- reading
@@ -199,7 +185,8 @@ def _plan(row, where: str, array) -> Plan:
     pins = [_pin(value, f"{where}: pins") for value in entries(row["pins"], f"{where}: pins")]
     return Plan(
         track=track, timeline=Timeline(tuple(spans), tuple(keys)), pins=tuple(pins),
-        solved=_course(row, where, array, float(first), float(last)), **_settings(row["settings"], f"{where}: settings"),
+        solved=_course(row, where, array, float(first), float(last)),
+        **_settings(row["settings"], f"{where}: settings"),
     )  # fmt: skip
 
 
@@ -230,15 +217,15 @@ def _texts(value, where: str) -> tuple:
 
 
 def _track(row, where: str, array) -> Track:
-    times = _unpacked(array("times", 1), f"{where}: times")[:, 0] / 1e6
+    times = unpacked(array("times", 1), f"{where}: times")[:, 0] / 1e6
     if len(times) < 2 or np.any(np.diff(times) <= 0.0) or times[-1] - times[0] > _LONGEST:
         raise InputError(f"{where}: times", f"{len(times)} of them", "two or more that rise, within a day")
-    positions = _places(array("positions", 2, len(times)), f"{where}: positions")
+    positions = places(array("positions", 2, len(times)), f"{where}: positions")
     if np.isnan(positions).any():
         raise InputError(f"{where}: positions", "one that is not known", "a cleaned track")
     flags = array("flags", None, len(times)).astype(int)
     known, filled, outlier = ((flags & bit) > 0 for bit in (1, 2, 4))
-    ball = _places(array("ball", 3, len(times)), f"{where}: ball")
+    ball = places(array("ball", 3, len(times)), f"{where}: ball")
     return Track(times, positions, ball, known, filled, outlier, text(row["name"], f"{where}: name"))
 
 
@@ -251,7 +238,7 @@ def _course(row, where: str, array, first: float, last: float) -> SolvedCourse |
         mine = None if mine is None else truth(mine, where)
         touches.append(Touched(number(time, where), mine, text(part, where), text(kind, where)))
     times = course_times(first, last, touches)
-    ball = _places(array("course", 3, len(times)), f"{where}: course")
+    ball = places(array("course", 3, len(times)), f"{where}: course")
     return SolvedCourse(times, ball, array("course_filled", None, len(times)) > 0, tuple(touches))
 
 
@@ -277,18 +264,3 @@ def _named_key(value, clips: int, where: str) -> NamedKey:
         raise InputError(f"{where}: placed", f"clip {shown(clip)}", f"0 to {clips - 1}")
     times = (number(each, f"{where}: placed") for each in (frame, start, end))
     return NamedKey(number(time, where), whole_number(clip, where), *times, _words(words, where))
-
-
-def _places(packed: np.ndarray, where: str) -> np.ndarray:
-    """Metres, NaN where they are not known."""
-    whole = _unpacked(packed, where)
-    return np.where(whole == _UNKNOWN, np.nan, whole / 1000.0)
-
-
-def _unpacked(packed: np.ndarray, where: str) -> np.ndarray:
-    """What `_packed` has packed, as floating point numbers."""
-    if packed.dtype.kind != "i":
-        raise InputError(where, f"values of type {packed.dtype}", "whole numbers")
-    once = packed.astype(np.int64)
-    once[1:] = np.cumsum(once[1:], axis=0)
-    return np.cumsum(once, axis=0).astype(float)

@@ -20,6 +20,9 @@ from .match_ball import led_by
 from .named_edit import part
 from .player_edit import PlayerEdit, Stretch
 
+LONGEST = 60.0
+"""Seconds of a window at most: everybody's motion in it is in memory at once."""
+
 BEYOND = 4.0
 """Seconds on either side of a window in which everybody is looked at too."""
 

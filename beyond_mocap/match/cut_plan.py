@@ -51,8 +51,8 @@ def cut_track(track: Track, start: float, end: float) -> Track:
 
 
 def _between(known: np.ndarray, values: np.ndarray, times: np.ndarray, before: np.ndarray, after: np.ndarray):
-    """(K, n): values (N, n) at known times (N,) on the line between the samples `before` (K,) and `after` (K,); the very
-    values where there is a sample."""
+    """(K, n): values (N, n) at known times (N,) on the line between the samples `before` (K,) and `after` (K,); the
+    very values where there is a sample."""
     step = known[after] - known[before]
     share = np.where(step > 0.0, (times - known[before]) / np.where(step > 0.0, step, 1.0), 0.0)[:, None]
     return np.where(share == 0.0, values[before], values[before] * (1.0 - share) + values[after] * share)

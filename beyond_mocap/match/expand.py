@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
+from ..library.chosen import with_chosen_gaits
 from ..library.library import FPS, Library
 from ..library.made import MADE_FOLDER
 from ..plan import Plan
@@ -28,7 +29,6 @@ from .joined_takes import one_take, own_part
 from .library_clips import bound
 from .named_edit import part
 from .player_edit import PlayerEdit, Stretch
-from .searched import searched_library
 from .units import frame_count, layout_edges
 
 AROUND = 4.0
@@ -72,8 +72,8 @@ def expanded(
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """Frames low .. high of a stretch at the output's rate, laid out with those around them as `take`, whose first frame
-    is frame `first` of the stretch. standing: (T, 2) bool of its feet, heel or toe."""
+    """Frames low .. high of a stretch at the output's rate, laid out with those around them as `take`, whose first
+    frame is frame `first` of the stretch. standing: (T, 2) bool of its feet, heel or toe."""
 
     low: int
     high: int
@@ -87,7 +87,8 @@ class _Layout:
 
     def __init__(self, library: Library, window: float, stretch: Stretch):
         self.plan, self.edit = stretch.plan, stretch.edit
-        self.library = searched_library(library, self.plan) if any(path.startswith(MADE_FOLDER) for path, _ in self.edit.clips) else library
+        made = any(path.startswith(MADE_FOLDER) for path, _ in self.edit.clips)
+        self.library = with_chosen_gaits(library.extended if made else library, dict(self.plan.gaits))
         self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
         self.count = frame_count(self.plan, self.fps)
         self.edges = layout_edges(self.begin, self.count, self.fps, window)

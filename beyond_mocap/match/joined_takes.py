@@ -17,8 +17,8 @@ _SAME_TIME = 1e-6
 
 
 def own_part(take: Take, first: int, end: int) -> Take:
-    """Frames first .. end of a take, with the key moments, pins, touches and warnings of that time. It has no edit list,
-    and nothing that would be needed to edit it."""
+    """Frames first .. end of a take, with the key moments, pins, touches and warnings of that time. It has no edit
+    list, and nothing that would be needed to edit it."""
     inside = slice(first, end)
     begin, fps = take.start_time + first / take.motion.fps, take.motion.fps
     until = begin + (end - first) / fps

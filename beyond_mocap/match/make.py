@@ -73,6 +73,8 @@ def make_match(
     and the result say why. InputError for what is wrong with the order, its files or its cluster; Cancelled. What was
     done till then is kept and found again by the next run.
     """
+    from threadpoolctl import threadpool_limits
+
     report = progress or (lambda fraction, text: None)
     check_folder(order.out)
     place = Workplace(order.workers, order.scheduler)
@@ -90,7 +92,8 @@ def make_match(
         state.took("library", read)
         job = stages.Job(order, folder, state, source, library, place, report, cancelled)
         try:
-            _make(job, match, span, report)
+            with threadpool_limits(limits=1):  # more threads add up in another order
+                _make(job, match, span, report)
         except BeyondMocapError as error:
             if state.players:  # else nothing was begun
                 state.tell(status="cancelled" if isinstance(error, Cancelled) else "failed", reason=str(error))

@@ -21,8 +21,8 @@ ClipName = tuple[str, bool]
 
 @dataclass(frozen=True)
 class NamedKey:
-    """A key moment of the timeline, asked for at `time` s, is served by a key moment of a clip: clip of the table; frame,
-    start and end in the clip's own rate; words that it carries there."""
+    """A key moment of the timeline, asked for at `time` s, is served by a key moment of a clip: clip of the table;
+    frame, start and end in the clip's own rate; words that it carries there."""
 
     time: float
     clip: int

@@ -8,6 +8,7 @@ from pathlib import Path
 from .. import __version__
 from ..errors import InputError
 from .content_digest import digest_of, digest_of_file
+from .units import OVERLAP, WINDOW
 
 FORM = 1
 """Raised whenever the same order would give other results, so that kept ones are not taken for them."""
@@ -26,7 +27,7 @@ class MatchOrder:
     of every random choice. nearest: whether words that the library lacks give way to the nearest it has. solve_touches:
     whether the ball is solved. annotations: folder with a text for players (ID.txt), instead of automatic words.
     bvh: whether every player is written as BVH too; figures: whether reports, provenance and the page are made. window,
-    overlap: seconds that a piece of the search has, and on either side of it. variety: as a plan has it. workers,
+    overlap: seconds that a piece of the search has, and shares with the next. variety: as a plan has it. workers,
     scheduler: `pool.Workplace`.
     InputError for numbers outside their limits and a span that ends before it begins.
     """
@@ -50,8 +51,8 @@ class MatchOrder:
     annotations: Path | None = None
     bvh: bool = False
     figures: bool = True
-    window: float = 60.0
-    overlap: float = 4.0
+    window: float = WINDOW
+    overlap: float = OVERLAP
     variety: float = 0.6
     workers: int = 1
     scheduler: str = ""

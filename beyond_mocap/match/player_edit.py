@@ -26,8 +26,8 @@ _MOST_STEPS = 10_000_000
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """A player's time on the pitch without a break. plan: his order, as `kept`. edit: at the library's rate, from the
-    track's first time on. warnings: what the library lacks of what is asked; short: (start, end) s that were searched in
-    a hurry."""
+    track's first time on. warnings: what the library lacks of what is asked; short: (start, end) s that were searched
+    in a hurry."""
 
     plan: Plan
     edit: NamedEdit

@@ -19,7 +19,7 @@ from ..library.library import Library
 from ..polish.crowd.correction import joined
 from ..take import BallPath
 from .content_digest import digest_of
-from .crowd_window import BEYOND, REACH, CrowdPart, cut_edit, in_turn
+from .crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn
 from .folder import MatchFolder
 from .kept_crowd import keep_parts, kept_parts
 from .kept_pieces import keep_piece, kept_piece
@@ -95,8 +95,9 @@ class _Search:
             if isinstance(result, Failed):
                 self._fail(player, result.reason)
                 continue
-            keep_piece(job.folder.place(SEARCH, name), result)
-            self._take(player, result)
+            path = job.folder.place(SEARCH, name)
+            keep_piece(path, result)
+            self._take(player, kept_piece(path) or result)  # as a run that finds it would have it
         job.folder.forget(SEARCH, self._names)
         return {player: self._edits[player] for player in self._parts if player in self._edits}
 
@@ -150,9 +151,9 @@ def _bare(plan):
 
 
 def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str, CrowdPart]:
-    """What the whole span says of each player, by id: windows of everybody on the grid of the search."""
+    """What the whole span says of each player, by id: windows of everybody on the match's clock."""
     players, names = list(edits), {}
-    windows = _windows(span, job.order.window, job.order.fps)
+    windows = _windows(span, min(job.order.window, LONGEST), job.order.fps)
     found: dict[int, tuple[CrowdPart, ...]] = {}
 
     def missing():

@@ -19,12 +19,12 @@ from ..synthesis.offer import SLOT
 from .cut_plan import cut_plan
 from .player_edit import kept
 
-WINDOW = 60.0
+WINDOW = 300.0
 """Seconds of a window's own part."""
 
-OVERLAP = 8.0
-"""Seconds that two neighbours share: two thirds before the edge between them, which the later one needs to find onto the
-way of who comes from further back, and one third behind it."""
+OVERLAP = 12.0
+"""Seconds that two neighbours share: two thirds before the edge between them, which the later one needs to find onto
+the way of who comes from further back, and one third behind it."""
 
 RUN_IN = 2.0 / 3.0
 """Share of the overlap that lies before the edge."""
@@ -38,7 +38,8 @@ class Unit:
     """One player's window of work, with all that is needed to search it.
 
     player: his id. stretch: which of his stretches on the pitch. number: of the window within the stretch. start, end:
-    s on the match's clock of the part that is its own. plan: his order of that and of the overlaps around it, as `kept`. first: frame of the plan's first time, at the library's rate from the stretch's first time on. own: (first,
+    s on the match's clock of the part that is its own. plan: his order of that and of the overlaps around it, as
+    `kept`. first: frame of the plan's first time, at the library's rate from the stretch's first time on. own: (first,
     end) frames of its own part, counted in the same way.
     """
 

@@ -19,13 +19,16 @@ APART = 0.3
 BESIDE = 0.3
 """How much somebody near who has the next lag counts against one who has the same."""
 
+SWEEPS = 6
+"""Times that everybody chooses, knowing what all others have chosen."""
+
 
 def lags(positions: np.ndarray) -> np.ndarray:
     """(P,) s: the lag that each player is to like (`Plan.lag`), so that those who are much near each other have others.
 
     positions (P, N, 2) m at evenly spaced times, NaN where somebody is not there; a sample or a few a second will do.
     There are PERIOD / APART lags. Whoever is near others most chooses first, and each takes the lag which, with those
-    beside it, those have near whom he is least.
+    beside it, those have near whom he is least; then they choose again.
     """
     count = round(PERIOD / APART)
     near = np.zeros((len(positions), len(positions)))
@@ -33,7 +36,9 @@ def lags(positions: np.ndarray) -> np.ndarray:
         near[one] = (np.linalg.norm(positions - place, axis=-1) < NEAR).mean(axis=-1)
     np.fill_diagonal(near, 0.0)
     chosen = np.full(len(positions), -1)
-    for one in np.argsort(-near.sum(axis=1), kind="stable"):
+    order = np.argsort(-near.sum(axis=1), kind="stable")
+    for one in np.tile(order, SWEEPS):
+        chosen[one] = -1
         taken = np.array([near[one, chosen == number].sum() for number in range(count)])
         chosen[one] = int(np.argmin(taken + BESIDE * (np.roll(taken, 1) + np.roll(taken, -1))))
     return chosen * APART

@@ -84,6 +84,7 @@ class PathCosts:
         self.wanted_offset = wanted_offset(wanted.track)
         self._rate_cost = (weights.rate * np.abs(RATES - 1.0)).astype(np.float32)
         self._kept: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
+        self._asked: dict[tuple[int, int], tuple[float, float]] = {}
 
     def inside(self, frame: np.ndarray) -> np.ndarray:
         """Nearest whole library frames."""
@@ -91,10 +92,13 @@ class PathCosts:
 
     def asked(self, first: int, end: int) -> tuple[float, float]:
         """Mean speed in m/s and change of direction in radians that the track asks from frame first to end."""
-        track = self.wanted.track
-        last = min(end, len(track.times) - 1)
-        speed = float(track.speed[first : last + 1].mean())
-        return speed, float(track.direction[last] - track.direction[first]) * min(1.0, speed)
+        if (first, end) not in self._asked:
+            track = self.wanted.track
+            last = min(end, len(track.times) - 1)
+            speed = float(track.speed[first : last + 1].mean())
+            turn = float(track.direction[last] - track.direction[first]) * min(1.0, speed)
+            self._asked[first, end] = speed, turn
+        return self._asked[first, end]
 
     def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
         """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end;

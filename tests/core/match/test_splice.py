@@ -133,6 +133,7 @@ def test_a_window_that_is_missing_is_told(library, weaving_plan, weaving_pieces)
 
 
 def test_a_clip_that_is_missing_is_told(library, weaving_player):
-    edit = replace(weaving_player.stretches[0].edit, clips=(("gone.bvh", True), *weaving_player.stretches[0].edit.clips[1:]))
+    edit = weaving_player.stretches[0].edit
+    edit = replace(edit, clips=(("gone.bvh", True), *edit.clips[1:]))
     with pytest.raises(InputError, match=r"no clip gone.bvh \(mirrored\)"):
         bound(library.extended, edit)

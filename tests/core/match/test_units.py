@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
-from beyond_mocap.errors import InputError
+from beyond_mocap.errors import Cancelled, InputError
 from beyond_mocap.match.cut_plan import cut_plan, cut_track
 from beyond_mocap.match.player_edit import kept
+from beyond_mocap.match.searched import searched
 from beyond_mocap.match.units import frame_count, layout_edges, units_of, window_edges
 from beyond_mocap.motion.track import Track, sample
 from beyond_mocap.plan import Plan, SolvedCourse, Touched
@@ -45,10 +46,27 @@ def test_units_cover_a_stretch_and_share_their_overlaps(weaving_plan):
     assert [len(unit.plan.timeline.keys) for unit in units] == [0, 0, 1, 0]
 
 
-def test_a_unit_travels_to_another_process(weaving_plan):
-    unit = units_of(weaving_plan, window=8.0, overlap=3.0)[1]
-    again = pickle.loads(pickle.dumps(unit))
-    assert np.array_equal(again.plan.track.positions, unit.plan.track.positions) and again.own == unit.own
+def test_a_unit_that_has_travelled_finds_the_same(library, weaving_plan, weaving_pieces):
+    unit = units_of(weaving_plan, window=8.0, overlap=3.0)[2]
+    piece = pickle.loads(pickle.dumps(searched(library, pickle.loads(pickle.dumps(unit)))))
+    same = weaving_pieces[2]
+    assert (piece.first, piece.own, piece.warnings) == (same.first, same.own, same.warnings)
+    assert piece.edit.clips == same.edit.clips
+    assert all(np.array_equal(a, b) for a, b in zip(piece.edit.frames(), same.edit.frames()))
+    assert piece.edit.keys == same.edit.keys and len(piece.edit.keys) == 1 and piece.seconds > 0.0
+    assert len(piece.edit) == frame_count(unit.plan)
+
+
+def test_a_search_that_is_cancelled_ends(library, weaving_plan):
+    with pytest.raises(Cancelled):
+        searched(library, units_of(weaving_plan, window=8.0, overlap=3.0)[0], lambda: True)
+
+
+def test_a_search_in_a_hurry_says_from_where_on(library, weaving_plan):
+    unit = units_of(weaving_plan, window=8.0, overlap=3.0)[0]
+    asked = iter([False] * 4 + [True] * 10000)
+    piece = searched(library, unit, hurry=lambda: next(asked))
+    assert piece.hurried is not None and 0 < piece.hurried < len(piece.edit) == frame_count(unit.plan)
 
 
 @pytest.mark.parametrize("window, overlap", [(2.0, 1.0), (60.0, 40.0), (60.0, 0.1)])
