@@ -95,8 +95,9 @@ class _Search:
             if isinstance(result, Failed):
                 self._fail(player, result.reason)
                 continue
-            keep_piece(job.folder.place(SEARCH, name), result)
-            self._take(player, result)
+            path = job.folder.place(SEARCH, name)
+            keep_piece(path, result)
+            self._take(player, kept_piece(path) or result)  # as a run that finds it would have it
         job.folder.forget(SEARCH, self._names)
         return {player: self._edits[player] for player in self._parts if player in self._edits}
 

@@ -1,0 +1,50 @@
+"""Pieces of work in files: read as they were written, and never trusted where they are damaged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.errors import TimedLine, spans_of
+from beyond_mocap.match.content_digest import digest_of
+from beyond_mocap.match.crowd_window import CrowdPart
+from beyond_mocap.match.kept_crowd import keep_parts, kept_parts
+from beyond_mocap.match.kept_pieces import keep_piece, kept_piece
+from beyond_mocap.polish.crowd.correction import Correction
+
+
+@pytest.fixture
+def parts():
+    values = np.arange(36, dtype=np.int16).reshape(3, 12)
+    one = CrowdPart(Correction(np.array([3, 6, 9]), values, 30.0, 3), np.array([4, 5]), np.array([0.01, 0.02]), 0.1,
+                    np.array([7]), np.ones((1, 3)))  # fmt: skip
+    none = CrowdPart(Correction.none(30.0), np.zeros(0, int), np.zeros(0), 0.0, np.zeros(0, int), np.zeros((0, 3)))
+    return one, none
+
+
+def test_a_piece_comes_back_as_it_was(weaving_pieces, tmp_path):
+    told = (TimedLine("1.0 s: something", (1.0, 2.5)), TimedLine("plain"))
+    piece = replace(weaving_pieces[0], warnings=told, hurried=7)
+    keep_piece(tmp_path / "a.npz", piece)
+    back = kept_piece(tmp_path / "a.npz")
+    assert digest_of(back) == digest_of(piece) and [spans_of(line) for line in back.warnings] == [((1.0, 2.5),), ()]
+    keep_piece(tmp_path / "b.npz", back)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_parts_of_a_crowd_come_back_as_they_were(parts, tmp_path):
+    keep_parts(tmp_path / "a.npz", parts)
+    assert digest_of(kept_parts(tmp_path / "a.npz")) == digest_of(parts)
+
+
+@pytest.mark.parametrize("read", [kept_piece, kept_parts])
+def test_what_is_damaged_is_not_used(weaving_pieces, parts, tmp_path, read):
+    path = tmp_path / "piece.npz"
+    keep_piece(path, weaving_pieces[0]) if read is kept_piece else keep_parts(path, parts)
+    whole = path.read_bytes()
+    assert read(path) is not None and read(tmp_path / "none.npz") is None
+    for content in (b"", whole[: len(whole) // 2], b"no zip at all", whole[:200] + b"\xff" * 40 + whole[240:]):
+        path.write_bytes(content)
+        assert read(path) is None
+    np.savez(path, header=np.frombuffer(b"[[1, 2, 3]]", np.uint8))
+    assert read(path) is None
