@@ -62,8 +62,8 @@ class MatchOrder:
             raise InputError("--to", f"{self.end:g} s", f"later than --from {self.start:g} s")
         if not WINDOWS[0] <= self.window <= WINDOWS[1]:
             raise InputError("window", f"{self.window:g} s", f"{WINDOWS[0]:g} to {WINDOWS[1]:g} s")
-        if not 1.0 <= self.overlap <= self.window:
-            raise InputError("overlap", f"{self.overlap:g} s", f"1 s to the window's {self.window:g} s")
+        if not 1.0 <= self.overlap <= self.window / 2.0:
+            raise InputError("overlap", f"{self.overlap:g} s", f"1 s to half of the window, {self.window / 2.0:g} s")
 
     def told(self) -> dict:
         """The order as plain values, for people."""
