@@ -8,13 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import InputError
 from ..library.library import Library
 from ..polish.crowd.attention import looking
 from ..polish.crowd.correction import Correction, applied
 from ..synthesize import look_of
 from ..take import BallPath, Take
 from .expand import expanded
+from .joined_takes import own_part
 from .player_edit import PlayerEdit
+
+AROUND = 3.0
+"""Seconds around what is asked for that are laid out too: what heads do is smoothed over less."""
 
 
 def shown(
@@ -25,13 +30,29 @@ def shown(
     end: float,
     progress: Callable[[float, str], None] | None = None,
 ) -> tuple[Take, ...]:
-    """What a player does from `start` to `end` seconds, a take for each of his stretches there.
+    """What a player does from `start` to `end` seconds, a take for each of his stretches there; a frame looks the same
+    whatever span is asked for.
 
-    ball: the match's, which every take has as its own. InputError as of
-    `expanded`.
+    ball: the match's, which every take has as its own. InputError as of `expanded`.
     """
-    takes = expanded(library, edit, start, end, progress)
-    return tuple(_finished(library, take, edit.correction, ball) for take in takes)
+    if not end > start:
+        raise InputError("times", f"{start:g} to {end:g} s", "an end behind the start")
+    takes = expanded(library, edit, start - AROUND, end + AROUND, progress)
+    finished = (_finished(library, take, edit.correction, ball) for take in takes)
+    inside = (_between(take, start, end) for take in finished)
+    return tuple(take for take in inside if take is not None)
+
+
+def _between(take: Take, start: float, end: float) -> Take | None:
+    """The frames of a take from `start` to `end` seconds, None where there are none."""
+    fps = take.motion.fps
+    first = max(int(np.ceil((start - take.start_time) * fps - 1e-6)), 0)
+    last = min(int(np.floor((end - take.start_time) * fps + 1e-6)), len(take.motion) - 1)
+    if last < first:
+        return None
+    if (first, last) == (0, len(take.motion) - 1):
+        return take
+    return replace(own_part(take, first, last + 1), plan=take.plan)
 
 
 def _finished(library: Library, take: Take, correction: Correction | None, ball: BallPath | None) -> Take:

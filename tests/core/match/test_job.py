@@ -83,6 +83,19 @@ def test_a_player_is_shown_from_his_file_as_he_was_written(made, sample_cache):
     assert len(read_provenance(folder / "home_7.provenance.csv").clip) == len(take.clip)
 
 
+@pytest.mark.parametrize("span", [(SECONDS[0] + 1.0, SECONDS[0] + 3.5), (SECONDS[0], SECONDS[1] - 1.5)])
+def test_a_frame_looks_the_same_whatever_span_is_shown(made, sample_cache, span):
+    """The head too, whose turn to the ball is smoothed over time."""
+    folder, _ = made
+    edit, ball = read_player(folder / "home_7.take.npz"), read_ball(folder / "ball.csv")
+    library = build(LIBRARY, cache_dir=sample_cache)
+    (whole,), (part,) = shown(library, edit, ball, *SECONDS), shown(library, edit, ball, *span)
+    at = slice(round(30.0 * (span[0] - SECONDS[0])), round(30.0 * (span[1] - SECONDS[0])) + 1)
+    assert part.start_time == span[0] and part.clip_frame.tolist() == whole.clip_frame[at].tolist()
+    assert np.array_equal(part.motion.root_positions, whole.motion.root_positions[at])
+    assert np.allclose(np.abs(part.motion.rotations), np.abs(whole.motion.rotations[at]), rtol=0.0, atol=1e-12)
+
+
 def test_any_number_of_workers_gives_the_same_bits(made, order_to, tmp_path):
     make_match(order_to(tmp_path / "two", workers=2))
     assert kept_files(tmp_path / "two") == kept_files(made[0])
