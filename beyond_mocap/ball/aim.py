@@ -37,6 +37,8 @@ FASTEST_TRIED = 200.0
 ELSE = (1.06, 0.94, 1.15, 0.85)
 """Of the time with the slowest launch, where the ball's own physics does not allow that one: it lies at the edge of
 what can be, where a rebound just reaches the target's height."""
+JUST_NOW = 5e-3
+"""s that the last bounce lies back at least: a ball on the ground at its target would do by its first touch of it."""
 NUDGE = 1e-3
 """m/s by which a launch is varied to see where that takes it."""
 
@@ -189,11 +191,14 @@ class _Problem:
 
     def arrived(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the balls (B, 3) m are in time, and after how many bounces (B,); more bounces than asked for are not
-        made. A ball that lies on the ground is not struck into it: -1 bounces."""
+        made, and one of this moment does not count. A ball that lies on the ground is not struck into it: -1
+        bounces."""
         balls = batch.launched(self.start, velocity, self.spin, self.ball, self.ground)
         balls = batch.after(balls, self.ball, self.seconds, self.ground, self.bounces)
-        lies = self.start[:, 2] < self.ground + self.ball.radius + 1e-3
-        return balls.position, np.where(lies & (velocity[:, 2] < 0.0), -1, balls.bounces)
+        low, rising = self.ground + self.ball.radius, balls.velocity[:, 2]
+        just = (balls.bounces > 0) & (rising > 0.0) & (balls.position[:, 2] - low < JUST_NOW * rising)
+        lies = self.start[:, 2] < low + 1e-3
+        return balls.position, np.where(lies & (velocity[:, 2] < 0.0), -1, balls.bounces - just)
 
     def guessed(self) -> tuple[np.ndarray, np.ndarray]:
         """Launch velocities (B, 3) of balls that linear drag as strong as theirs slows; exact for such balls. And (B,)

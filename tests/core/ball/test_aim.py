@@ -64,6 +64,18 @@ def test_a_bounce_comes_late_where_an_early_one_would_do_too():
     assert flight.bounces[0] > 1.0
 
 
+def test_a_ball_on_the_ground_has_bounced_before():
+    """The launch that is there by its first touch of the ground has bounced at that moment, and does not count."""
+    start, target = np.array([[2.945, -1.032, 0.64]]), np.array([[0.11, 2.638, FOOTBALL.radius]])
+    seconds = np.array([0.9])
+    direct = aim(start, target, FOOTBALL, seconds).velocity
+    aimed = aim(start, target, FOOTBALL, seconds, 1, near=direct)
+    assert aimed.possible.all()
+    flight = fly(Launch(0.0, start[0], aimed.velocity[0]), FOOTBALL, 0.9)
+    assert np.linalg.norm(flight.at([0.9])[0] - target[0]) < 0.01
+    assert np.sum(flight.bounces < 0.9 - 4e-3) == 1
+
+
 def test_the_free_time_is_the_slowest_launchs():
     start, target, _ = aims(4, 3)
     for bounces in (0, 1):
