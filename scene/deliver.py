@@ -25,7 +25,9 @@ SHIRT = (0.75, 0.05, 0.06)
 def write(made: "Take | MatchResult", out: Path) -> tuple[str, ...]:
     """Write a take or a match to `out` in the form that its suffix names; beside it first, then renamed. Returns lines
     about whoever of a match could not be shown."""
-    lines = stage(made) if isinstance(made, Take) else stage_match(made)
+    from ..beyond_mocap.match.make import MatchResult  # brings scipy, which is slow to import
+
+    lines = stage_match(made) if isinstance(made, MatchResult) else stage(made)
     export.saved(out, EXPORTERS[out.suffix.lower()])
     return lines
 

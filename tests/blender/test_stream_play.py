@@ -37,12 +37,14 @@ def playing(room, cache):
     """Three players stand, Ann has the ball; 24 frames a second, from frame 5 on."""
     scene = bpy.context.scene
     scene.render.fps = 24
-    bpy.context.preferences.addons[EXTENSION].preferences.cache_folder = str(cache)
+    chosen = bpy.context.preferences.addons[EXTENSION].preferences
+    chosen.cache_folder = str(cache)
     OPS.passes_sample(sample="three")
     scene.beyond_mocap_passes.library_folder, scene.beyond_mocap_passes.start_frame = str(CLIPS), 5
     scene.frame_set(5)
     assert press(OPS.stream_play) == {"FINISHED"}
-    return scene
+    yield scene
+    chosen.property_unset("cache_folder")
 
 
 def told():
