@@ -109,11 +109,16 @@ def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
 
 
 def without(arguments: Sequence[str], option: str) -> list[str]:
-    """A command line without an option of one value, whichever way it is written."""
-    kept = list(arguments)
-    while option in kept:
-        del kept[(at := kept.index(option)) : at + 2]
-    return [one for one in kept if not one.startswith(f"{option}=")]
+    """A command line without a long option of one value, whichever way it is written: shortened too, as argparse takes
+    it."""
+    kept, rest = [], iter(arguments)
+    for one in rest:
+        name, equals, _ = one.partition("=")
+        if len(name) > 2 and option.startswith(name):
+            next(rest if not equals else iter(()), None)
+        else:
+            kept.append(one)
+    return kept
 
 
 def _cores() -> range | set[int]:
