@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import BeyondMocapError, InputError
-from .numbers import positive, rate, whole
+from .numbers import positive, rate, seed, whole
 from .outputs import Writer, check_outputs
 from .told import Told
 
@@ -56,7 +56,7 @@ def _add_results(verb) -> None:
     )
     verb.add_argument("--no-figures", action="store_true", help="no reports, no provenance, no page")
     verb.add_argument("--fps", type=rate, default=30.0)
-    verb.add_argument("--seed", type=int, default=0)
+    verb.add_argument("--seed", type=seed, default=0)
     verb.add_argument(
         "--exact", dest="nearest", action="store_false",
         help="a player whose words the library lacks fails, instead of going on with the nearest it has",

@@ -99,6 +99,7 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"fps": 0}, 2, "1 to 480 frames per second"),
     ({"out": ""}, 2, "no folder is named"),
     ({"from": "nan"}, 2, "--from: nan"),
+    ({"seed": -5}, 2, "'-5' is not 0 to 2147483647"),
     ({"annotations": "nowhere"}, 2, "nowhere: no such folder"),
     ({"out": "no/such/place"}, 2, "the folder above it does not exist"),
     ({"out": str(SMALL)}, 2, "holds other files"),
