@@ -21,7 +21,7 @@ from . import __version__
 from .commands import (
     learning, matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches,
 )
-from .commands.numbers import between, positive, rate
+from .commands.numbers import between, positive, rate, seed
 from .commands.outputs import Writer, check_outputs, writer_of
 from .commands.told import Told
 from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
@@ -90,7 +90,7 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--method", choices=METHODS, default="path")
     verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
     verb.add_argument("--fps", type=rate, default=30.0)
-    verb.add_argument("--seed", type=int, default=0, help="of the clustering that blocks and distance search in")
+    verb.add_argument("--seed", type=seed, default=0, help="of the clustering that blocks and distance search in")
     verb.add_argument(
         "--solve-touches", action="store_true",
         help="key moments move to the touches that the ball's samples tell; the ball goes as physics has it and is "
@@ -416,8 +416,8 @@ def main(
 
 
 class _interrupts:
-    """While it lasts, Ctrl-C, or a farm's request to end (SIGTERM), asks the work to stop instead of breaking it off; the
-    second one breaks it off. Outside the main thread nothing is done."""
+    """While it lasts, Ctrl-C, or a farm's request to end (SIGTERM), asks the work to stop instead of breaking it off;
+    the second one breaks it off. Outside the main thread nothing is done."""
 
     def __init__(self, told: Told):
         self._told, self._before = told, {}

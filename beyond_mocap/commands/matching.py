@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import BeyondMocapError, InputError
-from .numbers import positive, rate, whole
+from .numbers import positive, rate, seed, whole
 from .outputs import Writer, check_outputs
 from .told import Told
 
@@ -56,7 +56,7 @@ def _add_results(verb) -> None:
     )
     verb.add_argument("--no-figures", action="store_true", help="no reports, no provenance, no page")
     verb.add_argument("--fps", type=rate, default=30.0)
-    verb.add_argument("--seed", type=int, default=0)
+    verb.add_argument("--seed", type=seed, default=0)
     verb.add_argument(
         "--exact", dest="nearest", action="store_false",
         help="a player whose words the library lacks fails, instead of going on with the nearest it has",
@@ -109,11 +109,16 @@ def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
 
 
 def without(arguments: Sequence[str], option: str) -> list[str]:
-    """A command line without an option of one value, whichever way it is written."""
-    kept = list(arguments)
-    while option in kept:
-        del kept[(at := kept.index(option)) : at + 2]
-    return [one for one in kept if not one.startswith(f"{option}=")]
+    """A command line without a long option of one value, whichever way it is written: shortened too, as argparse takes
+    it."""
+    kept, rest = [], iter(arguments)
+    for one in rest:
+        name, equals, _ = one.partition("=")
+        if len(name) > 2 and option.startswith(name):
+            next(rest if not equals else iter(()), None)
+        else:
+            kept.append(one)
+    return kept
 
 
 def _cores() -> range | set[int]:

@@ -21,6 +21,11 @@ def share(text: str) -> float:
     return between(text, 0.0, 1.0, "a number from 0 to 1")
 
 
+def seed(text: str) -> int:
+    """What random choices begin with, as all who draw numbers take it."""
+    return whole(text, 0, 2**31 - 1, "0 to 2147483647")
+
+
 def between(text: str, low: float, high: float, expected: str, kind: type = float) -> float:
     """The number of a kind, float or int, that an option's text says, where it lies from `low` to `high`."""
     with contextlib.suppress(ValueError):

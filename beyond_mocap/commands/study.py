@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import InputError
-from .numbers import whole
+from .numbers import seed, whole
 from .outputs import Writer, check_outputs
 from .told import Told
 
@@ -40,7 +40,7 @@ def _add_order(verbs):
     many = partial(whole, low=1, high=1000, expected="1 to 1000")
     verb.add_argument("--raters", type=many, required=True, metavar="N")
     verb.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new or an empty folder")
-    verb.add_argument("--seed", type=partial(whole, low=0, high=2**31, expected="0 or more"), default=0)
+    verb.add_argument("--seed", type=seed, default=0)
     verb.add_argument("--pairs", action="store_true", help="compare two clips at a time instead of rating each")
     verb.add_argument("--copy", action="store_true", help="copy the movies to their neutral names")
     verb.set_defaults(run=run_order)

@@ -67,6 +67,17 @@ def _balls(path: Path) -> list[tuple[str, ...]]:
     return [(*row[:2], *(cell for cell in row[-2:])) for row in rows]
 
 
+def check_rows(feed: Feed) -> list[str]:
+    """A line where the two teams' files of Metrica's CSV have not as many rows: frames are those that both have."""
+    if feed.provider != "metrica" or feed.meta:
+        return []
+    rows = [sum(bool(line.strip()) for line in path.read_bytes().splitlines()) for path in feed.tracking]
+    if rows[0] == rows[1]:
+        return []
+    told = " and ".join(f"{path.name} {count}" for path, count in zip(feed.tracking, rows))
+    return [f"the teams' files have not as many rows ({told}): only what both have is read"]
+
+
 def check_players(players, dataset, feed: Feed) -> list[str]:
     """Lines on players whom the metadata does not know. players: kloppy's, those who are tracked. InputError for more
     than MOST_PLAYERS of them, and where so many are unknown that the metadata is another match's."""

@@ -37,6 +37,7 @@ _TYPES = tuple(np.dtype(name) for name in ("<f8", "<i8", "<i4", "<i2", "|i1", "|
 _LONGEST = 24 * 3600.0
 """Seconds of a stretch above which it is none of ours."""
 _MOST_FRAMES, _MOST_RATE = 1e7, 100.0
+_LEAST_WINDOW = 1.0  # s
 _DEFAULTS = {
     field.name: field.default for field in fields(Plan) if field.name not in ("track", "timeline", "pins", "solved")
 }  # fmt: skip
@@ -116,9 +117,12 @@ def _player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
     check_names(header, HEADER, rows, rows)
     stretches = [_stretch(row, index, arrays) for index, row in enumerate(entries(header["stretches"], "stretches"))]
     apart = _correction(header["correction"], arrays)
+    window = number(header["window"], "window")
+    if window < _LEAST_WINDOW:
+        raise InputError("window", f"{window:g} s", f"{_LEAST_WINDOW:g} s or more")
     if arrays:
         raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
-    return PlayerEdit(text(header["player"], "player"), number(header["window"], "window"), tuple(stretches), apart)
+    return PlayerEdit(text(header["player"], "player"), window, tuple(stretches), apart)
 
 
 def _correction(value, arrays: dict[str, np.ndarray]) -> Correction | None:

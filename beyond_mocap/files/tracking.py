@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..motion.skeleton import frozen_array
 from ..motion.track import Track
 from . import match_arrays
-from .match_checks import check_periods, check_players, check_same_match, whole_lines
+from .match_checks import check_periods, check_players, check_rows, check_same_match, whole_lines
 from .match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
 from .match_mending import mended_ball, mended_players, mended_sides, side_lines
 from .providers import Feed, feed_of, load
@@ -120,7 +120,7 @@ def _read(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray
 def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) -> dict[str, np.ndarray]:
     """The match as named arrays, everything that the cache keeps."""
     records = match_arrays.records_of(dataset)
-    lines = [*lines, *check_periods(records, dataset, feed)]
+    lines = [*lines, *check_rows(feed), *check_periods(records, dataset, feed)]
     players = match_arrays.tracked_players(records)
     lines += check_players(players, dataset, feed)
     times, periods = match_arrays.clock(records)

@@ -57,9 +57,9 @@ class PeriodClock:
 
 @dataclass(frozen=True)
 class AlignedEvents:
-    """The events of a match on the tracking's clock. events: as given. times: s of each on the match's clock, lag taken
-    out; NaN in halves whose clock cannot be set. touches: the index of each one's solved touch, -1 where it has none. clocks: period -> its clock. notes: lines
-    for people."""
+    """The events of a match on the tracking's clock. events: as given. times: (E,) s of each on the match's clock, lag
+    taken out; NaN in halves whose clock cannot be set. touches: (E,) the index of each one's solved touch, -1 where it
+    has none. clocks: period -> its clock. notes: lines for people."""
 
     events: tuple[MatchEvent, ...]
     times: np.ndarray
@@ -112,7 +112,8 @@ def _told(number: int, clock: PeriodClock) -> str:
     drift = f", {1000.0 * clock.drift:+.2f} s more in 1000 s" if clock.drift else ""
     return (
         f"period {number}: events come {clock.lag:.2f} s after their touches{drift}, "
-        f"give or take {clock.spread:.2f} s; {clock.matched:.0%} of passes and shots fit (by chance {clock.by_chance:.0%})"
+        f"give or take {clock.spread:.2f} s; "
+        f"{clock.matched:.0%} of passes and shots fit (by chance {clock.by_chance:.0%})"
     )
 
 

@@ -2,7 +2,7 @@
 
     with opened(order.out, identity) as folder:
         folder.tell({"state": "running", ...})          # match.json, whole
-        folder.keep("search", name, content); folder.kept("search", name)
+        folder.place("search", name)                    # where a piece of work is kept
 
 Nothing in it is ever half-written. One run works in it at a time: the lock is the operating system's, so that it ends
 with its process however that ends.
@@ -67,10 +67,6 @@ class MatchFolder:
         for path in (self.path / _WORK / kind).glob("*"):
             if path.name not in wanted:
                 path.unlink(missing_ok=True)
-
-    def clear(self, kind: str) -> None:
-        """Takes away all pieces of a kind."""
-        shutil.rmtree(self.path / _WORK / kind, ignore_errors=True)
 
 
 @contextlib.contextmanager
@@ -161,7 +157,8 @@ def _check_order(path: Path, before: dict, identity: Mapping[str, object]) -> No
 
 _NAMES = {
     "start": "--from", "end": "--to", "tracking": "tracking file", "meta": "metadata", "events": "events file",
-    "solve_touches": "--no-solve-touches", "players": "list of players", "form": "version", "software": "version",
+    "solve_touches": "--no-solve-touches", "players": "list of players", "fps": "--fps", "seed": "--seed",
+    "nearest": "--exact", "provider": "--provider", "form": "version", "software": "version",
 }
 
 

@@ -28,11 +28,10 @@ from . import stages
 from .folder import MatchFolder, check_folder, file_names, opened, read_state
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
-from .parts import parts_of
+from .parts import check_texts, parts_of, strange_texts
 from .pool import Workplace, check_place, ended
-from .roles import pushed_apart, roles_of, span_of
+from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import MatchState, begun, now, row_of
-from .thumbnails import thumbnails
 from .thumbnails import thumbnails
 from .words import MatchWords, words_of
 from .workplace_library import LibrarySource, hold
@@ -56,7 +55,8 @@ class MadePlayer:
 
 @dataclass(frozen=True)
 class MatchResult:
-    """order: what was asked. span: (start, end) s. done, failed: who was made, and who was not. notes: lines for people."""
+    """order: what was asked. span: (start, end) s. done, failed: who was made, and who was not. notes: lines for
+    people."""
 
     order: MatchOrder
     span: tuple[float, float]
@@ -78,6 +78,7 @@ def make_match(
 
     report = progress or (lambda fraction, text: None)
     check_folder(order.out)
+    check_texts(order.annotations)
     place = Workplace(order.workers, order.scheduler)
     check_place(place)
     clock = now()
@@ -122,6 +123,7 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     """All stages behind the reading."""
     state, begin = job.state, now()
     roles = roles_of(match, job.order, span)
+    state.told["notes"] += absent_lines(job.order, roles, span)
     solved = _solved(job, match, span, _part(report, "ball"))
     state.took("ball", begin)
     clock = now()
@@ -130,7 +132,10 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
     names = file_names(player.id for player in match.players)
     parts = parts_of(roles, names, words, solved, job.order, job.folder, job.library.words)
-    state.players = {part.role.player.id: row_of(part) for part in parts}
+    told = job.folder.before.get("players", ())
+    finished = {row["id"]: row["finished"] for row in told if isinstance(row.get("finished"), str)}
+    state.players = {part.role.player.id: row_of(part, finished.get(part.role.player.id)) for part in parts}
+    state.told["notes"] += strange_texts(job.order.annotations, names.values())
     state.took("words", clock)
     state.write()
     clock = now()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError
-from .content_digest import digest_of, digest_of_file
+from .content_digest import digest_of_file
 from .units import OVERLAP, WINDOW
 
 FORM = 1
@@ -29,7 +30,7 @@ class MatchOrder:
     bvh: whether every player is written as BVH too; figures: whether reports, provenance and the page are made. window,
     overlap: seconds that a piece of the search has, and shares with the next. variety: as a plan has it. workers,
     scheduler: `pool.Workplace`.
-    InputError for numbers outside their limits and a span that ends before it begins.
+    InputError for numbers outside their limits, a span that ends before it begins, and times that are no numbers.
     """
 
     tracking: Path
@@ -58,6 +59,9 @@ class MatchOrder:
     scheduler: str = ""
 
     def __post_init__(self):
+        for option, value in (("--from", self.start), ("--to", self.end)):
+            if value is not None and math.isnan(value):
+                raise InputError(option, "nan", "seconds of the match's clock")
         if self.start is not None and self.end is not None and self.end <= self.start:
             raise InputError("--to", f"{self.end:g} s", f"later than --from {self.start:g} s")
         if not WINDOWS[0] <= self.window <= WINDOWS[1]:
@@ -77,9 +81,10 @@ _FILES = ("tracking", "meta", "events")
 
 def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
     """What decides the results of an order, by name: settings, and the content of its files by their digests. The
-    words' texts are not among them: they may be edited between runs. library_key: of the library's content
-    (`Library.kept`). InputError for a file that cannot be read."""
-    out: dict[str, object] = {"form": FORM, "software": __version__, "library": library_key}
+    words' texts are not among them: they may be edited between runs. library_key: of the library's content and of the
+    seed that it was read with (`Library.kept`), last, so that another seed is told as such. InputError for a file that
+    cannot be read."""
+    out: dict[str, object] = {"form": FORM, "software": __version__}
     out |= {name: getattr(order, name) for name in _RESULTS}
     for name in _FILES:
         path = getattr(order, name)
@@ -87,11 +92,7 @@ def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
             out[name] = None if path is None else digest_of_file(path)
         except OSError as error:
             raise InputError(path, error.strerror or str(error), "a file that can be read", "check the path") from None
+    out["library"] = library_key
     return out
-
-
-def digest(known: dict[str, object]) -> str:
-    """The hex digits that stand for an `identity`."""
-    return digest_of(known)
 
 

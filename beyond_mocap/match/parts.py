@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -46,6 +46,20 @@ def parts_of(
         except InputError as error:
             out.append(Part(replace(role, reason=str(error)), file))
     return out
+
+
+def check_texts(annotations: Path | None) -> None:
+    """InputError where the folder with the user's words is named and not there."""
+    if annotations is not None and not annotations.is_dir():
+        found = "is a file" if annotations.exists() else "no such folder"
+        raise InputError(annotations, found, "a folder with a text ID.txt for players", "check the path")
+
+
+def strange_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
+    """A line for each text of the user's that is nobody's. files: what everybody's files are called."""
+    known = {f"{file}.txt" for file in files}
+    texts = [] if annotations is None else sorted(annotations.glob("*.txt"))
+    return [f"{text}: not used, since nobody of the match is called so" for text in texts if text.name not in known]
 
 
 def _moments(

@@ -22,6 +22,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
+from typing import NoReturn
 
 from ..errors import BeyondMocapError, Cancelled, InputError
 
@@ -153,7 +154,15 @@ def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Iterator[tuple[ob
         while True:
             alone = breaks >= _BREAKS and bool(again or going)
             while len(going) < (1 if alone else place.room()) and (task := _next(again, tasks)) is not None:
-                going[place.executor().submit(attempt, work, task[1])] = task
+                try:
+                    going[place.submit(work, task[1])] = task
+                except BrokenExecutor:  # a worker ended while nobody looked
+                    again.appendleft(task)
+                    break
+            if not going and again:
+                breaks += 1
+                place.renew()
+                continue
             if not going:
                 return
             done, _ = wait(going, timeout=POLL, return_when=FIRST_COMPLETED)
@@ -212,8 +221,9 @@ class _Processes:
         """Pieces that may be in hand at once."""
         return AHEAD * self._workers
 
-    def executor(self) -> Executor:
-        """Who takes pieces; processes that are still there from an earlier stage go on, with all that they hold."""
+    def submit(self, work: Work, arguments: tuple) -> Future:
+        """Hands out a piece; processes that are still there from an earlier stage go on, with all that they hold.
+        BrokenExecutor where one of them has ended."""
         if self._executor is None:
             from joblib.externals.loky import get_reusable_executor
 
@@ -222,7 +232,7 @@ class _Processes:
                 env={name: "1" for name in _THREADS},
             )  # fmt: skip
             _Processes.started = self._executor
-        return self._executor
+        return self._executor.submit(attempt, work, arguments)
 
     def check(self, moved: bool) -> None:
         """Processes here need no looking after: the executor tells when one ends."""
@@ -280,9 +290,12 @@ class _Cluster:
             self._room = AHEAD * max(threads, 1)
         return self._room
 
-    def executor(self) -> Executor:
-        """Who takes pieces."""
-        return self._executor
+    def submit(self, work: Work, arguments: tuple) -> Future:
+        """Hands out a piece. InputError where the scheduler is gone."""
+        try:
+            return self._executor.submit(attempt, work, arguments)
+        except Exception:  # a client without a scheduler tells it in many ways
+            return self.renew()
 
     def check(self, moved: bool) -> None:
         """Raises InputError where nobody has worked for long, since nobody is there."""
@@ -291,7 +304,7 @@ class _Cluster:
         elif time.monotonic() - self._moved > PATIENCE:
             raise InputError("--scheduler", f"no worker for {PATIENCE:g} s", "some", "start 'dask worker ADDRESS'")
 
-    def renew(self) -> None:
+    def renew(self) -> NoReturn:
         """A cluster looks after its workers itself; what it loses, it loses with its scheduler. InputError."""
         what = "start it and the command again; what is done is kept"
         raise InputError("--scheduler", "the scheduler went away", "one that stays", what)

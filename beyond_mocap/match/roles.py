@@ -71,6 +71,13 @@ def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tupl
     return tuple(roles)
 
 
+def absent_lines(order: MatchOrder, roles: Sequence[Role], span: tuple[float, float]) -> list[str]:
+    """A line for each player whom the order names and who is not there in `span` s."""
+    there = {role.player.id for role in roles}
+    away = [player for player in order.players if player not in there]
+    return [f"player {player} is not made: he is not there from {span[0]:g} to {span[1]:g} s" for player in away]
+
+
 def _sampled(match: Match, span: tuple[float, float]) -> np.ndarray:
     """Samples of the span, some NEAR_SAMPLES a second."""
     inside = np.flatnonzero((match.times >= span[0] - 1e-9) & (match.times <= span[1] + 1e-9))

@@ -240,17 +240,19 @@ def finish(
 
 def _is_finished(job: Job, part: Part, name: str) -> bool:
     """Whether an earlier run wrote this player's files; then they are told again."""
-    before = next((row for row in job.folder.before.get("players", ()) if row["id"] == part.role.player.id), {})
-    kinds = [kind for kind in ("take", "report", "provenance", "bvh") if isinstance(before.get(kind), str)]
-    there = all((job.folder.path / before[kind]).is_file() for kind in kinds)
-    if before.get("status") != "done" or before.get("finished") != name or not there:
+    endings = {"report": "report.json", "provenance": "provenance.csv"} if job.order.figures else {}
+    endings |= {"bvh": "bvh"} if job.order.bvh else {}
+    files = {kind: job.folder.of(part.file, ending) for kind, ending in endings.items()}
+    player = part.role.player.id
+    if job.state.players[player].get("finished") != name or not all(path.is_file() for path in files.values()):
         return False
-    job.state.player(part.role.player.id, status="done", **{kind: before[kind] for kind in (*kinds, "finished")})
+    job.state.player(player, status="done", **{kind: path.name for kind, path in files.items()})
     return True
 
 
 def _write(job: Job, part: Part, made, name: str) -> dict[str, str]:
-    """Writes a player's files; their names for his row."""
+    """Writes a player's files; their names for his row. What an earlier run said of them holds no longer."""
+    job.state.player(part.role.player.id, finished=None)
     told = {"finished": name}
     for ending, content in made.files.items():
         path = job.folder.of(part.file, ending)

@@ -97,12 +97,12 @@ def begun(
     })  # fmt: skip
 
 
-def row_of(part: Part) -> dict:
-    """A player's row when work begins."""
+def row_of(part: Part, finished: str | None = None) -> dict:
+    """A player's row when work begins. finished: what the files are made of that an earlier run has left of him."""
     player, role = part.role.player, part.role
     return {
         "id": player.id, "file": part.file, "team": player.team, "name": player.name, "number": player.number,
         "position": player.position, "status": "failed" if role.reason else "waiting", "reason": role.reason,
         "stretches_s": [[float(track.times[0]), float(track.times[-1])] for track in role.measured],
-        "units": 0, "units_done": 0, "data": list(role.notes),
+        "units": 0, "units_done": 0, "data": list(role.notes), "finished": finished,
     }  # fmt: skip

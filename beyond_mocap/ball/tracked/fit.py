@@ -209,7 +209,7 @@ def _fitted(stretches: Stretches, unknown, ball: Ball, rounds: int, follow, canc
     out, costs = unknown.copy(), np.zeros(len(unknown))
     for low in range(0, len(order), _AT_ONCE):
         if cancelled is not None and cancelled():
-            raise Cancelled("solving the ball")
+            raise Cancelled("solving the ball: cancelled")
         some = order[low : low + _AT_ONCE]
         out[some], costs[some] = _descend(stretches.take(some), unknown[some], ball, rounds, follow)
     return out, costs

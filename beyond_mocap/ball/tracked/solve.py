@@ -115,7 +115,7 @@ def solve(
     found = []
     for number, window in enumerate(windows):
         if cancelled is not None and cancelled():
-            raise Cancelled("solving the ball")
+            raise Cancelled("solving the ball: cancelled")
         if progress is not None:
             progress(0.6 * number / len(windows), "touches")
         found.append(_solve_window(samples, window, positions, stranger))

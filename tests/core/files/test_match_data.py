@@ -210,6 +210,18 @@ def test_two_teams_of_two_matches_are_refused(tmp_path):
         read_match(tmp_path / "g_Home.csv", cache_dir=tmp_path)
 
 
+def test_a_team_s_file_that_ends_before_the_other_s_is_told(tmp_path):
+    pytest.importorskip("kloppy")
+    for team, last in (("Home", 60), ("Away", 40)):
+        rows = [f",,,{team},,,", ",,,7,,,", "Period,Frame,Time [s],Player7,,Ball,"]
+        rows += [f"1,{n},{n / 25:.2f},0.{500 + n},0.5,0.5,0.25" for n in range(1, last)]
+        (tmp_path / f"g_{team}.csv").write_text("\n".join(rows) + "\n")
+    match = read_match(tmp_path / "g_Home.csv", cache_dir=tmp_path)
+    assert len(match.times) == 39
+    told = "the teams' files have not as many rows (g_Home.csv 62 and g_Away.csv 42): only what both have is read"
+    assert told in match.report
+
+
 @pytest.mark.parametrize("said, expected", [
     ('{"homeTeamKit":{"name":"x","primaryColor":"#ff00aa"},"awayTeamKit":{"primaryColor":"#003366"}}',
      ("#FF00AA", "#003366")),

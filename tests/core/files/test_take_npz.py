@@ -125,6 +125,7 @@ def first(header) -> dict:
     (lambda h: h.update(format="a cake"), "no player of a match"),
     (lambda h: h.update(version=99), "another Beyond Mocap"),
     (lambda h: h.pop("player"), "player"),
+    (lambda h: h.update(window=0.0), "window: 0 s; expected 1 s or more"),
     (lambda h: h.update(correction=[25.0]), "2 values"),
     (lambda h: h.update(correction=[-1.0, 2]), "above 0"),
     (lambda h: h.update(correction=[25.0, 99]), "rising"),

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -143,6 +144,23 @@ def test_what_is_cancelled_is_told_and_gone_on_with(made, order_to, tmp_path):
     assert [fraction for fraction, _ in told] == sorted(fraction for fraction, _ in told)
     make_match(order)
     assert kept_files(order.out) == kept_files(made[0])
+
+
+def test_figures_that_are_made_outlast_a_run_that_ends_before_them(made, order_to, tmp_path):
+    order = order_to(tmp_path / "again")
+    shutil.copytree(made[0], order.out)
+    before = {path: path.stat().st_mtime_ns for path in order.out.glob("*.report.json")}
+    text = order.out / "annotations" / "away_6.txt"
+    words, told = text.read_text(), []
+    text.write_text(words + "9.5 kick right\n")
+    with pytest.raises(Cancelled):
+        make_match(order, lambda fraction, line: told.append(line), lambda: any("windows" in line for line in told))
+    assert read_state(order.out)["status"] == "cancelled"
+    text.write_text(words)
+    make_match(order)
+    assert len(before) == 3 and before == {path: path.stat().st_mtime_ns for path in before}
+    assert kept_files(order.out) == kept_files(made[0])
+    assert [row["status"] for row in read_state(order.out)["players"]] == ["done"] * 3
 
 
 def test_edited_words_touch_their_player_and_nobody_else(made, order_to, tmp_path):

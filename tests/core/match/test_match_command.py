@@ -5,6 +5,7 @@ import json
 import pytest
 
 from beyond_mocap.__main__ import main
+from beyond_mocap.commands.matching import without
 from beyond_mocap.match.folder import read_state
 from tests.core.match.small_match import LIBRARY, SMALL
 
@@ -64,6 +65,24 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     assert read_state(tmp_path / "out")["status"] == "failed"
 
 
+def test_who_is_not_there_and_texts_of_nobody_are_told(match, tmp_path):
+    words = tmp_path / "words"
+    words.mkdir()
+    for name in ("home_7", "home_8"):
+        (words / f"{name}.txt").write_text("13 kick right\n")
+    span = {"from": 12, "to": 14}
+    status, out, error = match("--players", "away_9", "home_7", "--no-figures", players=None, annotations=words, **span)
+    assert status == 0 and "1 of 1 players" in out
+    assert "note: player away_9 is not made: he is not there from 12 to 14 s" in error
+    assert [line for line in error if "home_8.txt: not used" in line]
+    assert not [line for line in error if "home_7.txt" in line]
+
+
+@pytest.mark.parametrize("written", [["--scene", "x.blend"], ["--scene=x.blend"], ["--sce", "x.blend"], ["--scen=x"]])
+def test_an_option_is_taken_out_however_it_is_written(written):
+    assert without(["match", "--seed", "3", *written, "--json"], "--scene") == ["match", "--seed", "3", "--json"]
+
+
 @pytest.mark.parametrize("options, status, told", [
     ({"tracking": "no.dat"}, 2, "no.dat: no such file"),
     ({"library": "nowhere"}, 2, "nowhere"),
@@ -79,6 +98,9 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "--scheduler: tcp://127.0.0.1:9 does not answer"),
     ({"fps": 0}, 2, "1 to 480 frames per second"),
     ({"out": ""}, 2, "no folder is named"),
+    ({"from": "nan"}, 2, "--from: nan"),
+    ({"seed": -5}, 2, "'-5' is not 0 to 2147483647"),
+    ({"annotations": "nowhere"}, 2, "nowhere: no such folder"),
     ({"out": "no/such/place"}, 2, "the folder above it does not exist"),
     ({"out": str(SMALL)}, 2, "holds other files"),
 ])  # fmt: skip

@@ -46,6 +46,16 @@ def test_a_worker_that_is_killed_costs_nothing(chores, tmp_path):
     assert {key: value[0] for key, value in found.items()} == {n: n for n in range(8)}
 
 
+def test_a_worker_that_ends_while_results_are_looked_at_costs_nothing(chores):
+    """The pool is broken before anything else is handed out."""
+    going = run([(number, (0.01,)) for number in range(12)], chores.slow, Workplace(2))
+    found = [next(going)]
+    os.kill(found[0][1], signal.SIGKILL)
+    time.sleep(1.0)
+    found += going
+    assert sorted(key for key, _ in found) == list(range(12))
+
+
 def test_a_piece_that_kills_every_worker_fails_alone(chores, tmp_path):
     found = dict(run(numbers(8, tmp_path, 99), chores.deadly, Workplace(2)))
     assert "worker process ended" in found.pop(3).reason
