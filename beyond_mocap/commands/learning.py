@@ -23,16 +23,21 @@ def add_options(verb) -> None:
 
 
 def run(options, told: Told) -> None:
-    """Learns, proposes, or first the one and then the other. InputError for clips that cannot be read."""
+    """Learns, proposes, or first the one and then the other. InputError for clips that cannot be read, and for a table
+    of words that would be lost."""
     from ..library.classify import keep
     from ..library.classify.examples import examples_of
     from ..library.classify.train import trained
+    from ..library.scan import TABLE_NAME
 
     check_outputs(options.learn, options.propose, never=(options.learned,))
     if options.learn and options.learned:
         raise InputError("--learned", "given beside --learn", "one of them", "leave it away: what is learned is used")
     if options.learned and not options.propose:
         raise InputError("--learned", "given without --propose", "--propose OUT.csv", "say where the proposals go")
+    if options.propose and options.propose.name == TABLE_NAME and options.propose.exists():
+        what = "holds words already, which would be lost"
+        raise InputError(options.propose, what, "a new file", "choose another name, then put the rows together")
     known = keep.read(options.learned) if options.learned else None
     if options.learn:
         examples = examples_of(options.library, options.unit, told.progress, options.cache, told.cancelled)

@@ -42,7 +42,7 @@ def _add_order(verbs):
     verb.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new or an empty folder")
     verb.add_argument("--seed", type=seed, default=0)
     verb.add_argument("--pairs", action="store_true", help="compare two clips at a time instead of rating each")
-    verb.add_argument("--copy", action="store_true", help="copy the movies to their neutral names")
+    verb.add_argument("--copy", action="store_true", help="copy what is a movie to its neutral name")
     verb.set_defaults(run=run_order)
     return verb
 
@@ -70,8 +70,9 @@ def _add_analyse(verbs):
 
 
 def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`study order`: writes study.json and, if asked, the movies under neutral names."""
+    """`study order`: writes study.json and, if asked, the movies under neutral names; motions are to be rendered."""
     from ..files.whole import whole_folder
+    from ..study.form import MOVIES
     from ..study.order import ordered
     from ..study.study_file import read_clips, write_study
 
@@ -83,15 +84,18 @@ def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
         if error.where != "clips":
             raise
         raise InputError(options.clips, str(error).removeprefix("clips: ")) from None
+    movies = [clip for clip in study.clips if options.copy and Path(clip.file).suffix.lower() in MOVIES]
     with whole_folder(options.out) as place:
         write_study(place, study)
-        if options.copy:
+        if movies:
             (place / CLIPS).mkdir()
-        for number, clip in enumerate(study.clips if options.copy else (), 1):
+        for number, clip in enumerate(movies, 1):
             told.check()
             _copy(options.out / clip.file, place / CLIPS / clip.name)
-            told.progress(number / len(study.clips), clip.name)
+            told.progress(number / len(movies), clip.name)
     told.end()
+    if options.copy and len(movies) < len(study.clips):
+        told.note(f"{len(study.clips) - len(movies)} of {len(study.clips)} clips are no movies and are to be rendered")
     shown = len(next(iter(study.orders.values())))
     print(f"{options.out}: study {study.id}, {len(study.clips)} clips of {len(study.systems)} systems, "
           f"{len(study.orders)} raters with {shown} pages each")  # fmt: skip
@@ -157,12 +161,12 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.tables import write_report
     from ..files.whole import atomic_write
     from ..study.analysis import analysed
-    from ..study.answers import read_answers
+    from ..study.answers import answer_files, read_answers
     from ..study.page import p_text, study_page, study_report
     from ..study.study_file import read_study
 
     answers = options.answers or [options.study / ANSWERS]
-    check_outputs(options.report, options.html, never=(*answers, options.study / "study.json"))
+    check_outputs(options.report, options.html, never=(*answer_files(answers), options.study / "study.json"))
     study = read_study(options.study)
     found = analysed(study, read_answers(study, answers), [tuple(pair) for pair in options.better])
     page = study_page(found) if options.html else None

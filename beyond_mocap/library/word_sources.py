@@ -14,12 +14,13 @@ from pathlib import Path
 
 from ..annotation import ClipAnnotation, clip_annotations, parse_timeline
 from ..annotation.text import read_text
+from .proposals import LEARNED, RULES
 
 Found = dict[ClipAnnotation, tuple[str, float]]
 Sources = Mapping[ClipAnnotation, tuple[str, float]]
 """A row -> what proposed it, and its confidence from 0 to 1."""
 
-_COMMENT = re.compile(r"#\s*([A-Za-z_]+)\s+([01](?:\.\d+)?)\s*$")
+_COMMENT = re.compile(rf"#\s*({RULES}|{LEARNED})\s+([01](?:\.\d+)?)\s*$")
 COLUMNS = ("source", "confidence")
 _ROW = ("start_frame", "end_frame", "key_frame", "labels")
 

@@ -41,7 +41,7 @@ def read_answers(study: Study, paths: Sequence[Path]) -> Answers:
     choice; where one rater answered a question in two ways; and where nobody answered.
     """
     found: dict[str, dict[str, tuple[str, str]]] = {}
-    for path in _files(paths):
+    for path in answer_files(paths):
         for place, mark, rater, question, answer in _rows(path):
             if not answer:
                 continue
@@ -86,7 +86,8 @@ def _checked(study: Study, place: str, mark: str, rater: str, question: str, ans
     return answer
 
 
-def _files(paths: Sequence[Path]) -> list[Path]:
+def answer_files(paths: Sequence[Path]) -> list[Path]:
+    """The files, and those in the folders (.csv, .json), that answers are read from."""
     out = []
     for path in map(Path, paths):
         inside = sorted(path.iterdir()) if path.is_dir() else [path]

@@ -45,6 +45,7 @@ def read_study(folder: Path) -> Study:
     text = utf8(path, "a study.json, as 'beyond-mocap study order' writes it", _LARGEST)
     try:
         told = json.loads(text)
+        json.dumps(told, ensure_ascii=False).encode("utf-8")  # halves of characters can be read but not written
         clips = tuple(Clip(*(str(row[key]) for key in ("file", "system", "scenario", "name"))) for row in told["clips"])
         names = {clip.name for clip in clips}
         orders = {str(rater): tuple(_shown(row, names) for row in rows) for rater, rows in told["orders"].items()}
@@ -53,7 +54,7 @@ def read_study(folder: Path) -> Study:
         if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
             raise ValueError(f"{odd!r} is no name")
         return Study(str(told["study"]), int(told["seed"]), told["pairs"], clips, orders)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         found = f"not of the form of a study ({type(error).__name__}: {error})"
         raise InputError(path, found, "what 'study order' writes", "make the study again") from None
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .results import MatchResults, PlayerResult, read_match_results
+from .results import LONGEST, MatchResults, PlayerResult, read_match_results
 from .strips import heat_strip, png
 from .tables import own_warnings, shared_warnings, team_table
 from .worst import LIMITS, WorstSecond, badness, worst_seconds
@@ -67,14 +67,14 @@ def page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
 
 
 def _span(match: MatchResults) -> tuple[float, float]:
-    """First and last second that the page shows: what was asked for, else what there is."""
+    """First and last second that the page shows: what was asked for, else what there is; LONGEST at most."""
     known = [one for one in match.players if one.per_second]
     first, last = match.start, match.end
     if not math.isfinite(first):
         first = min((one.start for one in known), default=0.0)
     if not math.isfinite(last):
         last = max((one.start + len(badness(one)) for one in known), default=first + 1.0)
-    return first, max(last, first + 1.0)
+    return first, min(max(last, first + 1.0), first + LONGEST)
 
 
 def _head(match: MatchResults, span: tuple[float, float]) -> str:

@@ -16,7 +16,9 @@ from ...errors import InputError
 MADE = "done"
 FIGURES = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
 """Keys of a report's `per_second`, beside its `start_s`."""
-_LONGEST = 6 * 3600  # seconds of one match
+LONGEST = 6 * 3600
+"""Most seconds of one match that a page shows."""
+_LATEST = 1e11  # seconds: some clocks count from 1970
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +93,7 @@ def read_match_results(folder: Path) -> MatchResults:
     stages = {str(stage): number(spent) for stage, spent in seconds.items()}
     return MatchResults(
         _text(told.get("title")) or (" - ".join(sides) if len(sides) == 2 else Path(folder).resolve().name),
-        _text(told.get("status")), number(told.get("fps")), number(told.get("from_s")), number(told.get("to_s")),
+        _text(told.get("status")), number(told.get("fps")), _time(told.get("from_s")), _time(told.get("to_s")),
         (*teams.values(), *map(TeamResult, others)), players, stages, _lines(told),
     )  # fmt: skip
 
@@ -114,7 +116,7 @@ def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> Play
     path = folder / f"{Path(_text(row.get('file')) or name).name}.report.json"
     if path.is_file():
         try:
-            report = _object(path)
+            report = _report(path)
         except InputError as error:
             trouble = str(error)
     elif status == MADE:
@@ -132,9 +134,9 @@ def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> Play
 
 def _by_second(told) -> tuple[float, dict[str, np.ndarray]]:
     """The first second, and the columns (S,) of FIGURES, filled with NaN to one length."""
-    if not isinstance(told, Mapping) or not math.isfinite(start := number(told.get("start_s", 0.0))):
+    if not isinstance(told, Mapping) or not math.isfinite(start := _time(told.get("start_s", 0.0))):
         return 0.0, {}
-    lists = {key: told[key][:_LONGEST] for key in FIGURES if isinstance(told.get(key), list)}
+    lists = {key: told[key][:LONGEST] for key in FIGURES if isinstance(told.get(key), list)}
     columns = {key: [number(value) for value in values] for key, values in lists.items()}
     count = max(map(len, columns.values()), default=0)
     return start, {key: np.array(values + [math.nan] * (count - len(values))) for key, values in columns.items()}
@@ -147,8 +149,17 @@ def _lines(told: Mapping) -> tuple[str, ...]:
 
 
 def number(value) -> float:
-    """A number from JSON; NaN for anything else."""
-    return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
+    """A number from JSON; NaN for anything else, and for one that no computer can count with."""
+    try:
+        return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        return math.nan
+
+
+def _time(value) -> float:
+    """Seconds on a match clock; NaN for anything else."""
+    seconds = number(value)
+    return seconds if abs(seconds) <= _LATEST else math.nan
 
 
 def _text(value) -> str:
@@ -159,6 +170,13 @@ def _colour(value) -> str:
     """A colour "#rrggbb", "" for anything else."""
     text = _text(value)
     return text if len(text) == 7 and text[0] == "#" and all(c in "0123456789abcdefABCDEF" for c in text[1:]) else ""
+
+
+def _report(path: Path) -> Mapping:
+    found = _object(path)
+    if not isinstance(found.get("warnings", []), list):
+        raise InputError(path, "cannot be read: its warnings are no list", "a player's report", "make the match again")
+    return found
 
 
 def _object(path: Path) -> Mapping:

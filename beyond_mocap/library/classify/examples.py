@@ -10,6 +10,7 @@ import numpy as np
 
 from ...annotation import LOCOMOTION, VOCABULARY, ClipAnnotation, spoken
 from ...errors import Cancelled, InputError
+from ...motion.humanoid import identify
 from ...motion.motion import Motion
 from ..proposals import GAITS, Proposal, propose
 from .signals import Signals, signals
@@ -50,7 +51,7 @@ def examples_of(
     folder: str | Path, unit: float | None = None, progress=None, cache_dir=None, cancelled=None
 ) -> tuple[Example, ...]:
     """The annotated clips below a library's folder, in its order. unit: metres per unit of the BVH files, guessed where
-    None. progress(fraction, text). InputError where no clip has words, or a file cannot be read; Cancelled."""
+    None. progress(fraction, text). InputError where no clip has words, a file cannot be read or has no legs; Cancelled."""
     read = _clips(folder, True, unit, progress, cache_dir, cancelled)
     out = tuple(Example.of(name, motion, rows) for name, motion, rows in read)
     if not out:
@@ -83,4 +84,8 @@ def _clips(folder, worded: bool, unit, progress, cache_dir, cancelled) -> Iterat
             progress(number / len(paths), f"Looking at {path.name}")
         if bool(annotations.of(path, 30.0)) == worded:
             motion = bvh.read(file, unit if file == path else None).motion
+            try:
+                identify(motion.skeleton)
+            except InputError as error:  # skeletons do not know their files
+                raise InputError(path, str(error)) from None
             yield path.relative_to(folder).as_posix(), motion, annotations.of(path, motion.fps)

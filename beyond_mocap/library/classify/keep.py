@@ -61,7 +61,7 @@ def read(path: str | os.PathLike) -> Classifier:
         raise InputError(path, f"version {version!r}", f"version {VERSION}", _NEXT)
     try:
         return _restored(header, arrays)
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
         raise InputError(path, "numbers that do not belong together", "a file of learned words", _NEXT) from None
 
 
@@ -87,9 +87,11 @@ def _restored(header: dict, arrays: dict) -> Classifier:
 
 def _act(number: int, header: dict, arrays: dict, components: int) -> Act:
     count = len(arrays[f"{number}.weights"])
+    if not count or not _word(header["word"]):
+        raise ValueError("act")
     supports = _array(arrays, f"{number}.supports", (count, components))
     kernel = Kernel(supports, _array(arrays, f"{number}.weights", (count,)), _number(header["shift"]),
-                    _number(header["gamma"]))
+                    _number(header["gamma"], least=0.0))
     choices = tuple(tuple(_word(word) for word in group) for group in header["choices"])
     planes = tuple(_array(arrays, f"{number}.plane.{group}", (len(words), components + 1))
                    for group, words in enumerate(choices))
@@ -97,9 +99,9 @@ def _act(number: int, header: dict, arrays: dict, components: int) -> Act:
     strike = int(header["strike"])
     if len(by_rule) != len(choices) or not -1 <= strike < len(STRIKES) or not all(choices):
         raise ValueError("header")
-    lead, before, after = (_number(header[name]) for name in ("lead", "before", "after"))
+    before, after = (_number(header[name], least=0.0) for name in ("before", "after"))
     return Act(_word(header["word"]), bool(header["moment"]), kernel, _array(arrays, f"{number}.sure", (3,)),
-               _number(header["silent"]), _number(header["shown"]), strike, lead, before, after,
+               _number(header["silent"]), _number(header["shown"]), strike, _number(header["lead"]), before, after,
                Details(choices, planes, by_rule))
 
 
@@ -110,8 +112,8 @@ def _array(arrays: dict, name: str, shape: tuple[int, ...]) -> np.ndarray:
     return found
 
 
-def _number(value) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e6:
+def _number(value, least: float = -1e6) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value < 1e6:
         raise ValueError("number")
     return float(value)
 

@@ -65,7 +65,8 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
     kept = tuple(act for act in acts if act is not None)
     if not kept:
         words = ", ".join(word for word, _ in wanted)
-        raise InputError("examples", f"only {words}, which the rules find as well", "other acts too", "annotate kicks")
+        found = f"only {words}, which the rules find as well or which lies outside its clips"
+        raise InputError("examples", found, "other acts too", "annotate kicks")
     return Classifier(space, kept, len(examples))
 
 
@@ -135,6 +136,8 @@ def _labels(side: _Side, word: str, moment: bool) -> np.ndarray:
 
 def _kernel(word: str, moment: bool, sides: list[_Side]) -> kernel.Kernel | None:
     """The looks of an act; None where these sides show none."""
+    if not sides:
+        return None
     labels = np.concatenate([_labels(side, word, moment) for side in sides])
     rows = np.concatenate([side.rows for side in sides])
     kept = np.concatenate([_thinned(np.flatnonzero(labels == 1)), _thinned(np.flatnonzero(labels == 0))])

@@ -147,6 +147,22 @@ def test_a_player_who_comes_late_and_unknown_values(tmp_path):
     assert "152 s" in page(tmp_path)
 
 
+@pytest.mark.parametrize("changed", [{"to_s": 1e12}, {"to_s": 10**400}, {"from_s": -1e300}])
+def test_seconds_that_no_match_has_do_not_stop_the_page(tmp_path, changed):
+    text = page(written(tmp_path, {"a": report(root_error_m=column(0.002, s7=0.08))}, **changed))
+    assert "1 of 1 players made" in text and "8.0 cm off the track" in text
+
+
+@pytest.mark.parametrize("changed, told", [
+    ({"warnings": 5}, "its warnings are no list"), ({"warnings": None}, "its warnings are no list"),
+    ({"root_error_m": {"mean": 10**400}}, ""), ({"per_second": {"start_s": 1e300, "root_error_m": [1.0]}}, ""),
+])
+def test_odd_values_of_one_player_touch_nobody_else(tmp_path, changed, told):
+    folder = written(tmp_path, {"a": {**report(), **changed}, "b": report(root_error_m=column(0.002, s7=0.08))})
+    text = page(folder)
+    assert told in text and f"{1 if told else 2} of 2 players made" in text and "8.0 cm off the track" in text
+
+
 @pytest.mark.parametrize("told", ["", "[]", "{\"players\": 3}", "{\"players\": [{\"name\": \"x\"}]}", "{", "\xff"])
 def test_a_broken_match_json_is_told_in_one_line(tmp_path, told):
     (tmp_path / "match.json").write_text(told, "latin-1")

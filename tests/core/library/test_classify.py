@@ -1,5 +1,6 @@
 """Acts learned from ten made clips of one body are found on another: what, when, which side; and kept in a file."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -123,6 +124,37 @@ def test_files_that_are_none_are_refused_in_one_line(known, tmp_path):
         keep.write(bad, replace(known, space=wrong))
         with pytest.raises(InputError, match="do not belong together"):
             keep.read(bad)
+
+
+@pytest.mark.parametrize("change", [
+    {"basis": lambda a, h: a["basis"][0]},
+    {"0.supports": lambda a, h: a["0.supports"][:0], "0.weights": lambda a, h: a["0.weights"][:0]},
+    {"gamma": -1.0}, {"before": -1.0}, {"word": ""},
+])
+def test_numbers_that_no_training_gives_are_refused(known, tmp_path, change):
+    path = tmp_path / "words.npz"
+    keep.write(path, known)
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    header = json.loads(arrays["header"].tobytes())
+    arrays.update({name: value(arrays, header) for name, value in change.items() if callable(value)})
+    header["acts"][0].update({name: value for name, value in change.items() if not callable(value)})
+    np.savez(path, **{**arrays, "header": np.frombuffer(json.dumps(header).encode(), np.uint8)})
+    with pytest.raises(InputError, match="do not belong together"):
+        keep.read(path)
+
+
+def test_one_clip_with_two_moments_is_enough(examples):
+    one = examples[0]
+    (row,) = one.rows
+    again = replace(row, start=row.start + 1, end=row.end + 1, key=row.key + 1)
+    assert trained([replace(one, rows=(row, again))]).told() == ("learned from 1 clip", "receive: 2 moments")
+
+
+def test_words_outside_their_clip_teach_nothing_and_are_told(examples):
+    late = ClipAnnotation(9000, 9600, None, ("dribble",))
+    with pytest.raises(InputError, match="outside its clips"):
+        trained([replace(examples[0], rows=(late,))])
 
 
 def test_too_little_to_learn_from_is_told(examples):

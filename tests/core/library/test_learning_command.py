@@ -75,6 +75,25 @@ def test_bad_input_is_one_line(folder, tmp_path, capsys, options, told):
     assert told in line and list(tmp_path.iterdir()) == []
 
 
+def test_a_table_of_words_is_never_lost(folder, tmp_path, capsys):
+    shutil.copytree(folder / "new", tmp_path / "library")
+    table = tmp_path / "library" / "annotations.csv"
+    table.write_text("file,fps,start_frame,end_frame,key_frame,labels\ntwo.bvh,30,0,20,,walking\n")
+    assert main(["library", str(table.parent), "--propose", str(table)]) == 2
+    assert "would be lost" in capsys.readouterr().err and "two.bvh,30,0,20" in table.read_text()
+
+
+@pytest.mark.parametrize("option", ["--learn", "--propose"])
+def test_a_recording_without_legs_is_named(tmp_path, capsys, option):
+    joints = "ROOT Hips { OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition End Site { OFFSET 0 9 0 } }"
+    (tmp_path / "box.bvh").write_text(f"HIERARCHY\n{joints}\nMOTION\nFrames: 2\nFrame Time: 0.033\n0 90 0\n0 90 0\n")
+    if option == "--learn":
+        (tmp_path / "box.txt").write_text("0 0.03 kick")
+    assert main(["library", str(tmp_path), option, str(tmp_path / "out"), "--unit", "0.01"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{tmp_path / 'box.bvh'}: " in line and "upper_leg" in line
+
+
 def test_a_library_without_words_has_nothing_to_learn_from(folder, tmp_path, capsys):
     assert main(["library", str(folder / "new"), "--learn", str(tmp_path / "m.npz")]) == 2
     assert "no clip with words" in capsys.readouterr().err

@@ -40,7 +40,7 @@ def test_in_a_table_it_stands_in_columns_where_these_are(clip, columns, said):
     assert rows == ROWS and read_sources(clip, clip.parent, rows, 30.0) == said
 
 
-@pytest.mark.parametrize("text", ["# by hand", "# learned", "# 0.9", ""])
+@pytest.mark.parametrize("text", ["# by hand", "# learned", "# 0.9", "# take 1", ""])
 def test_other_comments_are_a_persons(clip, text):
     clip.with_suffix(".txt").write_text(f"0f 80f jogging {text}\n")
     rows = read_words(clip, clip.parent, 30.0)

@@ -108,7 +108,7 @@ def test_a_study_comes_back_from_its_file(tmp_path):
 
 @pytest.mark.parametrize("change", [
     {"version": 2}, {"pairs": 1}, {"clips": []}, {"clips": 3}, {"orders": {"R01": ["ab"]}}, {"orders": {"R01": [[]]}},
-    {"orders": []}, {"seed": "x"}, {"orders": {"../R01": []}},
+    {"orders": []}, {"seed": "x"}, {"orders": {"../R01": []}}, {"seed": float("inf")}, {"study": "\ud800"},
     {"clips": [{"name": "../a", "file": "a", "system": "b", "scenario": "c"}], "orders": {}},
 ])
 def test_a_broken_study_file_is_told(tmp_path, change):
@@ -300,6 +300,35 @@ def test_what_is_wrong_is_one_line(tmp_path, capfd, argv, words):
     assert main(["study", *(f"{word}/".replace("T/", f"{tmp_path}/").rstrip("/") for word in argv)]) == 2
     told = capfd.readouterr().err.strip().splitlines()
     assert len(told) == 1 and words in told[0] and not (tmp_path / "o").exists() and not (tmp_path / "r.json").exists()
+
+
+def test_only_movies_are_copied_under_neutral_names(tmp_path, capfd):
+    """A motion under a neutral name would still tell by its joints who made it."""
+    for name in ("good.mp4", "bad.webm"):
+        (tmp_path / name).write_bytes(b"movie")
+    (tmp_path / "clips.csv").write_text(
+        "file,system,scenario\ngood.mp4,training,\nbad.webm,training,\nours.bvh,ours,a\ntheirs.bvh,theirs,a\n", "utf-8")
+    argv = ["--raters", "2", "--out", str(tmp_path / "o"), "--copy"]
+    assert main(["study", "order", str(tmp_path / "clips.csv"), *argv]) == 0
+    assert sorted(path.suffix for path in (tmp_path / "o" / "clips").iterdir()) == [".mp4", ".webm"]
+    assert "2 of 4 clips are no movies" in capfd.readouterr().err
+
+
+def test_a_report_never_takes_the_place_of_answers(tmp_path, capfd):
+    study = ordered(CLIPS, 2)
+    write_study(tmp_path, study)
+    planted(tmp_path / "answers", study, {})
+    one = tmp_path / "answers" / "R01.csv"
+    before = one.read_bytes()
+    assert main(["study", "analyse", str(tmp_path), "--report", str(one)]) == 2
+    assert one.read_bytes() == before and "R01.csv" in capfd.readouterr().err
+
+
+def test_a_hypothesis_that_is_named_twice_counts_once(tmp_path):
+    study = ordered(CLIPS, 8)
+    answers = planted(tmp_path / "a", study, {"ours": 0.5})
+    once, twice = (analysed(study, answers, [("ours", "theirs")] * times) for times in (1, 2))
+    assert len(twice.findings) == 1 and twice.findings[0].holm_p == once.findings[0].holm_p
 
 
 def test_the_forms_script_is_javascript(tmp_path):
