@@ -127,6 +127,7 @@ def judged(target: bpy.types.Object, what: str, index: int = -1) -> str:
     """Carry out one of WHAT; returns a line for the user. InputError for a place that is not in the list."""
     group = target.beyond_mocap_proposals
     if what in ("NEXT", "PREVIOUS"):
+        group.active = min(group.active, len(group.listed) - 1)
         proposals.go_on(target, 1 if what == "NEXT" else -1)
         return proposals.chosen(target).name
     how = proposals.accept if what.startswith("ACCEPT") else proposals.refuse

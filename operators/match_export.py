@@ -57,8 +57,12 @@ stays as it is"""
             raise InputError("export", "no file given", "where to write it", "choose a place")
         path = export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
         scene = context.scene
+        everybody = ours.bodies(scene)
+        bodies = [body for body in everybody if body.name in context.view_layer.objects]
+        if len(bodies) < len(everybody):
+            self.report({"WARNING"}, f"{len(everybody) - len(bodies)} are left out: their collection is excluded")
         wanted = export.Wanted(path, self.format, self.engine, None, self.root)
         things = ours.meshes(scene, "ball") + (ours.meshes(scene, "pitch") if self.pitch else [])
-        for line in export.write(context, ours.bodies(scene), wanted, things):
+        for line in export.write(context, bodies, wanted, things):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")

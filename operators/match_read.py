@@ -26,17 +26,12 @@ The first minute is chosen"""
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
-    def invoke(self, context, event):
-        """Of files that are dropped together the first one is read: a second one is found beside it."""
-        names = sorted(file.name for file in self.files if file.name)
-        if self.directory and names:
-            self.filepath = str(Path(self.directory, _first(names)))
-        return super().invoke(context, event)
-
     def order(self, context):
-        """Which files."""
-        chosen = bpy.path.abspath(self.filepath) if self.filepath else ""
-        return reading.order_of(context.scene.beyond_mocap_match, chosen)
+        """Which files. Of those that are dropped together the largest is read, which is the tracking: others are found
+        beside it."""
+        dropped = [Path(self.directory, name) for name in sorted(file.name for file in self.files) if name]
+        chosen = str(max(dropped, key=_size)) if self.directory and dropped else self.filepath
+        return reading.order_of(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
 
     @staticmethod
     def work(order, progress, cancelled, hurry):
@@ -67,6 +62,6 @@ class BEYOND_MOCAP_FH_match(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def _first(names: list[str]) -> str:
-    """Of a tracking file and its metadata the tracking: that is no .xml and does not say meta."""
-    return next((name for name in names if not name.lower().endswith(".xml") and "meta" not in name.lower()), names[0])
+def _size(path: Path) -> int:
+    """Bytes of a file; 0 where there is none."""
+    return path.stat().st_size if path.is_file() else 0

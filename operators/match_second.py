@@ -8,7 +8,6 @@ from bpy.props import FloatProperty, StringProperty
 from ..beyond_mocap.errors import InputError
 from ..scene import channels
 from ..scene.match import ours
-from ..scene.match.baked import frame_of
 from ..scene.measure import frames_per_second
 from .verb import Verb
 
@@ -36,10 +35,11 @@ seconds"""
     def do(self, context):
         """Set the frame, select the body."""
         scene, shown = context.scene, context.scene.beyond_mocap_match
-        frame = round(frame_of(scene, shown.shown_start, shown.shown_first, self.seconds))
+        rate = shown.shown_rate or frames_per_second(scene)  # keys stay on their frames when the scene's rate changes
+        frame = round(shown.shown_first + (self.seconds - shown.shown_start) * rate)
         last = _last(scene)
         if not shown.shown_first <= frame <= last:
-            end = shown.shown_start + (last - shown.shown_first) / frames_per_second(scene)
+            end = shown.shown_start + (last - shown.shown_first) / rate
             raise InputError("match", f"{self.seconds:g} s is not shown", f"{shown.shown_start:g} to {end:g} s",
                              "choose From and To around it and press Show Match")
         body = self.body(scene)

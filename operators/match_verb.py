@@ -7,6 +7,7 @@ import bpy
 from ..beyond_mocap.errors import InputError
 from ..scene import session
 from ..scene.match import load, show
+from ..scene.measure import frames_per_second
 from ..scene.settings import as_setting
 from .verb import BackgroundVerb
 
@@ -34,6 +35,7 @@ class MatchVerb(BackgroundVerb):
         first = match.first_frame
         took = show.show(bpy.context, scenery, first)
         match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
+        match.shown_rate = frames_per_second(scene)
         match.made = "" if match.folder else as_setting(wanted.folder)
         known = match.report.splitlines()
         match.told = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)

@@ -6,8 +6,8 @@ import bpy
 
 
 def colour(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
-    """The material `name`, made with this colour (linear RGB) where the file has none of that name yet."""
-    found = bpy.data.materials.get(name)
+    """The material `name`, made with this colour (linear RGB) where the file has none of that name of its own yet."""
+    found = bpy.data.materials.get((name, None))  # a linked one cannot be changed
     if found is not None:
         return found
     material = bpy.data.materials.new(name)

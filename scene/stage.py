@@ -11,12 +11,16 @@ from .measure import units_per_metre
 NAME = "Stage"
 FOCUS = "Stage focus"
 MARK = "beyond_mocap_focus"
+OURS = "beyond_mocap_stage"
+"""Custom property of the collection and of all that `create` puts into it."""
+
+EARLIER = {"Grass", "Lines", "Sun", "Camera", FOCUS}  # what stages of files from before that property hold
 HALF_WIDTH = 0.36  # metres to either side that the camera shows with some margin, per metre of its distance
 CAMERA_FROM = (-1.5, -8.5, 1.3)  # metres from the focus: from the touchline, a little above the players' heads
 
 
 def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collection:
-    """A collection "Stage" with pitch, sun and, if wanted, a camera; an older one of that name is taken away first."""
+    """A collection "Stage" with pitch, sun and, if wanted, a camera; an older one is taken away first."""
     scene = context.scene
     remove(scene)
     stage = bpy.data.collections.new(NAME)
@@ -27,28 +31,49 @@ def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collect
     sun(stage)
     if camera:
         scene.camera = _camera(stage, units)
+    for thing in (stage, *stage.objects):
+        thing[OURS] = True
     if scene.world is None:
         scene.world = sky()
     return stage
 
 
 def remove(scene: bpy.types.Scene) -> None:
-    """Take the stage away, with the meshes, lights and cameras that only it used."""
-    stage = scene.collection.children.get(NAME)
+    """Take the stage away, with the meshes, lights and cameras that only it used; what the user has put into its
+    collection stays, and so does a collection of his own that has its name."""
+    stage = _stage(scene)
     if stage is None:
         return
-    for thing in list(stage.objects):
+    for thing in _own(stage):
         data = thing.data
         bpy.data.objects.remove(thing)
         if data is not None and not data.users:
             bpy.data.batch_remove([data])
-    bpy.data.collections.remove(stage)
+    if not stage.objects and not stage.children:
+        bpy.data.collections.remove(stage)
 
 
 def focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The empty that the stage's camera hangs on; None where there is no such camera."""
-    stage = scene.collection.children.get(NAME)
+    stage = _stage(scene)
     return stage.objects.get(FOCUS) if stage else None
+
+
+def _stage(scene: bpy.types.Scene) -> bpy.types.Collection | None:
+    """The collection that `create` has made, by now or in an earlier version."""
+    found = next((one for one in scene.collection.children if one.get(OURS) and one.library is None), None)
+    if found is not None:
+        return found
+    named = scene.collection.children.get(NAME)
+    return named if named is not None and _own(named) else None
+
+
+def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
+    """What `create` has put into a collection."""
+    if stage.get(OURS):
+        return [thing for thing in stage.objects if thing.get(OURS)]
+    named = {thing: thing.name.split(".")[0] for thing in stage.objects}
+    return [thing for thing, name in named.items() if name in EARLIER] if {"Grass", "Lines"} <= set(named.values()) else []
 
 
 def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:

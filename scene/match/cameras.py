@@ -59,8 +59,7 @@ def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndar
 
 def stand_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The camera in the stand; None where there is none."""
-    home = ours.part(scene, "cameras")
-    return next((thing for thing in home.objects if thing.type == "CAMERA" and thing.get(ours.MARK) == STAND), None)
+    return next((thing for thing in ours.things(scene, "cameras") if thing.get(ours.MARK) == STAND), None)
 
 
 def eyes(scene: bpy.types.Scene, who: bpy.types.Object, ball: bpy.types.Object | None) -> bpy.types.Object:
@@ -157,7 +156,7 @@ def _ball_places(scene: bpy.types.Scene, ball: bpy.types.Object | None, frames: 
 
 def _eyes_camera(scene: bpy.types.Scene) -> bpy.types.Object:
     home = ours.part(scene, "cameras")
-    found = next((thing for thing in home.objects if thing.type == "CAMERA" and thing.get(ours.MARK) == EYES), None)
+    found = next((thing for thing in ours.things(scene, "cameras") if thing.get(ours.MARK) == EYES), None)
     if found is None:
         found = bpy.data.objects.new(EYES, bpy.data.cameras.new(EYES))
         found[ours.MARK] = EYES

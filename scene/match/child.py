@@ -21,6 +21,10 @@ from ...beyond_mocap.errors import BeyondMocapError, Cancelled
 
 LOOK = 0.1  # seconds between two looks whether somebody wants out
 PATIENCE = 60.0  # seconds that a cancelled process has to come to its end
+SILENCE = 3.0  # seconds after its end for which its last words are waited for: workers may hold its pipe open
+OWN = "beyond-mocap: "
+"""What the command's own lines about trouble begin with."""
+
 _running: set[subprocess.Popen] = set()
 
 
@@ -44,14 +48,14 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
     try:
         notes, last, asked = _heard(process, progress, cancelled)
     finally:
-        process.stderr.close()
+        _interrupt(process)  # where something else than its end ended the listening
         _running.discard(process)
     if process.returncode == 0:
         return notes
     if asked or process.returncode == Cancelled.exit_status:
         raise Cancelled("cancelled; what was finished is kept, and the next run goes on there")
     ended = f"the process that makes the match ended with status {process.returncode}"
-    trouble = BeyondMocapError(last.removeprefix("beyond-mocap: ") or ended)
+    trouble = BeyondMocapError(last.removeprefix(OWN) or ended)
     trouble.exit_status = process.returncode if process.returncode > 0 else trouble.exit_status
     raise trouble
 
@@ -63,41 +67,45 @@ def end_all() -> None:
 
 
 def _heard(process, progress, cancelled) -> tuple[list[str], str, bool]:
-    """Follow a process to its end: its notes, its last other line, and whether it was asked to stop."""
+    """Follow a process to its end: its notes, what it said last beside them (its own trouble, where it told some), and
+    whether it was asked to stop."""
     lines: queue.SimpleQueue = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(process.stderr, lines), daemon=True).start()
-    notes, last, waited = [], "", None
+    notes, last, asked, ended = [], "", None, None  # asked, ended: when, by the clock
     while True:
-        try:
-            line = lines.get(timeout=LOOK)
-        except queue.Empty:
-            line = ""
-        if line is None:
+        line = _next(lines)
+        now = time.monotonic()
+        ended = now if ended is None and process.poll() is not None else ended
+        if line is None or (not line and ended is not None and now - ended > SILENCE):
             process.wait()
-            return notes, last, waited is not None
+            return notes, last, asked is not None
         told = _told(line)
         if told is None:
-            last = line.strip() or last
+            last = line.strip() or last if line.startswith(OWN) or not last.startswith(OWN) else last
         elif "note" in told:
             notes.append(str(told["note"]))
-        elif waited is None:
+        elif asked is None:
             progress(float(told.get("progress", 0.0)), str(told.get("text", "")))
-        if waited is None and cancelled():
+        if asked is None and cancelled():
             _interrupt(process)
-            waited = 0.0
-        elif waited is not None:
-            waited += LOOK
-            if waited > PATIENCE:
-                process.kill()
+            asked = now
+        elif asked is not None and now - asked > PATIENCE:
+            process.kill()
+
+
+def _next(lines: queue.SimpleQueue) -> str | None:
+    """The next line; empty where none comes for a while, None at their end."""
+    try:
+        return lines.get(timeout=LOOK)
+    except queue.Empty:
+        return ""
 
 
 def _listen(stream, lines) -> None:
-    """Every line of a stream, then None."""
-    try:
+    """Every line of a stream, then None; it closes the stream, since nobody else may while it reads."""
+    with stream:
         for line in stream:
             lines.put(line)
-    except ValueError:  # closed meanwhile
-        pass
     lines.put(None)
 
 

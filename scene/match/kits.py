@@ -86,7 +86,7 @@ def repaint(colours: dict[str, str]) -> None:
         for keeper in (False, True):
             kit = kit_of(Person("", "", -1, team, keeper, ()), colours)
             for part in OWN:
-                if _name(kit, part) in bpy.data.materials:
+                if bpy.data.materials.get((_name(kit, part), None)) is not None:
                     cloth(kit, part)
 
 
@@ -100,7 +100,9 @@ def cloth(kit: Kit, part: str) -> bpy.types.Material:
     if part not in own:
         return colour(part.capitalize(), LOOKS[part])
     material = colour(_name(kit, part), own[part])
-    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = (*own[part], 1.0)
+    nodes = material.node_tree.nodes if material.node_tree is not None else ()
+    shader = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    if shader is not None:  # or the user has made another material of it
+        shader.inputs["Base Color"].default_value = (*own[part], 1.0)
     material.diffuse_color = (*(channel**0.6 for channel in own[part]), 1.0)
     return material

@@ -43,9 +43,8 @@ def scenery(
     """
     from ...beyond_mocap.files.tables import read_ball
     from ...beyond_mocap.library.library import build
-    from ...beyond_mocap.match.folder import read_state
 
-    state = read_state(wanted.folder)
+    state = _state(wanted.folder)
     if library is None:
         library = build(
             wanted.library, unit=wanted.unit, **wanted.build, cancelled=cancelled,
@@ -62,6 +61,20 @@ def scenery(
     return library, seen, tuple(lines)
 
 
+def _state(folder: str) -> dict:
+    """What match.json says. InputError where something is missing that is needed here."""
+    from ...beyond_mocap.match.folder import STATE, read_state
+
+    state = read_state(folder)
+    size = state.get("pitch_m") if isinstance(state.get("pitch_m"), list) else []
+    numbers = [state.get("from_s"), state.get("to_s"), *size]
+    known = len(numbers) == 4 and all(isinstance(number, (int, float)) for number in numbers)
+    if not known or not all("file" in player for player in state["players"]):
+        raise InputError(Path(folder) / STATE, "no times, no pitch, or a player without a file", "the state of a match",
+                         "make the match in another folder")
+    return state
+
+
 def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
     first, last = float(state["from_s"]), float(state["to_s"])
     start, end = max(wanted.start, first), min(wanted.end or last, last)
@@ -76,7 +89,7 @@ def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[li
     from ...beyond_mocap.files.take_npz import read_player
     from ...beyond_mocap.match.shown import shown
 
-    people, lines = [], []
+    people, lines, trouble = [], [], None
     asked = [player for player in state["players"] if not wanted.players or player["id"] in wanted.players]
     for number, player in enumerate(asked):
         if cancelled():
@@ -85,10 +98,16 @@ def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[li
         if player.get("status") != "done":
             lines.append(f"{player['id']} was not made: {player.get('reason') or player.get('status')}")
             continue
-        edit = read_player(Path(wanted.folder) / f"{player['file']}.take.npz")
-        takes = shown(library, edit, ball, *span)
+        try:
+            takes = shown(library, read_player(Path(wanted.folder) / f"{player['file']}.take.npz"), ball, *span)
+        except InputError as error:  # his file alone, or the library: then it is everybody's trouble
+            trouble = error
+            lines.append(f"{player['id']} cannot be shown: {error}")
+            continue
         if takes:
             people.append(_person(player, tuple((take.start_time, take.motion) for take in takes)))
+    if trouble is not None and not people:
+        raise trouble
     return people, lines
 
 

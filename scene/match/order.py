@@ -36,7 +36,10 @@ def _asked(scene: bpy.types.Scene) -> list[str]:
     for option, path in (("--meta", match.metadata_file), ("--events", match.events_file)):
         out += [option, absolute(path)] if path else []
     out += ["--provider", match.provider] if match.provider != AUTO else []
-    out += ["--from", f"{match.start:g}"] + (["--to", f"{match.end:g}"] if match.end > match.start else [])
+    if 0.0 < match.end <= match.start:
+        raise InputError("match", f"To ({match.end:g} s) is not after From ({match.start:g} s)", "a later time",
+                         "set To, or set it to 0 for the match's end")
+    out += ["--from", f"{match.start:g}"] + (["--to", f"{match.end:g}"] if match.end else [])
     out += _players(match)
     out += [] if match.solve_touches else ["--no-solve-touches"]
     out += ["--fps", f"{settings.rate:g}", "--seed", str(settings.seed)]
@@ -80,7 +83,12 @@ def _players(match: BeyondMocapMatch) -> list[str]:
     ticked = [player.feed_id for player in match.players if player.use]
     if match.players and not ticked:
         raise InputError("match", "nobody is ticked", "players", "tick some in the list")
-    return ["--players", *ticked] if len(ticked) < len(match.players) else []
+    if len(ticked) == len(match.players):
+        return []
+    if absolute(match.read_of) != absolute(match.tracking_file):
+        raise InputError("match", f"the list is that of {Path(match.read_of).name}", "the tracking file's own",
+                         "press Read Match, then tick players")
+    return ["--players", *ticked]
 
 
 def _library(settings) -> str:

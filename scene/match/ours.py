@@ -23,8 +23,10 @@ def mark(thing):
 
 
 def root(scene: bpy.types.Scene) -> bpy.types.Collection | None:
-    """The collection "Match"; None where no match is shown."""
-    return next((one for one in scene.collection.children if one.get(MARK) == "root"), None)
+    """The collection "Match", wherever the user has put it; None where no match is shown. One that is linked from
+    another file is that file's."""
+    found = (one for one in scene.collection.children_recursive if one.get(MARK) == "root" and one.library is None)
+    return next(found, None)
 
 
 def part(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
@@ -43,38 +45,53 @@ def part(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def include(layer: bpy.types.ViewLayer) -> None:
-    """Let a view layer have our collections again that somebody has excluded: only what is in it can be animated."""
-    for one in layer.layer_collection.children:
-        if one.collection.get(MARK):
-            for part in (one, *one.children):
-                part.exclude = False
+    """Let a view layer have our collections again that somebody has excluded, by themselves or with one above them: only
+    what is in it can be animated."""
+    _include(layer.layer_collection)
+
+
+def _include(layer: bpy.types.LayerCollection) -> None:
+    for one in layer.children:
+        held = (one.collection, *one.collection.children_recursive)
+        if any(collection.get(MARK) and collection.library is None for collection in held):
+            one.exclude = False
+            _include(one)
 
 
 def bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The armatures that are shown, team by team."""
     whole = root(scene)
-    found = [one for one in whole.children if one.get(MARK) in TEAMS] if whole is not None else []
-    return [thing for one in found for thing in one.objects if thing.type == "ARMATURE" and thing.get(MARK)]
+    teams = [one[MARK] for one in whole.children if one.get(MARK) in TEAMS] if whole is not None else []
+    return [thing for team in teams for thing in things(scene, team) if thing.type == "ARMATURE"]
+
+
+def things(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
+    """What is shown of one of PARTS."""
+    whole = root(scene)
+    found = [one for one in whole.children if one.get(MARK) == name] if whole is not None else []
+    return [thing for one in found for thing in one.objects if thing.get(MARK)]
 
 
 def meshes(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
     """The meshes of one of PARTS that is shown."""
-    whole = root(scene)
-    found = [one for one in whole.children if one.get(MARK) == name] if whole is not None else []
-    return [thing for one in found for thing in one.objects if thing.type == "MESH" and thing.get(MARK)]
+    return [thing for thing in things(scene, name) if thing.type == "MESH"]
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Take away all that is ours, with the actions and data that nothing else uses; emptied collections go too."""
+    """Take away all that is ours, with the actions and data that nothing else uses; emptied collections go too.
+    Actions stay that the user has made, or wants to keep (the shield beside their name)."""
     whole = root(scene)
     if whole is None:
         return
     gone = [thing for thing in whole.all_objects if thing.get(MARK)]
     actions = {_action(owner) for thing in gone for owner in (thing, thing.data)} - {None}
+    actions_of_users = [one for one in actions if not one.get(MARK) and one.library is None]
     data = {thing.data for thing in gone} - {None}
     bpy.data.batch_remove(gone)
     bpy.data.batch_remove([one for one in data if not one.users])
-    bpy.data.batch_remove([one for one in actions if one.get(MARK) and one.users - one.use_fake_user <= 0])
+    bpy.data.batch_remove([one for one in actions if one.get(MARK) and not one.users])
+    for one in actions_of_users:
+        one.use_fake_user = True  # or it would not be saved
     for one in [*whole.children, whole]:
         if not one.all_objects and not one.children:
             bpy.data.collections.remove(one)

@@ -48,17 +48,18 @@ def work(order: Read, progress) -> tuple[Read, "Match"]:
 
 def fill(match: BeyondMocapMatch, order: Read, read: "Match") -> None:
     """The list, the colours and the lines about the data. Who was left out before in the same file stays left out; of
-    another file the first minute is chosen."""
-    same = match.read_of == order.tracking
+    another file the first minute is chosen, and what was chosen beside the file before is forgotten."""
+    same = absolute(match.read_of) == order.tracking
     left_out = {player.feed_id for player in match.players if not player.use} if same else set()
     if not same:
-        match.tracking_file, match.events_file = as_setting(order.tracking), ""
+        match.tracking_file = as_setting(order.tracking)
         match.metadata_file = as_setting(order.metadata) if order.metadata else ""
-        match.folder = ""
+        if match.read_of:
+            match.events_file = match.folder = match.made = ""
         match.start = math.floor(float(read.times[0]))
         match.end = min(match.start + FIRST, math.floor(10.0 * float(read.times[-1])) / 10.0)
         match.active = 0
-    match.read_of, match.length_s = order.tracking, float(read.times[-1])
+    match.read_of, match.length_s = as_setting(order.tracking), float(read.times[-1])
     match.players.clear()
     for player in sorted(read.players, key=lambda one: (TEAMS.index(one.team), one.number)):
         row = match.players.add()

@@ -93,6 +93,7 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     made: StringProperty(options={"HIDDEN"}, description="The folder made last where none is chosen")
     shown_start: FloatProperty(options={"HIDDEN"}, description="Second of the match's clock at the first shown frame")
     shown_first: IntProperty(options={"HIDDEN"}, description="That frame")
+    shown_rate: FloatProperty(options={"HIDDEN"}, description="Frames a second of the keys; 0: the scene's")
     shown: StringProperty(options={"HIDDEN"}, description="The folder that is shown; empty where none is")
 
 

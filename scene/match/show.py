@@ -21,7 +21,6 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
     Returns how many seconds pitch, bodies, keys and cameras took.
     """
     scene, took = context.scene, {}
-    looked = scene.camera is None or bool(scene.camera.get(ours.MARK))
     ours.clear(scene)
     ours.include(context.view_layer)
     last = int(np.floor(baked.frame_of(scene, scenery.start, first, scenery.end) + 1e-4))
@@ -37,7 +36,7 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
     with _clock(took, "cameras"):
         frames, size = np.arange(first, last + 1), (scenery.length, scenery.width)
         camera = cameras.broadcast(scene, size, frames, _followed(scene, scenery, frames, first))
-    if looked:
+    if scene.camera is None:  # nobody's, or one of those that have just gone
         scene.camera = camera
     bake.lengthen(scene, last)
     return took
@@ -53,9 +52,7 @@ def _clock(took: dict[str, float], name: str):
 
 def ball_shown(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The ball of the match that is shown; None where there is none."""
-    home = ours.part(scene, "ball") if ours.root(scene) is not None else None
-    found = [thing for thing in home.objects if thing.type == "MESH" and thing.get(ours.MARK)] if home else []
-    return found[0] if found else None
+    return next(iter(ours.meshes(scene, "ball")), None)
 
 
 def _pitch(scene: bpy.types.Scene, scenery: Scenery) -> None:

@@ -1,6 +1,7 @@
 """A match by its buttons: read, made by a process beside Blender, shown, looked at, and one step of undo each."""
 
 import importlib
+import json
 import pathlib
 import shutil
 
@@ -151,6 +152,65 @@ def test_without_a_folder_each_choice_has_its_own(place):
     assert folder(scene) == room("order").folder_to_show(scene) == str(place)
 
 
+def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path):
+    match = a_match(place, tmp_path / "out")
+    match.start, match.end = 6.0, 3.0
+    with pytest.raises(RuntimeError, match="To .3 s. is not after From .6 s."):
+        bpy.ops.beyond_mocap.make_match()
+    assert not (tmp_path / "out").exists()
+    match.end = 0.0
+    assert "--to" not in room("order").command(bpy.context.scene)
+
+
+def test_what_was_chosen_before_the_first_reading_stays(place):
+    """Of the next file it is forgotten."""
+    scene, events = bpy.context.scene, str(TRACKING.with_name("small_events.csv"))
+    match = scene.beyond_mocap_match
+    match.tracking_file, match.events_file, match.folder = str(TRACKING), events, str(place / "mine")
+    bpy.ops.beyond_mocap.read_match()
+    assert (match.events_file, match.folder) == (events, str(place / "mine"))
+    match.made = str(place / "made")
+    bpy.ops.beyond_mocap.read_match(filepath=str(TRACKING.with_name("small_Home.csv")))
+    assert (match.events_file, match.folder, match.made) == ("", "", "")
+
+
+def test_ticks_of_another_file_are_not_asked_for(place):
+    match = a_match(place, place / "nowhere")
+    match.players[0].use, match.tracking_file = False, str(TRACKING.with_name("small_Home.csv"))
+    with pytest.raises(RuntimeError, match="the list is that of small.dat.*press Read Match"):
+        bpy.ops.beyond_mocap.make_match()
+
+
+def test_of_files_dropped_together_the_tracking_is_read():
+    names = ["small_meta.xml", "small_events.csv", "small.dat"]
+    bpy.ops.beyond_mocap.read_match("INVOKE_DEFAULT", directory=str(TRACKING.parent), files=[{"name": n} for n in names])
+    assert bpy.context.scene.beyond_mocap_match.read_of.endswith("small.dat")
+
+
+def test_one_whose_file_is_gone_leaves_the_others(place, made, tmp_path):
+    shutil.copytree(made, tmp_path / "copy")
+    (tmp_path / "copy" / "home_4.take.npz").unlink()
+    match = shown_again(place, tmp_path / "copy")
+    assert {thing[room("ours").PLAYER] for thing in room("ours").bodies(bpy.context.scene)} == {"home_7"}
+    assert "home_4 cannot be shown" in match.told and "no such file" in match.told
+    (tmp_path / "copy" / "home_7.take.npz").write_bytes(b"no take")
+    with pytest.raises(RuntimeError, match="take.npz"):
+        bpy.ops.beyond_mocap.show_match()
+
+
+@pytest.mark.parametrize("missing", ["pitch_m", "from_s", "file"])
+def test_a_damaged_state_is_told(place, made, tmp_path, missing):
+    state = json.loads((made / "match.json").read_text())
+    for table in (state, *state["players"]):
+        table.pop(missing, None)
+    (tmp_path / "match.json").write_text(json.dumps(state))
+    match = a_match(place, tmp_path)
+    match.start, match.end = 2.0, 8.0
+    with pytest.raises(RuntimeError, match="match.json: no times, no pitch") as caught:
+        bpy.ops.beyond_mocap.show_match()
+    assert "Traceback" not in str(caught.value)
+
+
 def test_cameras_by_their_buttons(place, made):
     shown_again(place, made)
     scene = bpy.context.scene
@@ -172,6 +232,10 @@ def test_a_new_colour_is_worn_at_once(place, made):
     shirt = bpy.data.materials["Match Home shirt"]
     shader = next(node for node in shirt.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     assert np.allclose(shader.inputs["Base Color"].default_value[:3], (0.0, 0.5, 0.1), atol=0.01)
+    shirt.node_tree.nodes.clear()  # made another material by the user: nothing to paint, and no trouble
+    match.home_colour = (0.9, 0.0, 0.1)
+    assert press(bpy.ops.beyond_mocap.show_match) == {"FINISHED"}
+    assert not len(shirt.node_tree.nodes)
 
 
 def test_a_saved_file_shows_it_without_its_folder(place, made, tmp_path):

@@ -2,6 +2,7 @@
 
 import importlib
 import pathlib
+import subprocess
 import sys
 import time
 
@@ -45,6 +46,38 @@ def test_cancelled_it_ends_soon(child, errors, tmp_path):
     with pytest.raises(errors.Cancelled):
         run(child, "library", SAMPLE, "--cache", tmp_path, cancelled=lambda: time.monotonic() - start > 0.5)
     assert time.monotonic() - start < 30.0 and not child._running
+
+
+def heard(child, script, cancelled=lambda: False):
+    """What is heard of a process that runs a Python script."""
+    process = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
+    return *child._heard(process, lambda done, text: None, cancelled), process.returncode
+
+
+def test_one_that_talks_while_it_ends_has_its_time(child):
+    """Patience is in seconds, however many lines come in them."""
+    script = """
+import signal, sys
+signal.signal(signal.SIGINT, lambda *_: (sys.stderr.write("ending\\n" * 2000), sys.exit(130)))
+print("{}", file=sys.stderr, flush=True)
+signal.pause()
+"""
+    begun = time.monotonic()
+    *_, asked, status = heard(child, script, lambda: time.monotonic() - begun > 1.0)
+    assert asked and status == 130
+
+
+def test_a_worker_that_lives_on_is_not_waited_for(child, monkeypatch):
+    monkeypatch.setattr(child, "SILENCE", 0.3)
+    script = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(8)'])"
+    start = time.monotonic()
+    assert heard(child, script)[-1] == 0
+    assert time.monotonic() - start < 6.0
+
+
+def test_its_own_words_count_whatever_is_said_after_them(child):
+    script = "import sys; sys.exit(print('beyond-mocap: no such file\\nUserWarning: leaked', file=sys.stderr) or 2)"
+    assert heard(child, script)[1] == "beyond-mocap: no such file"
 
 
 def test_it_finds_the_core_wherever_it_is_started_from(child, tmp_path, monkeypatch):

@@ -77,6 +77,18 @@ def test_a_root_bone_carries_everybody(room, scenery, tmp_path):  # noqa: F811
     assert not any("goal" in thing.name.lower() for thing in bpy.context.scene.objects)
 
 
+def test_who_is_excluded_is_left_out_and_that_is_told(room, scenery, tmp_path):  # noqa: F811
+    scene = shown(room, scenery, first=1)
+    layers = bpy.context.view_layer.layer_collection.children["Match"].children
+    next(layer for layer in layers if layer.name == "Match Home").exclude = True
+    path = tmp_path / "match.fbx"
+    bpy.ops.beyond_mocap.match_export(filepath=str(path), format="FBX", pitch=False)
+    assert len(room("ours").bodies(scene)) == 4
+    bpy.ops.wm.read_homefile(use_empty=True)
+    READERS[".fbx"](str(path))
+    assert len([thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE"]) == 2
+
+
 def test_without_a_match_nothing_is_written(tmp_path):
     with pytest.raises(RuntimeError, match="Show a match first|poll"):
         bpy.ops.beyond_mocap.match_export(filepath=str(tmp_path / "match.fbx"))

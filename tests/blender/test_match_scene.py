@@ -179,6 +179,72 @@ def test_shown_again_where_its_collections_were_excluded(room, scenery):
     assert body.visible_get() and body.animation_data.action_slot is not None
 
 
+def test_it_takes_its_own_place_below_another_collection(room, scenery):
+    scene = shown(room, scenery)
+    room("ours").part(scene, "home").objects.link(bpy.data.objects.new("Mine", None))  # so that it stays
+    above, whole = bpy.data.collections.new("Above"), room("ours").root(scene)
+    scene.collection.children.link(above)
+    scene.collection.children.unlink(whole)
+    above.children.link(whole)
+    bpy.context.view_layer.layer_collection.children["Above"].exclude = True
+    shown(room, scenery)
+    assert len([thing for thing in scene.objects if thing.type == "ARMATURE"]) == 4
+    assert room("ours").root(scene) in above.children[:] and room("ours").bodies(scene)[0].visible_get()
+
+
+def test_actions_that_somebody_keeps_stay(room, scenery):
+    """His own, which gets a shield, and one of ours that he has given a shield; others go."""
+    scene = shown(room, scenery)
+    first, second, *_ = room("ours").bodies(scene)
+    own = bpy.data.actions.new("Mine")
+    own.slots.new(id_type="OBJECT", name="Mine")
+    first.animation_data.action, first.animation_data.action_slot = own, own.slots[0]
+    second.animation_data.action.name, second.animation_data.action.use_fake_user = "Kept", True
+    shown(room, scenery)
+    room("ours").clear(scene)
+    kept = {action.name for action in bpy.data.actions if action.use_fake_user}
+    assert kept == {"Mine", "Kept"}
+
+
+def test_a_match_linked_from_another_file_is_left_alone(room, scenery, tmp_path):
+    shown(room, scenery)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "other.blend"), link=True) as (_, linked):
+        linked.collections = ["Match"]
+    scene = bpy.context.scene
+    scene.collection.children.link(linked.collections[0])
+    assert not room("ours").bodies(scene)
+    shown(room, scenery)
+    assert len(room("ours").bodies(scene)) == 4 and all(not thing.library for thing in room("ours").bodies(scene))
+    assert linked.collections[0] in scene.collection.children[:] and len(linked.collections[0].all_objects) > 10
+    worn = room("ours").bodies(scene)[0].children[0].data.materials
+    assert all(cloth.library is None for cloth in worn)  # a linked one would not take a new colour
+
+
+def test_the_stage_stands_aside_and_the_users_things_on_it_stay(room, scenery):
+    stage = importlib.import_module(f"{EXTENSION}.scene.stage")
+    scene = bpy.context.scene
+    stage.create(bpy.context)
+    own = bpy.data.objects.new("Mine", None)
+    scene.collection.children["Stage"].objects.link(own)
+    shown(room, scenery)
+    assert scene.camera == room("cameras").stand_of(scene) is not None
+    assert scene.collection.children["Stage"].objects[:] == [own]
+    bpy.data.objects.remove(own)
+    stage.remove(scene)
+    assert "Stage" not in scene.collection.children
+
+
+def test_a_stage_of_the_users_own_stays(room, scenery):
+    scene, own = bpy.context.scene, bpy.data.collections.new("Stage")
+    scene.collection.children.link(own)
+    for name in ("Camera", "Sun", "Grass"):
+        own.objects.link(bpy.data.objects.new(name, None))
+    shown(room, scenery)
+    assert sorted(thing.name for thing in own.objects) == ["Camera", "Grass", "Sun"]
+
+
 def test_the_stands_camera_keeps_the_ball_in_its_picture(room, scenery):
     from bpy_extras.object_utils import world_to_camera_view
 

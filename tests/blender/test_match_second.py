@@ -30,6 +30,13 @@ def test_it_goes_to_the_frame_and_selects_the_player(shown):
     assert bpy.context.scene.frame_current == 11 and bpy.context.object.name == "away_9"
 
 
+def test_keys_stay_on_their_frames_when_the_scenes_rate_changes(shown):
+    bpy.context.scene.beyond_mocap_match.shown_rate = 25.0
+    bpy.context.scene.render.fps = 50
+    bpy.ops.beyond_mocap.match_second(seconds=66.0)
+    assert bpy.context.scene.frame_current == 11 + 150
+
+
 @pytest.mark.parametrize("asked, words", [
     ({"seconds": 59.0}, "59 s is not shown; expected 60 to 70 s"), ({"seconds": 71.0}, "60 to 70 s"),
     ({"seconds": 66.0, "player": "home_1"}, "home_1 is not shown; expected one of home_7, away_9"),
