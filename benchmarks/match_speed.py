@@ -57,7 +57,8 @@ def half_row(match: Match) -> str:
     track = match.track(match.players[0].id)
     cleaned, (known, _) = seconds(lambda: clean(track))
     sampled, _ = seconds(lambda: sample(known, 30.0))
-    return row([match.players[0].id, f"{(track.times[-1] - track.times[0]) / 60:.1f}", f"{cleaned:.3f}", f"{sampled:.3f}"])
+    minutes = (track.times[-1] - track.times[0]) / 60
+    return row([match.players[0].id, f"{minutes:.1f}", f"{cleaned:.3f}", f"{sampled:.3f}"])
 
 
 def peak_memory() -> str:

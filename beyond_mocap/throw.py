@@ -23,6 +23,7 @@ from .ball.released.correction import FINE, LITTLE, Corrected, Freedom, correcte
 from .ball.released.letting_go import AtFoot, InHand, grip_point, leaving
 from .errors import InputError
 from .motion import quaternion
+from .motion.arctangent import arctan2
 from .motion.between_frames import cubic_at
 from .motion.grip import grip_of
 from .motion.humanoid import identify, stature
@@ -390,8 +391,8 @@ class _Work:
     def _check_steep(self, own: list[int], most: float) -> None:
         """InputError for a target to which the ball has to leave far more steeply than in any of the examples."""
         along, _, up = self.arcs.at(most)
-        steep, known = np.arctan2(up, along), self.launches[own]
-        steepest = float(np.arctan2(known[:, 2], np.hypot(known[:, 0], known[:, 1])).max())
+        steep, known = arctan2(up, along), self.launches[own]
+        steepest = float(arctan2(known[:, 2], np.hypot(known[:, 0], known[:, 1])).max())
         if steep > steepest + _STEEPER:
             found = f"the ball has to leave at {np.degrees(steep):.0f} degrees"
             expected = f"at most {np.degrees(steepest + _STEEPER):.0f}: the steepest example has {np.degrees(steepest):.0f}"

@@ -16,6 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..errors import InputError
+from ..motion.arctangent import arctan2
 from . import batch
 from .physics import Ball, length
 
@@ -322,7 +323,7 @@ def _best_time(problem: _Problem, times: np.ndarray, loft: float | None) -> np.n
     launch, found = problem.only(np.repeat(np.arange(count), each)).at_time(times.ravel()).guessed()
     worth = length(launch)
     if loft is not None:
-        worth = np.abs(np.arctan2(launch[:, 2], length(launch * [1.0, 1.0, 0.0])) - loft)
+        worth = np.abs(arctan2(launch[:, 2], length(launch * [1.0, 1.0, 0.0])) - loft)
     best = np.argmin(np.where(found, worth, worth + 1e6).reshape(count, each), axis=1)
     return times[np.arange(count), best]
 

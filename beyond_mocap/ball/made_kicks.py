@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.adult import adult_skeleton
+from ..motion.arctangent import arctan2
 from ..motion.gait_tables import LEG
 from ..motion.kicks import BEFORE, KICKS, KickStyle, contact, kicked
 from ..motion.motion import Motion, place
@@ -82,7 +83,7 @@ class _Aim:
         steep = _slopes(contact(style, neutral, foot, [(0.0, 0.0)])[0])[0] > _STEEP
         self.ways = self._cleared(_LOFTS) if steep else np.stack([_LIFTS, np.zeros_like(_LIFTS)], axis=-1)
         launches = self.launches_of(self.ways)
-        rising = np.arctan2(launches[:, 5], np.hypot(launches[:, 3], launches[:, 4]))
+        rising = arctan2(launches[:, 5], np.hypot(launches[:, 3], launches[:, 4]))
         order = np.argsort(rising)
         self.rising, self.ways, self.launches = rising[order], self.ways[order], launches[order]
 

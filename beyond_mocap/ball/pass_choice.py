@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from .aim import aim
 from .batch import courses
 from .contact import in_world
@@ -129,7 +130,7 @@ def _faced(court: Court, moments: StrikeMoments, site: Site, toward: np.ndarray)
     """Each moment with each way to face, and these (N,) rad: where the natural way goes at `toward` (3,) m, and
     beside."""
     velocity = moments.struck.velocity
-    natural = np.arctan2(velocity[:, 1], velocity[:, 0]) * (site.asked is not None)  # a trap gives way
+    natural = arctan2(velocity[:, 1], velocity[:, 0]) * (site.asked is not None)  # a trap gives way
     bearing = np.arctan2(*(toward[:2] - site.place)[::-1])
     facing = (bearing - natural)[:, None] + TURNS
     if court.scene.directions:

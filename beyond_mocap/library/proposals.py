@@ -3,8 +3,8 @@
 Locomotion follows from the pelvis's speed and from where the body faces while it travels. Actions are found by what
 stands out: a foot that swings faster than any stride of that speed would (a kick: the key moment is the foot's highest
 speed, the side the faster foot's), a body that falls freely for longer than a run does (a jump: its highest point), a
-head that strikes forward in the air (a header), a body that turns on the spot, one that gets up from the ground. There is
-no ball in a recording, so what only a ball shows (dribbling, receiving) is not proposed.
+head that strikes forward in the air (a header), a body that turns on the spot, one that gets up from the ground. There
+is no ball in a recording, so what only a ball shows (dribbling, receiving) is not proposed.
 
 `propose` is all that others call. With a classifier that has learned from annotated clips (`library.classify`) the
 rules are what it starts from: it weighs them with what it has seen, and they stay for all acts that it does not know.
@@ -242,7 +242,8 @@ def _turns(seen: _Seen) -> list[Proposal]:
             angle = abs(float(seen.facing[stop - 1] - seen.facing[start]))
             if angle >= _TURN and stop - start >= seen.frames(0.25):
                 sure = float(np.clip(0.4 + angle / np.pi, 0.5, 0.95))
-                out.append(Proposal(seen.row(start, stop - 1, ("turning", side)), sure, f"{np.degrees(angle):.0f} degrees"))
+                row = seen.row(start, stop - 1, ("turning", side))
+                out.append(Proposal(row, sure, f"{np.degrees(angle):.0f} degrees"))
     return out
 
 

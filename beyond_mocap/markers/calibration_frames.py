@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..motion.arctangent import arctan2
 from .frames import rigid_fit
 from .trial import MarkerTrial
 
@@ -45,7 +46,7 @@ def _cosine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _tilt(v: np.ndarray) -> np.ndarray:
     """Angle in radians between vectors (T, 3) and the vertical."""
-    return np.arctan2(np.linalg.norm(v[:, :2], axis=-1), v[:, 2])
+    return arctan2(np.linalg.norm(v[:, :2], axis=-1), v[:, 2])
 
 
 def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..motion import quaternion
+from ..motion.arctangent import arctan2
 from .chain import Chain, Poses, angles_of, cross, own_axes, within
 from .elimination import Own
 
@@ -67,7 +68,7 @@ def _read(q: np.ndarray, order: str) -> np.ndarray:
     first = 2.0 * (sign * v[1] * v[2] - w * v[0]), 1.0 - 2.0 * (v[0] * v[0] + v[1] * v[1])
     third = 2.0 * (sign * v[0] * v[1] - w * v[2]), 1.0 - 2.0 * (v[1] * v[1] + v[2] * v[2])
     middle = np.arcsin(np.clip(2.0 * (sign * v[0] * v[2] + w * v[1]), -1.0, 1.0))
-    return np.stack([np.arctan2(-first[0], first[1]), middle, np.arctan2(-third[0], third[1])], axis=-2)
+    return np.stack([arctan2(-first[0], first[1]), middle, arctan2(-third[0], third[1])], axis=-2)
 
 
 def _counts(angles: np.ndarray) -> np.ndarray:

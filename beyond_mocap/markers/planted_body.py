@@ -12,6 +12,7 @@ import numpy as np
 
 from ..motion import quaternion
 from ..motion.anatomy import Anatomy, head_chain, study
+from ..motion.arctangent import arctan2
 from ..motion.humanoid import Limb, identify_posed
 from ..motion.motion import Motion, forward_kinematics, pose_kinematics
 from ..motion.skeleton import Skeleton
@@ -76,7 +77,7 @@ def _forearm_turns_hand(turns: dict[str, np.ndarray], side: str) -> None:
         return
     forearm, hand = turns[side + "ForeArm"], turns[side + "Hand"]
     bend = quaternion.multiply(quaternion.inverse(forearm), hand)
-    angle = 2.0 * np.arctan2(bend[:, 2], bend[:, 0])
+    angle = 2.0 * arctan2(bend[:, 2], bend[:, 0])
     turns[side + "ForeArm"] = quaternion.multiply(forearm, quaternion.about_axis(_Y, angle))
 
 

@@ -12,7 +12,6 @@ NEAR = 10.0
 PHASE = 0.15
 """Seconds between the places in a clip within which two players are in step."""
 
-
 APART = 0.3
 """Seconds between the lags of two players who come near each other."""
 

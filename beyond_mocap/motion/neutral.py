@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import quaternion
+from .arctangent import arctan2
 from .humanoid import Humanoid, Limb, heading_from_positions, identify
 from .limb import unit
 from .motion import Motion, forward_kinematics, pose_kinematics
@@ -145,7 +146,7 @@ def _sole_slope(skeleton: Skeleton, limb: Limb, world: np.ndarray, example: Moti
         ankle = places[:, limb.foot]
         bones = places[:, limb.toe] - ankle
         low = ankle[:, 2] <= np.quantile(ankle[:, 2], 0.25)
-        slope = float(np.median(np.arctan2(-bones[low, 2], np.hypot(bones[low, 0], bones[low, 1]))))
+        slope = float(np.median(arctan2(-bones[low, 2], np.hypot(bones[low, 0], bones[low, 1]))))
         return float(np.clip(slope, np.radians(5.0), np.radians(50.0)))
     direction = _direction(skeleton, world, limb.foot, limb.toe)
     slope = float(np.arctan2(-direction[2], np.hypot(direction[0], direction[1])))

@@ -14,6 +14,7 @@ from .questions import SCALE
 
 COLOURS = ("#b5482a", "#e3a587", "#d9d9d9", "#8fb8de", "#2563a8")
 _WIDTH, _DPI = 11.0, 100
+_NAME = {"fontsize": 9, "parse_math": False}  # a name may have dollars in it
 
 
 def rows_of(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -34,7 +35,7 @@ def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     y, ticks, names = 0.0, [], []
     for title, rows in groups:
         if title:
-            ax.text(0.0, y, title, transform=ax.get_yaxis_transform(), fontsize=9, weight="bold", va="center")
+            ax.text(0.0, y, title, transform=ax.get_yaxis_transform(), weight="bold", va="center", **_NAME)
             y += 0.8
         for row in rows:
             _bar(ax, y, row.counts)
@@ -42,7 +43,7 @@ def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
             names.append(f"{row.name} ({int(row.counts.sum())})")
             y += 1.0
         y += 0.3
-    ax.set_yticks(ticks, names, fontsize=9)
+    ax.set_yticks(ticks, names, **_NAME)
     ax.set_ylim(y, -0.8)
     ax.set_xlim(-100.0, 100.0)
     ax.set_xticks(range(-100, 101, 25), [f"{abs(at)} %" for at in range(-100, 101, 25)])
@@ -65,7 +66,7 @@ def differences(findings: Sequence[Finding], unit: str) -> bytes:
         ax.plot([finding.low, finding.high], [row, row], color="#222222", lw=2)
         ax.plot([finding.mean], [row], "D", color="#222222", ms=6)
     ax.axvline(0.0, color="#b5482a", lw=1, ls="--")
-    ax.set_yticks(range(len(findings)), [f"{finding.new} - {finding.old}" for finding in findings], fontsize=9)
+    ax.set_yticks(range(len(findings)), [f"{finding.new} - {finding.old}" for finding in findings], **_NAME)
     ax.set_ylim(len(findings) - 0.4, -0.6)
     ax.set_xlabel(unit, fontsize=8)
     return _png(figure)

@@ -1,7 +1,7 @@
 """The cheapest of many pairs of a rate and a library frame, without weighing them all.
 
-Pairs lie in the order of their speeds, and each costs at least the speed that it misses. What every eighth of them costs
-tells how dear the cheapest are at most, and so how far from the asked speed they can lie.
+Pairs lie in the order of their speeds, and each costs at least the speed that it misses. What every eighth of them
+costs tells how dear the cheapest are at most, and so how far from the asked speed they can lie.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 _SAMPLED = 8
-_ABOVE = 1.25  # as many pairs as are wanted lie below the cost below which this many times their share of the sample does
+# as many pairs as are wanted lie below the cost below which this many times their share of the sample lies
+_ABOVE = 1.25
 _ROUNDING = 1e-3
 
 
@@ -37,8 +38,8 @@ def _nearest(speeds: np.ndarray, speed: float, count: int) -> slice:
 
 
 def _promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: slice, count: int):
-    """The part of `near` that holds the `count` cheapest pairs, and what its pairs cost; all of `near` where it is small
-    or the sample deceives."""
+    """The part of `near` that holds the `count` cheapest pairs, and what its pairs cost; all of `near` where it is
+    small or the sample deceives."""
     rank = int(_ABOVE * count / _SAMPLED)
     if near.stop - near.start > 4 * _SAMPLED * rank and weight > 0.0:
         most = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]

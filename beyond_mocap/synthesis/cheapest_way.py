@@ -16,8 +16,8 @@ _SAME = 0.05  # library frames between two that are one but for rounding
 
 @dataclass(frozen=True, eq=False)
 class Offered:
-    """K frames to come to: clip (K,), fractional library frame start (K,), rate (K,) and cost (K,) of what is shown from
-    there on; piece (K,) of a key moment that begins there, or -1."""
+    """K frames to come to: clip (K,), fractional library frame start (K,), rate (K,) and cost (K,) of what is shown
+    from there on; piece (K,) of a key moment that begins there, or -1."""
 
     clip: np.ndarray
     start: np.ndarray
@@ -31,8 +31,8 @@ class Offered:
 
 
 class Ways:
-    """All ways on from B states: clip (B,) that each shows, library frame end (B,) at which it ends, rate (B,), cost (B,)
-    so far, seen (B, buckets) bool what it has lately shown.
+    """All ways on from B states: clip (B,) that each shows, library frame end (B,) at which it ends, rate (B,), cost
+    (B,) so far, seen (B, buckets) bool what it has lately shown.
 
     A way costs a cut, unless the clip shows that frame next anyway, and the change of rate; `costs` are a search's
     `PathCosts`. Costs are float32 above `base`, that of the cheapest state, so that they stay exact in long searches.

@@ -114,8 +114,8 @@ class PathCosts:
 
     def cheapest(self, first: int, end: int, looked_at: int, count: int):
         """The `count` pairs of rate and library frame that cost least of the `looked_at` nearest in speed: number (K,),
-        frame (K,), misfit (K,). The others' misfit in speed alone would put them behind, and a large library is searched
-        as fast as a small one."""
+        frame (K,), misfit (K,). The others' misfit in speed alone would put them behind, and a large library is
+        searched as fast as a small one."""
         words, avoid = self._words(first, end), self.wanted.avoided_in(first, end)
         pairs, still, (speed, _) = self.offer.in_speed(avoid), self._still(words, avoid), self.asked(first, end)
 
@@ -209,9 +209,9 @@ class PathCosts:
         yield "facing", w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
 
     def cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
-        """What a cut from library frames ends (B,) to start (K,) costs, by name, each (B, K) or broadcast to it: how far
-        their poses are apart ("pose", first), and how wild the motion is that is left or entered (nobody can blend out of
-        a kick half way)."""
+        """What a cut from library frames ends (B,) to start (K,) costs, by name, each (B, K) or broadcast to it: how
+        far their poses are apart ("pose", first), and how wild the motion is that is left or entered (nobody can blend
+        out of a kick half way)."""
         ends, start = self.inside(ends), self.inside(start)
         yield "pose", self.apart(ends, start)
         yield "feet", np.float32(self.weights.feet) * self.feet_apart(ends[:, None], start)
@@ -220,7 +220,7 @@ class PathCosts:
         yield "cut", entered
 
     def left_and_entered(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(B,) what it costs to leave library frames ends (B,), and (K,) to cut to start (K,), whatever the other is."""
+        """(B,) what it costs to leave library frames ends (B,), (K,) what to cut to start (K,), whatever the other."""
         left = self.weights.wild * self.offer.wild_before[ends]
         entered = self.weights.switch + self.weights.wild * self.offer.wild_after[start]
         return left.astype(np.float32), entered.astype(np.float32)

@@ -78,9 +78,8 @@ class PathSearch:
 
     between: search this stretch only and keep the rest. used: footage to do without where that can be. alike: another
     measure of how far poses are apart. on_grid: slots lie as in other searches of the same frames (`slot_edges`).
-    hurry: when it
-    says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None; before the first
-    slot is filled it ends the search as `cancelled` does.
+    hurry: when it says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None;
+    before the first slot is filled it ends the search as `cancelled` does.
     """
 
     def __init__(

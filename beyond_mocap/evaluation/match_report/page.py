@@ -201,9 +201,12 @@ def _moment_anchor(one: WorstSecond, anchors: Mapping[str, str]) -> str:
 
 
 def _frame(match: MatchResults, time: float) -> str:
-    """Which frame of the take it is; nothing where rate or beginning are not known."""
-    frame = (time - match.start) * match.fps
-    return f", frame {round(frame)}" if math.isfinite(frame) else ""
+    """Which frame of the span it is, counted from the first on the clock's grid, as in ball.csv; nothing where rate or
+    beginning are not known."""
+    if not math.isfinite(match.start * match.fps):
+        return ""
+    first = math.ceil(match.start * match.fps - 1e-6)
+    return f", frame {max(math.ceil(time * match.fps - 1e-6) - first, 0)}"
 
 
 def _go_to(one: WorstSecond) -> str:

@@ -24,6 +24,7 @@ _COMPONENTS, _FOLDS, _MOST = 80, 5, 4000  # of a window; of the clips; windows t
 _KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1  # seconds: an act's moment; where it is neither; the same of a stretch's ends
 _MARGIN = 0.1  # of F1 by which a stretch has to be told better than by the rules
 _EVERY = 5  # samples between two of a stretch that count for its confidence and words
+_WINDOWS = 60000  # that the space is made from at most: half a gigabyte
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
         found = f"{len(examples)} clips with too few key moments"
         raise InputError("examples", found, "two moments of an act at least", "annotate more clips, kicks for example")
     with threadpool_limits(limits=1):  # with more, sums of products come out in another order
-        space = Space.of(np.concatenate([windows(s) for one in examples for s in _sides(one)]), _COMPONENTS)
+        space = _space(examples)
         sides = [side for one in examples for side in _twins(one, space)]
         acts = []
         for number, (word, moment) in enumerate(wanted):
@@ -68,6 +69,13 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
         found = f"only {words}, which the rules find as well or which lies outside its clips"
         raise InputError("examples", found, "other acts too", "annotate kicks")
     return Classifier(space, kept, len(examples))
+
+
+def _space(examples: Sequence[Example]) -> Space:
+    """The space of the windows of all clips, of evenly spaced ones where they are too many."""
+    sides = [side for one in examples for side in _sides(one)]
+    step = max(1, -(-sum(map(len, sides)) // _WINDOWS))
+    return Space.of(np.concatenate([windows(side)[::step] for side in sides]), _COMPONENTS)
 
 
 def _acts(examples: Sequence[Example]) -> dict[tuple[str, bool], float]:

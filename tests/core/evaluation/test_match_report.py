@@ -111,6 +111,13 @@ def test_the_page_tells_who_when_and_which_frame(tmp_path):
     assert "0.21" in text and "12.3 s" in text and "ball &lt;measured&gt; in 80 %" in text
 
 
+@pytest.mark.parametrize("start, frame", [(FIRST, 210), (FIRST + 0.01, 209), (FIRST + 7.9, 0)])
+def test_frames_count_from_the_first_on_the_clocks_grid(tmp_path, start, frame):
+    """Second 107 begins with frame 3210 of the clock; 100.01 s lie between its frames 3000 and 3001."""
+    text = page(written(tmp_path, {"a": report(root_error_m=column(0.002, s7=0.08))}, from_s=start))
+    assert f"</b>, frame {frame}:" in text
+
+
 def test_nothing_is_loaded_all_is_escaped_and_links_lead_somewhere(tmp_path):
     reports = {name: report(root_error_m=column(0.002, s10=0.1)) for name in ("a", "b", "c")}
     reports["c"]["warnings"] = ["<script>alert(1)</script>"]

@@ -10,7 +10,7 @@ import pytest
 from beyond_mocap.annotation import ClipAnnotation, read_annotation_csv
 from beyond_mocap.errors import Cancelled, InputError
 from beyond_mocap.files import bvh
-from beyond_mocap.library.classify import confidence, keep
+from beyond_mocap.library.classify import confidence, keep, train
 from beyond_mocap.library.classify.examples import Example, act_of
 from beyond_mocap.library.classify.signals import signals
 from beyond_mocap.library.classify.train import trained
@@ -142,6 +142,14 @@ def test_numbers_that_no_training_gives_are_refused(known, tmp_path, change):
     np.savez(path, **{**arrays, "header": np.frombuffer(json.dumps(header).encode(), np.uint8)})
     with pytest.raises(InputError, match="do not belong together"):
         keep.read(path)
+
+
+def test_a_large_library_is_learned_from_a_part_of_its_windows(examples, monkeypatch):
+    monkeypatch.setattr(train, "_WINDOWS", 400)
+    known = trained(examples)
+    assert known.space.basis.shape[1] == 80 and sum(2 * len(one.signals) for one in examples) > 800
+    (one,) = moments(volley("attack", adult_skeleton(1.62), seed=7).motion, known)
+    assert one.annotation.words[0] == "kick"
 
 
 def test_one_clip_with_two_moments_is_enough(examples):

@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from beyond_mocap.study.answers import read_answers
 from beyond_mocap.study.bars import rows_of
 from beyond_mocap.study.form import form_page, form_table, questions_of
 from beyond_mocap.study.order import Clip, ordered
+from beyond_mocap.study.page import study_page
 from beyond_mocap.study.study_file import read_study, write_study
 
 SYSTEMS, SCENARIOS = ("ours", "skating", "theirs"), ("s1", "s2", "s3", "s4", "s5")
@@ -322,6 +324,15 @@ def test_a_report_never_takes_the_place_of_answers(tmp_path, capfd):
     before = one.read_bytes()
     assert main(["study", "analyse", str(tmp_path), "--report", str(one)]) == 2
     assert one.read_bytes() == before and "R01.csv" in capfd.readouterr().err
+
+
+def test_names_are_drawn_as_they_are(tmp_path):
+    pytest.importorskip("matplotlib")
+    names = {"ours": r"$\frac$", "theirs": "a $ b $ <c>"}
+    clips = [replace(clip, system=names.get(clip.system, clip.system), scenario=f"${clip.scenario}_$") for clip in CLIPS]
+    study = ordered(clips, 4)
+    page = study_page(analysed(study, planted(tmp_path / "a", study, {})))
+    assert page.count("data:image/png") == 3 and "&lt;c&gt;" in page and "<c>" not in page
 
 
 def test_a_hypothesis_that_is_named_twice_counts_once(tmp_path):
