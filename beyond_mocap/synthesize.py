@@ -114,7 +114,8 @@ def constructed(library: Library, known: Plan, edit: EditList, progress: Progres
 
     known: the plan with its key moments and its ball as they are in force (`known_touches.in_force`). edit: at the
     library's rate, from the track's first time on; its clips are those of `library`, which has made ones
-    (`Library.extended`) where it shows them. The same arguments and numpy give the same bits.
+    (`Library.extended`) where it shows them. What gave way is not told in its warnings: it may be a part of a longer
+    take, of which `evaluation.evaluate` tells it. The same arguments and numpy give the same bits.
     """
     from threadpoolctl import threadpool_limits
 
@@ -122,7 +123,7 @@ def constructed(library: Library, known: Plan, edit: EditList, progress: Progres
         plan = in_library_size(known, size_of(known, library.skeleton))
         order = wanted(library, plan)
         take, seconds = _laid_out(library, plan, order, Found(edit), progress or (lambda fraction, text: None))
-        return finished(replace(take, seconds=seconds), known, known, library, order, None)
+        return finished(replace(take, seconds=seconds), known, known, library, order, None, judged=False)
 
 
 def _laid_out(
@@ -250,16 +251,16 @@ def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
 
 def finished(
     take: Take, asked: Plan, plan: Plan, recordings: Library, order: Wanted, hurried: int | None,
-    before: Take | None = None,
+    before: Take | None = None, judged: bool = True,
 ) -> Take:
     """A take out of the library's size in the player's, with its pins, its ball and its warnings. plan: `asked` as it
-    is in force; before: the finished take that it is an edit of."""
+    is in force; before: the finished take that it is an edit of; judged: as `with_warnings` has it."""
     take = with_pins(in_own_size(take, size_of(asked, recordings.skeleton), asked, before), recordings)
     begun = time.perf_counter()
     take = with_course(take, plan)
     if plan.solved is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - begun})
-    return with_warnings(take, recordings, order, hurried, untouched(take, plan))
+    return with_warnings(take, recordings, order, hurried, untouched(take, plan), judged)
 
 
 def with_pins(take: Take, recordings: Library) -> Take:
@@ -288,16 +289,18 @@ def look_of(library: Library) -> np.ndarray:
 
 
 def with_warnings(
-    take: Take, recordings: Library, order: Wanted, hurried: int | None, more: Sequence[str] = ()
+    take: Take, recordings: Library, order: Wanted, hurried: int | None, more: Sequence[str] = (), judged: bool = True
 ) -> Take:
     """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
-    library's rate from which on the search was cut short, or None; more: lines that are told too."""
+    library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
+    gave way is told."""
     told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
     if hurried is not None:
         since = take.start_time + hurried / recordings.fps
         told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
     told += [*_shown_all_the_same(take), *_pins_missed(take)]
-    return replace(take, cut_short=hurried is not None, warnings=(*told, *_gave_way(recordings, take.plan, take)))
+    gave_way = _gave_way(recordings, take.plan, take) if judged else ()
+    return replace(take, cut_short=hurried is not None, warnings=(*told, *gave_way))
 
 
 def _crowded_out(order: Wanted, edit: EditList) -> list[str]:

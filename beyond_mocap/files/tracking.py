@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -202,10 +201,10 @@ def _cached(cache: Path) -> dict[str, np.ndarray] | None:
     try:
         with np.load(cache, allow_pickle=False) as kept:
             arrays = {name: kept[name] for name in _ARRAYS}
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+    except Exception:  # a damaged file can fail in any of zipfile's, zlib's and numpy's own ways
         return None
-    count, who = len(arrays["times"]), arrays["players"].shape
-    shapes = {"positions": (who[0], count, 2), "ball": (count, 3), "pitch": (4,), "players": (who[0], 5)}
+    count, who = arrays["times"].size, arrays["players"].size // 5
+    shapes = {"times": (count,), "positions": (who, count, 2), "ball": (count, 3), "pitch": (4,), "players": (who, 5)}
     fits = all(arrays[name].shape == shape for name, shape in shapes.items())
     return arrays if fits and arrays["periods"].shape[1:] == (4,) and arrays["teams"].shape[1:] == (3,) else None
 

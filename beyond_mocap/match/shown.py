@@ -33,7 +33,8 @@ def shown(
     """What a player does from `start` to `end` seconds, a take for each of his stretches there; a frame looks the same
     whatever span is asked for.
 
-    ball: the match's, which every take has as its own. InputError as of `expanded`.
+    ball: the match's, which every take has as its own; unknown in frames that it does not tell of. InputError as of
+    `expanded`.
     """
     if not end > start:
         raise InputError("times", f"{start:g} to {end:g} s", "an end behind the start")
@@ -68,7 +69,10 @@ def _finished(library: Library, take: Take, correction: Correction | None, ball:
 
 
 def _cut(ball: BallPath, first: int, count: int, fps: float) -> BallPath:
-    """Frames first .. first + count of the match's clock of the match's ball, as far as it goes."""
-    low = max(first - round(float(ball.times[0]) * fps), 0)
-    part = slice(low, low + count)
-    return BallPath(ball.times[part], ball.positions[part], ball.measured[part])
+    """The match's ball at frames first .. first + count of the match's clock, unknown where it is not told of."""
+    at = np.arange(count) + first - round(float(ball.times[0]) * fps)
+    told = (at >= 0) & (at < len(ball.times))
+    times, places, measured = (first + np.arange(count)) / fps, np.full((count, 3), np.nan), np.zeros(count, bool)
+    for own, known in ((times, ball.times), (places, ball.positions), (measured, ball.measured)):
+        own[told] = known[at[told]]
+    return BallPath(times, places, measured)

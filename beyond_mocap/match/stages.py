@@ -222,7 +222,7 @@ def finish(
             write_player(job.folder.of(part.file, "take.npz"), edit)
             order = Finish(edit, part.role.measured, ball, crowd[player].frames, crowd[player].depth,
                            job.order.figures, job.order.bvh)  # fmt: skip
-            names[player] = job.named(replace(order, edit=_unnamed([edit])[0]))
+            names[player] = job.named(replace(order, edit=_unnamed([edit])[0]), part.role.player, part.role.notes)
             if _is_finished(job, part, names[player]):
                 done += 1
             else:

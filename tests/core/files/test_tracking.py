@@ -184,7 +184,10 @@ def test_a_changed_file_or_a_damaged_cache_is_read_anew(tmp_path):
     cache = tmp_path / "cache"
     read_match(file, cache_dir=cache)
     (kept,) = cache.iterdir()
-    for damage in (b"", b"PK\x03\x04 not a zip", kept.read_bytes()[:-200]):
+    whole = kept.read_bytes()
+    packed = bytearray(whole)
+    packed[whole.index(b"PK\x01\x02") + 10] = 99  # a way of packing that nobody knows
+    for damage in (b"", b"PK\x03\x04 not a zip", whole[:-200], bytes(packed)):
         kept.write_bytes(damage)
         np.testing.assert_allclose(read_match(file, cache_dir=cache).positions, players[::-1], atol=1e-9)
         assert len(kept.read_bytes()) > 1000

@@ -1,11 +1,14 @@
 """A player searched in windows, joined and laid out: what every span of him has to be."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
+from beyond_mocap.evaluation.give_way import give_way
+from beyond_mocap.evaluation.played import played_from_take
 from beyond_mocap.match.expand import expanded
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import sample
@@ -74,6 +77,13 @@ def test_one_window_is_what_synthesize_makes(library, weaving_plan):
     again = constructed(library.extended, weaving_plan, take.edit)
     assert np.allclose(again.motion.root_positions, take.motion.root_positions, rtol=0.0, atol=1e-9)
     assert (again.keys[0].clip, again.words, again.timeline) == (take.keys[0].clip, take.words, take.timeline)
+
+
+def test_what_gave_way_is_told_by_the_report_and_not_by_every_window(library, weaving_player):
+    (take,) = expanded(library, weaving_player, 5.0, 30.0)
+    told = give_way(played_from_take(take), track=take.plan.track, timeline=take.timeline, library=library)
+    kinds = {re.sub(r"[\d., -]+", "", line) for line in told}
+    assert kinds and not kinds & {re.sub(r"[\d., -]+", "", line) for line in take.warnings}
 
 
 def test_nothing_of_a_player_who_is_not_there(library, weaving_player):

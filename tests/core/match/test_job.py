@@ -21,6 +21,7 @@ from beyond_mocap.library.library import build
 from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.shown import shown
+from beyond_mocap.take import BallPath
 from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP, kept_files
 from tests.core.test_command_line import assert_contract
 
@@ -95,6 +96,17 @@ def test_a_frame_looks_the_same_whatever_span_is_shown(made, sample_cache, span)
     assert part.start_time == span[0] and part.clip_frame.tolist() == whole.clip_frame[at].tolist()
     assert np.array_equal(part.motion.root_positions, whole.motion.root_positions[at])
     assert np.allclose(np.abs(part.motion.rotations), np.abs(whole.motion.rotations[at]), rtol=0.0, atol=1e-12)
+
+
+def test_a_ball_that_is_told_of_for_a_part_only_is_unknown_in_the_rest(made, sample_cache):
+    folder, _ = made
+    edit, ball = read_player(folder / "home_7.take.npz"), read_ball(folder / "ball.csv")
+    part = BallPath(*(values[60:150] for values in (ball.times, ball.positions, ball.measured)))
+    library = build(LIBRARY, cache_dir=sample_cache)
+    (take,) = shown(library, edit, part, *SECONDS)
+    known = np.isfinite(take.ball.positions).all(axis=1)
+    assert np.flatnonzero(known).tolist() == list(range(60, 150)) and len(known) == len(take.motion) == FRAMES
+    assert np.array_equal(take.ball.positions[60:150], part.positions) and np.allclose(take.ball.times, ball.times)
 
 
 def test_any_number_of_workers_gives_the_same_bits(made, order_to, tmp_path):
