@@ -17,8 +17,8 @@ FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
 
 
 class BEYOND_MOCAP_OT_match_export(Verb, bpy.types.Operator, ExportHelper):
-    """Write the match that is shown to one file: a skeleton and a mesh for everybody, the ball, and the pitch. The scene
-stays as it is"""
+    """Write the match that is shown to one file: a skeleton and meshes for everybody, the ball, and the pitch. The
+scene stays as it is"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"

@@ -43,10 +43,9 @@ yours to add"""
     def do(self, context):
         """Look at the recording itself, then lay the strips."""
         from ..beyond_mocap.annotation import Timeline
+        from ..beyond_mocap.library.classify import keep
         from ..beyond_mocap.library.keep_words import as_timeline
         from ..beyond_mocap.library.proposals import GAITS, gaits_of, propose
-
-        from ..beyond_mocap.library.classify import keep
 
         settings, rig = context.scene.beyond_mocap, context.object
         motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
@@ -72,7 +71,9 @@ yours to add"""
                 when = f"{(row.start if row.key is None else row.key) / motion.fps:.2f} s"
                 self.report({"INFO"}, f"{when} {' '.join(row.words)}: {one.why}, {one.confidence:.0%} sure")
         keys = sum(one.annotation.key is not None for one in found)
-        self.report({"INFO"}, f"{rig.name}: {len(found) - keys} stretches and {keys} key moments proposed")
+        rest = len(found) - keys
+        counted = f"{rest} stretch{'es' * (rest != 1)} and {keys} key moment{'s' * (keys != 1)}"
+        self.report({"INFO"}, f"{rig.name}: {counted} proposed")
 
     def list_them(self, rig, scene, motion, found):
         """List what is not among the clip's words already."""
@@ -83,4 +84,4 @@ yours to add"""
         said = lanes.read(rig)
         new = [one for one in found if not proposals.said_already(said, one.annotation, motion.fps)]
         proposals.keep(rig, new)
-        self.report({"INFO"}, f"{rig.name}: {len(new)} proposals to look through")
+        self.report({"INFO"}, f"{rig.name}: {len(new)} proposal{'s' * (len(new) != 1)} to look through")

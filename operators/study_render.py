@@ -76,9 +76,14 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
                 shutil.copyfile(source, part)
             return
         target = out / (f"{clip.name}.mp4" if look.movie else clip.name)
-        if not look.movie and target.is_dir():
-            shutil.rmtree(target)
-        filming.film(target, *source, look)
+        if look.movie or not target.is_dir():
+            filming.film(target, *source, look)
+            return
+        anew = target.with_name(f".{target.name}.anew")
+        shutil.rmtree(anew, ignore_errors=True)  # of a run that was killed
+        filming.film(anew, *source, look)
+        shutil.rmtree(target)
+        anew.rename(target)
 
 
 def _there(out: Path, name: str) -> bool:

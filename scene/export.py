@@ -341,8 +341,9 @@ def _channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
 
 def _dress(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
     """The meshes that an armature moves, visible now or at some other time by their keys."""
-    return [thing for thing in scene.objects if thing.type == "MESH" and (thing.visible_get() or _keyed(thing, HIDDEN)) and (
+    moved = [thing for thing in scene.objects if thing.type == "MESH" and (
         thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]
+    return [thing for thing in moved if thing.visible_get() or _keyed(thing, HIDDEN)]
 
 
 def _keyed(thing: bpy.types.Object, paths: set[str]) -> bool:
@@ -377,7 +378,7 @@ def _names(rigs, copies):
     for rig, copy, name in local:
         rig.name = f"{name} (original)"
         copy.name = name
-        if copy.type == "ARMATURE" and name not in bpy.data.armatures:  # USD names the bones' part, and many may share one
+        if copy.type == "ARMATURE" and name not in bpy.data.armatures:  # USD's bones; many may share one
             copy.data.name = name
         if copy.animation_data and copy.animation_data.action:
             copy.animation_data.action.name = f"{name} motion"

@@ -63,8 +63,8 @@ CLASSES = (BeyondMocapProposal, BeyondMocapProposals)
 
 
 def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN", beside: bool = True) -> None:
-    """List proposals in place of those before, the first one chosen. beside: those that were accepted stay listed, since
-    their strips do."""
+    """List proposals in place of those before, the first one chosen. beside: those that were accepted stay listed, as
+    their strips stay."""
     group = target.beyond_mocap_proposals
     for index in reversed(range(len(group.listed))):
         if not beside or group.listed[index].state != "ACCEPTED":

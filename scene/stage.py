@@ -73,7 +73,8 @@ def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
     if stage.get(OURS):
         return [thing for thing in stage.objects if thing.get(OURS)]
     named = {thing: thing.name.split(".")[0] for thing in stage.objects}
-    return [thing for thing, name in named.items() if name in EARLIER] if {"Grass", "Lines"} <= set(named.values()) else []
+    whole = {"Grass", "Lines"} <= set(named.values())
+    return [thing for thing, name in named.items() if whole and name in EARLIER]
 
 
 def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:

@@ -45,8 +45,8 @@ def part(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def include(layer: bpy.types.ViewLayer) -> None:
-    """Let a view layer have our collections again that somebody has excluded, by themselves or with one above them: only
-    what is in it can be animated."""
+    """Let a view layer have our collections again that somebody has excluded, or one above them: only what is in it can
+    be animated."""
     _include(layer.layer_collection)
 
 

@@ -183,7 +183,7 @@ def test_ticks_of_another_file_are_not_asked_for(place):
 
 def test_of_files_dropped_together_the_tracking_is_read():
     names = ["small_meta.xml", "small_events.csv", "small.dat"]
-    bpy.ops.beyond_mocap.read_match("INVOKE_DEFAULT", directory=str(TRACKING.parent), files=[{"name": n} for n in names])
+    bpy.ops.beyond_mocap.read_match(directory=str(TRACKING.parent), files=[{"name": name} for name in names])
     assert bpy.context.scene.beyond_mocap_match.read_of.endswith("small.dat")
 
 

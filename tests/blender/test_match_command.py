@@ -18,7 +18,8 @@ def run(extension):
 def order(tmp_path_factory):
     """Arguments of two seconds of the small match."""
     small, cache = SAMPLE / "match" / "small", tmp_path_factory.mktemp("cache")
-    return ["match", "--tracking", str(small / "small.dat"), "--library", str(SAMPLE / "library"), "--cache", str(cache),
+    return ["match", "--tracking", str(small / "small.dat"), "--library", str(SAMPLE / "library"),
+            "--cache", str(cache),
             "--from", "2", "--to", "4", "--workers", "2", "--no-figures"]
 
 

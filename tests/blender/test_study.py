@@ -80,6 +80,21 @@ def test_a_ball_beside_a_clip_is_seen(study, core):
     assert np.abs(pixels(folder / "clips" / names["a.bvh"] / "0001.png") - bare).max() > 0.1
 
 
+def test_pictures_that_cannot_be_made_again_stay(study, extension, core, monkeypatch):
+    folder, names = study
+    shown = folder / "clips" / names["a.bvh"]
+    shown.mkdir(parents=True)
+    (shown / "0001.png").write_bytes(b"before")
+
+    def broken(_path, *_):
+        raise core("errors").InputError("film", "no light")
+
+    monkeypatch.setattr(importlib.import_module(f"{extension.__name__}.scene.study"), "film", broken)
+    with pytest.raises(RuntimeError, match="no light"):
+        bpy.ops.beyond_mocap.study_render(directory=f"{folder}/", pictures=True, again=True, **SMALL)
+    assert (shown / "0001.png").read_bytes() == b"before"
+
+
 @pytest.mark.parametrize("spoil, words", [
     (lambda folder: (folder / "study.json").unlink(), "study.json"),
     (lambda folder: (folder.parent / "b.bvh").unlink(), "b.bvh"),

@@ -127,6 +127,13 @@ def test_a_row_that_is_changed_is_the_users_own(rooms, library, listed):
     assert "#" not in (library / "new.txt").read_text()
 
 
+def test_a_place_behind_the_list_is_its_end(listed):
+    for what in ("PREVIOUS", "NEXT"):
+        listed.active = 99
+        assert bpy.ops.beyond_mocap.judge_proposal(what=what) == {"FINISHED"}
+        assert 0 <= listed.active < len(listed.listed)
+
+
 def test_what_cannot_be_done_is_told(library, listed):
     with pytest.raises(RuntimeError, match="no proposal 99"):
         bpy.ops.beyond_mocap.judge_proposal(index=99)
