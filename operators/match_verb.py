@@ -27,16 +27,16 @@ class MatchVerb(BackgroundVerb):
     def apply(self, scene, result):
         """Pitch, bodies, ball, cameras; and lines about what came of it."""
         wanted, (library, scenery, lines), notes = result
+        match = scene.beyond_mocap_match
+        match.made = "" if match.folder else as_setting(wanted.folder)
         if scene != bpy.context.scene:
             raise InputError("match", f"scene {scene.name} is not shown in the window", "the scene that asked",
                              "choose it and press Show Match")
         session.keep_library(library, wanted.unit)
-        match = scene.beyond_mocap_match
         first = match.first_frame
         took = show.show(bpy.context, scenery, first)
         match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
         match.shown_rate = frames_per_second(scene)
-        match.made = "" if match.folder else as_setting(wanted.folder)
         known = match.report.splitlines()
         match.told = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)
         for line in lines:

@@ -81,7 +81,8 @@ def write(
         free = [_free(stage, thing, shown[thing.name].lies) for thing in things]
         if wanted.format == "GLB" and not meshes:
             told.append("no mesh hangs on the armature: glTF knows its bones as plain nodes then")
-        with _names([*rigs, *things], [*copies, *free]):
+        dressed = [thing for rig in rigs for thing in worn.get(rig.name, ())]
+        with _names([*rigs, *dressed, *things], [*copies, *meshes, *free]):
             _save(stage, copies, wanted)
     told.insert(0, f"{len(times)} frames at {rate:g} per second, {len(rigs)} armature{'s' * (len(rigs) > 1)}, "
                    f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}"

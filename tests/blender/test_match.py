@@ -152,6 +152,22 @@ def test_without_a_folder_each_choice_has_its_own(place):
     assert folder(scene) == room("order").folder_to_show(scene) == str(place)
 
 
+def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
+    """It is not put into the other scene; Show Match finds it."""
+    match = a_match(place, "")
+    match.start, match.end = 2.0, 8.0
+    scene, other = bpy.context.scene, bpy.data.scenes.new("Other")
+    wanted = room("order").wanted(scene, str(made))
+    seen = room("load").scenery(wanted, None, lambda done, text: None, lambda: False)
+    verb = importlib.import_module(f"{EXTENSION}.operators.match_verb").MatchVerb
+    bpy.context.window.scene = other
+    with pytest.raises(Exception, match="press Show Match"):
+        verb.apply(None, scene, (wanted, seen, ()))
+    assert not other.objects and not scene.objects
+    bpy.context.window.scene = scene
+    assert bpy.ops.beyond_mocap.show_match() == {"FINISHED"} and room("ours").bodies(scene)
+
+
 def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path):
     match = a_match(place, tmp_path / "out")
     match.start, match.end = 6.0, 3.0

@@ -64,6 +64,7 @@ def test_everybody_goes_out_and_comes_back(room, scenery, tmp_path, format):  # 
     worn = [thing for thing in scene.objects if any(one.type == "ARMATURE" for one in thing.modifiers)]
     assert len(worn) == 7  # four bodies, three numbers
     assert any("goal" in thing.name.lower() for thing in scene.objects)
+    assert format == "USD" or {thing.name for thing in worn} <= names  # without numbers behind them
 
 
 def test_a_root_bone_carries_everybody(room, scenery, tmp_path):  # noqa: F811
