@@ -185,10 +185,17 @@ def number_within(value, name: str, where: str, whole: bool = False):
     """`value` where it is a number within LIMITS[name]; InputError otherwise."""
     low, high = LIMITS[name]
     kind = "a whole number" if whole else "a number"
-    good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not good or (whole and value != int(value)) or not low <= value <= high:
-        raise InputError(where, f"{value!r}", f"{kind} from {low:g} to {high:g}")
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    good = good and low <= value <= high  # also of no NaN, and of whole numbers that no float can hold
+    if not good or (whole and value != int(value)):
+        raise InputError(where, _said(value), f"{kind} from {low:g} to {high:g}")
     return int(value) if whole else float(value)
+
+
+def _said(value) -> str:
+    """A value as it is told of, shortened: a whole number of a file may have hundreds of digits."""
+    said = repr(value)
+    return said if len(said) <= 40 else said[:37] + "..."
 
 
 def _check_players(players: tuple[Player, ...]) -> None:

@@ -195,6 +195,13 @@ PLACES = (
 )
 
 
+@pytest.mark.parametrize("value", [10**400, -(10**400), 2**63], ids=["400 digits", "below", "64 bits"])
+def test_a_seed_beyond_all_numbers_is_told_in_one_line(value):
+    with pytest.raises(InputError, match="seed: .{1,60}; expected a whole number") as told:
+        parse_scene({**json.loads(json.dumps(KEPT["three"])), "seed": value})
+    assert len(str(told.value)) < 200
+
+
 @settings(max_examples=400, deadline=None)
 @given(st.lists(st.tuples(PLACES, VALUES), min_size=1, max_size=3))
 def test_any_value_anywhere_makes_a_scene_or_one_line(changes):
