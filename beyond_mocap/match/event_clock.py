@@ -31,6 +31,7 @@ _MOST_DRIFT = 0.002  # s a second
 _FEWEST = 8  # events whose players touch the ball, below which nothing can be told
 _INSIDE = 4  # passes and shots within what was solved, below which a lag may be chance
 _SURE = 30  # pairs from which a drift is told from scatter
+_TELLING = 15  # of them, below which events that do not fit may be of this match all the same
 _LEAST_MATCHED, _ABOVE_CHANCE = 0.3, 1.6  # share of the certain events that must fit, and how much more than by chance
 _SENDING = {"pass", "shot", "clearance"}
 _TAKING = {"receive", "catch", "pick-up"}
@@ -46,13 +47,19 @@ _NO_TOUCH = 1.4  # s that an event without a touch is worth
 class PeriodClock:
     """lag: s that events of a period are later than their touches, at its begin; drift: s that it grows each second.
     spread: s, the usual distance from it (median absolute deviation times 1.48). matched: share of the events that are
-    touches for certain which have one; by_chance: the same with wrong lags."""
+    touches for certain which have one; by_chance: the same with wrong lags. told: how many these events are."""
 
     lag: float
     drift: float
     spread: float
     matched: float
     by_chance: float
+    told: int
+
+    @property
+    def fits(self) -> bool:
+        """Whether its events fit touches better than by chance."""
+        return self.matched >= max(_LEAST_MATCHED, _ABOVE_CHANCE * self.by_chance)
 
 
 @dataclass(frozen=True)
@@ -75,8 +82,9 @@ def aligned(
     """Events on the tracking's clock, each with its touch.
 
     touches: solved, on the match's clock, in order; halves: of the match. span: seconds within which
-    touches were solved, by default all; events outside it keep their place and no touch. InputError where the events
-    fit no better than by chance: they are of another match.
+    touches were solved, by default all; events outside it keep their place and no touch. A period whose events fit no
+    better than by chance is left out. InputError where that is so of all, and of many events: they are of another
+    match.
     """
     span = span or (-np.inf, np.inf)
     times, clocks, notes = np.full(len(events.events), np.nan), {}, []
@@ -91,6 +99,9 @@ def aligned(
             continue
         clocks[half.number], times[members] = found
     _check(events, clocks)
+    for number in [number for number, clock in clocks.items() if not clock.fits]:
+        notes.append(f"{_told(number, clocks.pop(number))}: they are left out")
+        times[[i for i, event in enumerate(events.events) if event.period == number]] = np.nan
     pairs = _pairs(events.events, times, touches)
     notes += [_told(number, clock) for number, clock in clocks.items()]
     return AlignedEvents(events.events, times, pairs, clocks, tuple(notes))
@@ -140,7 +151,8 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     ]
     rest = early - late * (1.0 + drift) - lag
     there = [start + (time - lag) / (1.0 + drift) for time, _ in certain_events]
-    if sum(span[0] <= time <= span[1] for time in there) < _INSIDE:
+    inside = sum(span[0] <= time <= span[1] for time in there)
+    if inside < _INSIDE:
         return None
     near = rest[np.abs(rest) < 3.0 * _SPREAD]
     spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
@@ -148,7 +160,8 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     def share(extra: float) -> float:
         return _matched(certain_events, when, who, lag + extra, drift, start, span)
 
-    return PeriodClock(float(lag), float(drift), spread, share(0.0), float(np.mean([share(by) for by in _CHANCES])))
+    chance = float(np.mean([share(by) for by in _CHANCES]))
+    return PeriodClock(float(lag), float(drift), spread, share(0.0), chance, inside)
 
 
 def _commonest(lags: np.ndarray, weights: np.ndarray) -> float:
@@ -196,9 +209,9 @@ def _matched(events, when, who, lag: float, drift: float, start: float, span) ->
 
 
 def _check(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:
-    """InputError where no period fits better than by chance."""
-    poor = [c for c in clocks.values() if c.matched < max(_LEAST_MATCHED, _ABOVE_CHANCE * c.by_chance)]
-    if clocks and len(poor) == len(clocks):
+    """InputError where no period fits better than by chance, and there are enough events to tell."""
+    many = sum(clock.told for clock in clocks.values()) >= _TELLING
+    if many and not any(clock.fits for clock in clocks.values()):
         best = max(clocks.values(), key=lambda clock: clock.matched)
         found = f"{best.matched:.0%} of passes and shots fit a touch of their player (by chance {best.by_chance:.0%})"
         raise InputError(events.where, found, "events of the same match", "check both files")

@@ -43,6 +43,20 @@ def right(found, truth):
     return float((found.touches[own] == truth[own]).mean())
 
 
+def test_few_events_that_do_not_fit_are_left_out_and_told():
+    """They may be of this match: so few fit by chance, or not."""
+    touches, events, _ = planted(seed=3)
+    sent = [event for event in events.events if event.period == 1 and event.kind == "pass"]
+    inside = [event for event in sent if 100.0 < event.time < 128.0]
+    rng = np.random.default_rng(4)
+    moved = [MatchEvent(100.0 + 28.0 * share, 1, event.player, "home", "pass") for event, share in
+             zip(inside * 2, rng.random(8))]  # fmt: skip
+    others = [event for event in sent if not 90.0 < event.time < 140.0][:20]
+    found = aligned(MatchEvents((*moved, *others), "made"), touches, HALVES, (100.0, 128.0))
+    assert not found.clocks and np.isnan(found.times).all() and (found.touches < 0).all()
+    assert len(found.notes) == 1 and "they are left out" in found.notes[0] and "fit (by chance" in found.notes[0]
+
+
 @pytest.mark.parametrize("lag, drift", [
     ((2.9, 2.9), (0.0, 0.0)), ((-1.4, 6.2), (0.0, 0.0)), ((0.0, 0.0), (0.0, 0.0)), ((180.0, -40.0), (0.0, 0.0)),
     ((2.0, 2.0), (8e-4, -1e-3)),
