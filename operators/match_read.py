@@ -54,7 +54,7 @@ class BEYOND_MOCAP_FH_match(bpy.types.FileHandler):
     bl_idname = "BEYOND_MOCAP_FH_match"
     bl_label = "Match of all players"
     bl_import_operator = "beyond_mocap.read_match"
-    bl_file_extensions = ".csv;.txt;.json;.jsonl;.xml;.dat"
+    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are words; tracking as text is chosen by name
 
     @classmethod
     def poll_drop(cls, context):
