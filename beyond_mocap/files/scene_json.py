@@ -64,7 +64,7 @@ def scene_dict(scene: PassScene) -> dict:
 def _player_out(one: Player) -> dict:
     out: dict = {"name": one.name, "place": list(one.place)}
     if one.facing is not None:
-        out["facing"] = math.degrees(one.facing)
+        out["facing"] = _in_degrees(one.facing)
     for name in ("part", "side", "height"):
         if getattr(one, name) != getattr(Player, name):
             out[name] = getattr(one, name)
@@ -193,7 +193,15 @@ def _list_of(read: Callable) -> Callable:
 
 
 def _angle(value, where: str) -> float:
-    return math.radians(number(value, where))
+    degrees = number(value, where)
+    return math.radians(degrees if abs(degrees) <= 360.0 else math.remainder(degrees, 360.0))
+
+
+def _in_degrees(angle: float) -> float:
+    """Degrees that are read as just this angle (radians) again, where there are such."""
+    near = math.degrees(angle)
+    tried = (near + ulps * math.ulp(near) for ulps in (0, 1, -1, 2, -2, 3, -3))
+    return next((degrees for degrees in tried if math.radians(degrees) == angle), near)
 
 
 def _place(value, where: str) -> tuple[float, float]:

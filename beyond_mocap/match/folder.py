@@ -30,6 +30,7 @@ WORDS = "annotations"
 VERSION = 1
 _WORK, _LOCK = ".work", "lock"
 _LONGEST = 100  # characters of a file's name
+_PART = re.compile(r"\..+\.\d+\.\d+\.part")  # what `files.whole.beside` writes before it has its name
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # names that Windows keeps for itself
 
 
@@ -86,6 +87,7 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     with _locked(path / _WORK / _LOCK, path):
         before = read_state(path) if (path / STATE).exists() else {}
         _check_order(path, before, identity)
+        _sweep(path)
         try:
             yield MatchFolder(path, digest_of(identity), before)
         finally:
@@ -93,6 +95,14 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
                 shutil.rmtree(path / _WORK, ignore_errors=True)
                 with contextlib.suppress(OSError):  # the user's own folder, or one with texts in it
                     path.rmdir() if new else None
+
+
+def _sweep(path: Path) -> None:
+    """Takes away what a killed run was about to rename: nobody else writes here."""
+    for part in path.rglob(".*.part"):
+        if _PART.fullmatch(part.name):
+            with contextlib.suppress(OSError):
+                part.unlink()
 
 
 def read_state(folder: str | os.PathLike) -> dict:

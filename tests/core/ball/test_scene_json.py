@@ -202,6 +202,16 @@ def test_a_seed_beyond_all_numbers_is_told_in_one_line(value):
     assert len(str(told.value)) < 200
 
 
+@pytest.mark.parametrize("degrees", [7.627877270399009e17, 1.7e308, -725.0, 359.99999999999994, 270.0, 0.1, -1e-300])
+def test_any_facing_is_written_as_it_is_read(degrees):
+    scene = json.loads(json.dumps(KEPT["three"]))
+    scene["players"][0]["facing"] = degrees
+    found = parse_scene(scene)
+    assert parse_scene(scene_text(found)) == found
+    wanted = math.radians(math.remainder(degrees, 360.0))
+    assert math.isclose(math.cos(found.players[0].facing), math.cos(wanted), abs_tol=1e-9)
+
+
 @settings(max_examples=400, deadline=None)
 @given(st.lists(st.tuples(PLACES, VALUES), min_size=1, max_size=3))
 def test_any_value_anywhere_makes_a_scene_or_one_line(changes):

@@ -98,6 +98,20 @@ def test_pieces_are_kept_till_they_are_forgotten(order):
         assert [path.name for path in folder.place("search", "b").parent.iterdir()] == ["b.npz"]
 
 
+def test_what_a_killed_run_was_about_to_rename_is_swept_and_nothing_else(order):
+    known = identity(order, "key")
+    with opened(order.out, known) as folder:
+        folder.tell({"players": []})
+        folder.place("search", "a").write_bytes(b"piece")
+    left = [order.out / ".match.json.28075.140397754297216.part", order.out / ".work" / "search" / ".b.npz.7.8.part"]
+    mine = [order.out / ".notes.part", order.out / "home.1.2.part"]
+    for path in (*left, *mine):
+        path.write_bytes(b"half of it")
+    with opened(order.out, known) as folder:
+        assert folder.place("search", "a").read_bytes() == b"piece"
+    assert not any(path.exists() for path in left) and all(path.exists() for path in mine)
+
+
 def test_two_runs_at_once_are_told_and_a_dead_one_holds_nothing(order):
     known = identity(order, "key")
     text = f"""
