@@ -37,11 +37,11 @@ def joined_spans(spans: list[tuple[int, int, tuple[int, int]]]) -> list[Episode]
     """Spans (first frame, end, pair of bodies) as episodes: those that overlap in time and share a body are one."""
     groups: list[tuple[int, int, set, set]] = []
     for first, end, pair in sorted(spans):
-        met = [g for g in groups if g[0] < end and first < g[1] and g[2] & set(pair)]
-        groups = [g for g in groups if not any(g is other for other in met)]
         bodies, pairs = set(pair), {pair}
-        for low, high, others, theirs in met:
-            first, end, bodies, pairs = min(first, low), max(end, high), bodies | others, pairs | theirs
+        while met := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # what is joined meets more
+            groups = [g for g in groups if not any(g is other for other in met)]
+            for low, high, others, theirs in met:
+                first, end, bodies, pairs = min(first, low), max(end, high), bodies | others, pairs | theirs
         groups.append((first, end, bodies, pairs))
     whole = [Episode(tuple(sorted(bodies)), first, end, tuple(sorted(pairs))) for first, end, bodies, pairs in groups]
     return sorted(whole, key=lambda episode: (episode.first, episode.bodies))

@@ -13,7 +13,7 @@ from beyond_mocap.polish.crowd.attention import looking
 from beyond_mocap.polish.crowd.banded_squares import BandedSquares
 from beyond_mocap.polish.crowd.capsules import nearest, overlap, touching
 from beyond_mocap.polish.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, applied, carried, joined
-from beyond_mocap.polish.crowd.episodes import episodes
+from beyond_mocap.polish.crowd.episodes import episodes, joined_spans
 from beyond_mocap.polish.crowd.spacing import DISTANCE, STEADY, keeping, spaced
 
 FPS = 30.0
@@ -108,6 +108,18 @@ def crossing(miss=0.05, speed=1.5, seconds=12.0, fps=25.0):
     way = speed * (times - 0.5 * seconds)
     far = np.where(times[:, None] < 8.0, np.column_stack([way, np.full(len(times), 30.0)]), np.nan)
     return times, np.stack([np.column_stack([way, 0 * way]), np.column_stack([-way, 0 * way + miss]), far])
+
+
+def test_episodes_that_share_a_body_at_one_time_are_one():
+    """The last span joins the second pair to the first one's body long after that met its other: in between both
+    episodes have that body, and would undo each other's work."""
+    spans = [(0, 40, (0, 1)), (10, 90, (2, 3)), (80, 100, (1, 3)), (200, 220, (0, 2))]
+    found = joined_spans(spans)
+    assert [(one.first, one.end, one.bodies) for one in found] == [(0, 100, (0, 1, 2, 3)), (200, 220, (0, 2))]
+    for number, one in enumerate(found):
+        for other in found[number + 1 :]:
+            apart = one.end <= other.first or other.end <= one.first
+            assert apart or not set(one.bodies) & set(other.bodies)
 
 
 def test_tracks_that_cross_are_spaced_by_the_least_smooth_shift():
