@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
-from bpy_extras.io_utils import ExportHelper
 
-from ..beyond_mocap.errors import InputError
 from ..scene import export, rig, session
 from ..scene.settings import active_player
-from .verb import Verb
+from .verb import ExportVerb
 
 
-class BEYOND_MOCAP_OT_export_motion(Verb, bpy.types.Operator, ExportHelper):
+class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
     """Write what the rig shows, with its meshes, to a file: baked to one action first. The scene stays as it is"""
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
-    bl_options = {"REGISTER"}
-    filename_ext = ""
-    check_extension = None
 
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Form of the file")
@@ -45,22 +38,11 @@ class BEYOND_MOCAP_OT_export_motion(Verb, bpy.types.Operator, ExportHelper):
         settings = context.scene.beyond_mocap.rig
         for name in ("format", "engine", "who", "root", "own_rate", "deform_only", "meshes"):
             setattr(self, name, getattr(settings, name))
-        self.filename_ext = export.SUFFIXES[self.format]
-        return ExportHelper.invoke(self, context, event)
-
-    def check(self, _context):
-        """The name in the file browser ends as the file will, so that Blender warns of one that is there."""
-        named = Path(self.filepath)
-        if not named.name:
-            return False
-        before, self.filepath = self.filepath, str(export.with_ending(named, export.SUFFIXES[self.format]))
-        return self.filepath != before
+        return super().invoke(context, event)
 
     def do(self, context):
         """Write it."""
-        if not self.filepath:
-            raise InputError("export", "no file given", "where to write it", "choose a place")
-        path = export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
+        path = self.out()
         rigs = self.rigs(context)
         wanted = export.Wanted(path, self.format, self.engine, self.rate(context), self.root, self.deform_only, self.meshes)
         for line in export.write(context, rigs, wanted):

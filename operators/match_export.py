@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
-from bpy_extras.io_utils import ExportHelper
 
-from ..beyond_mocap.errors import InputError
 from ..scene import export, rig
 from ..scene.match import ours
-from .verb import Verb
+from .verb import ExportVerb
 
 FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
 
 
-class BEYOND_MOCAP_OT_match_export(Verb, bpy.types.Operator, ExportHelper):
+class BEYOND_MOCAP_OT_match_export(ExportVerb, bpy.types.Operator):
     """Write the match that is shown to one file: a skeleton and meshes for everybody, the ball, and the pitch. The
 scene stays as it is"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"
-    bl_options = {"REGISTER"}
-    filename_ext = ""
-    check_extension = None
 
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="Form of the file")
@@ -38,24 +31,9 @@ scene stays as it is"""
         cls.poll_message_set("Show a match first")
         return bool(ours.bodies(context.scene))
 
-    def check(self, _context):
-        """The name in the file browser ends as the file will, so that Blender warns of one that is there."""
-        named = Path(self.filepath)
-        if not named.name:
-            return False
-        before, self.filepath = self.filepath, str(export.with_ending(named, export.SUFFIXES[self.format]))
-        return self.filepath != before
-
-    def invoke(self, context, event):
-        """The file browser."""
-        self.filename_ext = export.SUFFIXES[self.format]
-        return ExportHelper.invoke(self, context, event)
-
     def do(self, context):
         """Write it."""
-        if not self.filepath:
-            raise InputError("export", "no file given", "where to write it", "choose a place")
-        path = export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
+        path = self.out()
         scene = context.scene
         everybody = ours.bodies(scene)
         bodies = [body for body in everybody if body.name in context.view_layer.objects]

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import bpy
 from bpy.props import CollectionProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
+from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..beyond_mocap.errors import BeyondMocapError
-from ..scene import areas, background
+from ..beyond_mocap.errors import BeyondMocapError, InputError
+from ..scene import areas, background, export
 
 
 class Verb:
@@ -61,6 +61,33 @@ class ImportVerb(Verb, ImportHelper):
         if names:
             return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
         return [Path(bpy.path.abspath(self.filepath))] if self.filepath else []
+
+
+class ExportVerb(Verb, ExportHelper):
+    """A verb that writes a file in the form that its property `format` names."""
+
+    bl_options = {"REGISTER"}
+    filename_ext = ""
+    check_extension = None
+
+    def invoke(self, context, event):
+        """The file browser."""
+        self.filename_ext = export.SUFFIXES[self.format]
+        return ExportHelper.invoke(self, context, event)
+
+    def check(self, _context):
+        """The name in the file browser ends as the file will, so that Blender warns of one that is there."""
+        named = Path(self.filepath)
+        if not named.name:
+            return False
+        before, self.filepath = self.filepath, str(export.with_ending(named, export.SUFFIXES[self.format]))
+        return self.filepath != before
+
+    def out(self) -> Path:
+        """Where to write; InputError where nothing is chosen."""
+        if not self.filepath:
+            raise InputError("export", "no file given", "where to write it", "choose a place")
+        return export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
 
 
 class BackgroundVerb(Verb):
