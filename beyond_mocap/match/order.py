@@ -11,7 +11,7 @@ from ..errors import InputError
 from .content_digest import digest_of_file
 from .units import OVERLAP, WINDOW
 
-FORM = 1
+FORM = 2
 """Raised whenever the same order would give other results, so that kept ones are not taken for them."""
 
 WINDOWS = (5.0, 600.0)
