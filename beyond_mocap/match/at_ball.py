@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..motion.motion import Motion, pose_kinematics
-from ..motion.striking import ball_gap, surfaces
+from ..motion.striking import ball_gap, meeting_words, surfaces
 from ..motion.track import BALL_RADIUS
 from ..polish.strike_at import Meeting, met_at
 from ..take import KeyResult, Take
 
-CLOSED = 0.1
-"""Metres of gap that are closed. Who misses the ball by more never reached it, and plays as he does."""
+CLOSED = 0.15
+"""Metres of gap that are closed, as much as `polish.strike` closes; who misses the ball by more plays as he does."""
 
 OPEN = 1e-3
 """Metres of gap that are left."""
@@ -33,7 +33,7 @@ def at_ball(take: Take, ball: np.ndarray) -> Take:
 def _meeting(motion: Motion, key: KeyResult, ball: np.ndarray) -> Meeting | None:
     """What brings a part to the ball at one key moment; None where it is there, or too far."""
     frame = int(np.clip(np.rint(key.frame), 0, len(motion) - 1))
-    parts = surfaces(motion.skeleton, key.words) or surfaces(motion.skeleton, key.asked.words)
+    parts = surfaces(motion.skeleton, meeting_words(key.words, key.asked.words))
     if not parts or not np.isfinite(ball[frame]).all():
         return None
     places, world = pose_kinematics(motion.skeleton, motion.root_positions[frame], motion.rotations[frame])
