@@ -38,6 +38,7 @@ from .polish.strike import Touch
 from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
+from .synthesis.dragged import left_out
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch
 from .synthesis.locomotion import match_distance
@@ -295,6 +296,7 @@ def with_warnings(
     library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
     gave way is told."""
     told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
+    told += left_out(recordings, order, take.edit)
     if hurried is not None:
         since = take.start_time + hurried / recordings.fps
         told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
