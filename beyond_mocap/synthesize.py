@@ -162,10 +162,11 @@ def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
 
 
 def _lacks(library: Library, plan: Plan) -> bool:
-    """Whether the recordings lack speeds that the track asks for, or kicks as fast as its key moments."""
+    """Whether the recordings lack speeds that the track asks for, or touches as fast as its key moments."""
     track = sample(plan.track, library.fps, plan.track_window)
     moments = np.array([key.in_force for key in plan.timeline.keys])
-    return library.lacks(track.speed, np.interp(moments, track.times, track.speed))
+    takes = np.array(["receive" in key.words for key in plan.timeline.keys], bool)
+    return library.lacks(track.speed, np.interp(moments, track.times, track.speed), takes)
 
 
 def _search(
