@@ -38,6 +38,7 @@ from .polish.strike import Touch
 from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
+from .synthesis.dragged import left_out
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch
 from .synthesis.locomotion import match_distance
@@ -161,10 +162,11 @@ def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
 
 
 def _lacks(library: Library, plan: Plan) -> bool:
-    """Whether the recordings lack speeds that the track asks for, or kicks as fast as its key moments."""
+    """Whether the recordings lack speeds that the track asks for, or touches as fast as its key moments."""
     track = sample(plan.track, library.fps, plan.track_window)
     moments = np.array([key.in_force for key in plan.timeline.keys])
-    return library.lacks(track.speed, np.interp(moments, track.times, track.speed))
+    takes = np.array(["receive" in key.words for key in plan.timeline.keys], bool)
+    return library.lacks(track.speed, np.interp(moments, track.times, track.speed), takes)
 
 
 def _search(
@@ -295,6 +297,7 @@ def with_warnings(
     library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
     gave way is told."""
     told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
+    told += left_out(recordings, order, take.edit)
     if hurried is not None:
         since = take.start_time + hurried / recordings.fps
         told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))

@@ -16,7 +16,7 @@ from ..annotation import Timeline, words_per_frame
 from ..errors import TimedLine
 from ..library.library import Library
 from ..library.landings import LANDING_FOLDER
-from ..library.made import BLENDED, KICKED, MADE_FOLDER
+from ..library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN
 from ..motion.runs import runs
 from ..motion.track import Track
 from . import feet, jerk, root
@@ -126,12 +126,13 @@ def _whose(played: Played, *begins: str) -> np.ndarray:
 
 
 def _made_lines(played: Played) -> list[TimedLine]:
-    """A line per kind of made clip: running, two recordings blended, kicks."""
-    blends, kicks = _whose(played, MADE_FOLDER + BLENDED), _whose(played, MADE_FOLDER + KICKED)
+    """A line per kind of made clip: running, two recordings blended, kicks, taken balls."""
+    blends, kicks, takes = (_whose(played, MADE_FOLDER + name) for name in (BLENDED, KICKED, TAKEN))
     kinds = (
-        (_made(played) & ~blends & ~kicks, "made running, since no recording has the speed that the track asks for"),
+        (_made(played) & ~blends & ~kicks & ~takes, "made running, since no recording has the speed that the track asks for"),
         (blends, "blended from a slower and a faster recording, since none has the speed that the track asks for"),
         (kicks, "a kick made on the run, since no recorded one is as fast as the player"),
+        (takes, "a ball taken on the run, made, since nobody recorded takes one as fast as the player goes"),
     )
     return [
         _line(played.times, there, what, _in_all(played, there))

@@ -26,7 +26,7 @@ from .repair import Mended
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 23
+VERSION = 24
 _FRAME_ARRAYS = (
     "clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean",
     "basis", "words",

@@ -27,7 +27,7 @@ from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
 from .features import Frames, describe, joined
 from .keys import Key, keys_of
 from .landings import LANDING_FOLDER
-from .made import MADE_FOLDER, gaps, kick_speed, locomotion, made_clips
+from .made import KICK, MADE_FOLDER, TAKE, TAKES_FROM, gaps, locomotion, made_clips, touch_speed
 from .scan import CACHE_FOLDER, Annotations, readable_clips
 
 FPS = 30.0
@@ -156,7 +156,7 @@ class Library:
     @cached_property
     def extended(self) -> "Library":
         """The recordings and, behind them, what `library.made` makes of them: the speeds between and above them, and
-        kicks on the run; made on first use and kept beside the cache. It has no clusters. InputError where no recording
+        kicks and taken balls on the run; made on first use and kept beside the cache. It has no clusters. InputError where no recording
         shows locomotion."""
         measure_gaits(self)  # a library without locomotion stays an error
         made = cache.load(*self.kept, "made") if self.kept else None
@@ -177,12 +177,13 @@ class Library:
         """(from, to) m/s of the speeds that recorded locomotion does not reach."""
         return gaps(self.frames.speed[locomotion(self.frames, self.clips)], self.fps)
 
-    def lacks(self, speed: np.ndarray, at_keys: np.ndarray) -> bool:
+    def lacks(self, speed: np.ndarray, at_keys: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track at `speed` (T,) m/s, at the library's rate, stays in a gap for a fifth of a second or more,
-        or has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick can be played without
-        sliding."""
+        or has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick, or, where a foot `takes` (K,)
+        bool the ball, any recorded taking of a ball can be played without sliding."""
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.gaps)
-        too_fast = 1.3 * kick_speed(self.frames, self.clips, self.keys)
+        kick, take = (touch_speed(self.frames, self.clips, self.keys, act) for act in (KICK, TAKE))
+        too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, TAKES_FROM), kick)
         return inside >= 0.2 * self.fps or bool(np.any(at_keys > too_fast))
 
     @cached_property

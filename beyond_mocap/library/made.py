@@ -1,4 +1,4 @@
-"""What the recordings lack, made from them: speeds between and above them, and kicks on the run.
+"""What the recordings lack, made from them: speeds between and above them, kicks and taken balls on the run.
 
 Tracked players go at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
 to 1.125 of its rate covers some speeds around its own; where too few seconds of recording reach a speed that way is a
@@ -14,9 +14,9 @@ stance and the recorded runners' elbows and lean: long runs that slowly gain and
 needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
 figures and lose the look: knees pop, the body floats.
 
-Recorded kicks are seldom faster than a jog; carried along at 8 m/s their standing foot slides by metres.
-`motion.gestures` makes kicks on the run at the speeds they lack; they stand in for recorded kicks wherever they carry
-the words by which those answer.
+Recorded kicks are seldom faster than a jog, and who takes a ball with his foot in a recording all but stands; carried
+along at 8 m/s their standing foot slides by metres. `motion.gestures` makes both on the run at the speeds they lack; they
+stand in for recorded ones wherever they carry the words by which those answer.
 """
 
 from __future__ import annotations
@@ -40,18 +40,19 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 MADE_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-# how names of blends and of kicks begin, below it
-BLENDED, KICKED = "blend_", "kick_"
+# how names of blends, of kicks and of taken balls begin, below it
+BLENDED, KICKED, TAKEN = "blend_", "kick_", "receive_"
+KICK, TAKE = frozenset({"kick"}), frozenset({"receive", "foot"})
 FPS = 60.0
 FASTEST = 9.4
-# made running begins here, m/s: slower it is left to blends
-_RUNS_FROM = 2.4
+# made running begins here, m/s: slower it is left to blends; and taking a ball on the run
+_RUNS_FROM, TAKES_FROM = 2.4, 1.7
 # how far from its own speed a clip is played, and the seconds that have to reach a speed for it not to be a gap
 _WARP = (0.875, 1.125)
 _ENOUGH_SECONDS = 1.5
 _GRID = 1.03
-# speeds of blends and of kicks lie so far apart
-_BLEND_STEP, _KICK_STEP = 1.06, 1.4
+# speeds of blends and of touches lie so far apart
+_BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
 _PAIRS = 3
 _STEADY = 0.15
 _GAITS = ("walking", "jogging", "running", "sprinting")
@@ -97,13 +98,13 @@ def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
     return moves & ~acts & own[frames.clip]
 
 
-def kick_speed(frames: Frames, clips: Sequence, keys: Sequence) -> float:
-    """m/s of the fastest approach of a kick among `keys`; infinite where there is none."""
+def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
+    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite where there is none."""
     speed = frames.speed  # worked out over all frames each time it is asked for
     found = [
         speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
         for key in keys
-        if "kick" in key.words and not clips[key.clip].made
+        if act <= key.words and not clips[key.clip].made
     ]
     return float(max(found)) if found else np.inf
 
@@ -121,7 +122,11 @@ def made_clips(
     for low, high in gaps(frames.speed[locomotion(frames, clips)], fps):
         yield from _blends(clips, frames, fps, low, high, speeds)
         yield from _runs(max(0.93 * low, _RUNS_FROM), min(1.05 * high, FASTEST), example, style, speeds)
-    yield from _kicks(kick_speed(frames, clips, keys), keys, example, speeds)
+    kinds = sorted({"inside" if "inside" in key.words else "top" for key in keys if KICK <= key.words})
+    fastest = touch_speed(frames, clips, keys, KICK)
+    yield from _touches(KICKED, _TOUCH_STEP * fastest, ("kick", "low"), kinds, example, speeds)
+    fastest = max(_TOUCH_STEP * touch_speed(frames, clips, keys, TAKE), TAKES_FROM)
+    yield from _touches(TAKEN, fastest, ("receive", "foot", "low"), ["inside"], example, speeds)
 
 
 def upright_example(clips: Sequence) -> Motion:
@@ -236,20 +241,18 @@ def _runs(low: float, high: float, example: Motion, style: GaitStyle, speeds: di
         yield _grounded(f"{MADE_FOLDER}{name}_{low:.1f}.bvh", motion, None, _gait_rows(speed, speeds))
 
 
-def _kicks(recorded: float, keys: Sequence, example: Motion, speeds: dict[str, float]) -> Iterator[Made]:
-    """Kicks with the right foot on the run, from what recorded ones reach to a sprint, of the kinds that are
-    recorded."""
-    words = [key.words for key in keys if "kick" in key.words]
-    kinds = sorted({"inside" if "inside" in found else "top" for found in words})
-    speed = _KICK_STEP * recorded
+def _touches(
+    name: str, speed: float, act: tuple[str, ...], kinds: Sequence[str], example: Motion, speeds: dict[str, float]
+) -> Iterator[Made]:
+    """Touches with the right foot on the run, from `speed` m/s to a sprint, of each kind; `act`: their words."""
     while speed < FASTEST:
         for kind in kinds:
-            made = gestures.strike(f"kick low {kind}", example.skeleton, FPS, example=example, at_speed=speed)
-            words = ("kick", "right", "low", kind, "running", "front")
+            made = gestures.strike(f"{' '.join(act)} {kind}", example.skeleton, FPS, example=example, at_speed=speed)
+            words = (act[0], "right", *act[1:], kind, "running", "front")
             row = ClipAnnotation(np.ceil(made.start * FPS), np.floor(made.end * FPS), made.key * FPS, words)
             gait_row = _gait_rows(np.full(len(made.motion), speed), speeds)
-            yield _grounded(f"{MADE_FOLDER}{KICKED}{kind}_{speed:.1f}.bvh", made.motion, None, (row, *gait_row))
-        speed *= _KICK_STEP
+            yield _grounded(f"{MADE_FOLDER}{name}{kind}_{speed:.1f}.bvh", made.motion, None, (row, *gait_row))
+        speed *= _TOUCH_STEP
 
 
 def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:

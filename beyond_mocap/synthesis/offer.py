@@ -18,7 +18,7 @@ RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
 BUCKET = 40
 REACH = 8
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)
-_USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
+USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0
 _SHOWN = 14  # library frames that a long slot shows at the fastest rate
 
@@ -70,7 +70,7 @@ class Offer:
         usable = np.flatnonzero(self.valid)
         self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
         self.offset = -arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
-        self.long_stance = np.clip(library.stance_seconds - _USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
+        self.long_stance = np.clip(library.stance_seconds - USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
         self.stands = library.feet_standing
         self.wild_before, self.wild_after = wildness(library)
         self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}

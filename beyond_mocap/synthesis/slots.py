@@ -1,8 +1,9 @@
 """The output cut into slots of about eight frames, and the pieces that clips of key moments fill among them.
 
 A key moment's clip is played as long as its own entry and exit ask (Faustino §3.2.2): from the last slot edge before
-the entry to the first one after the exit, at one rate, so that the key frame is on time. Between two key moments that
-crowd each other lies an edge half way, which neither crosses.
+the entry to the first one after the exit, at one rate, so that the key frame is on time; where its feet would be dragged
+along there, also without that part (`dragged`). Between two key moments that crowd each other lies an edge half way,
+which neither crosses.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from ..library.keys import Key
 from ..library.library import Library
+from .dragged import undragged
 from .offer import SLOT
 from .wanted import Wanted, needed, pool_frame
 
@@ -106,8 +108,10 @@ def _pieces_of(library: Library, wanted: Wanted, edges: np.ndarray, number: int,
             first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
             first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))
-            start = pool_frame(library, option) - rate * (key.frame - edges[first])
-            rows.append((number, choice, option.clip, rate, first, end, start))
+            around = AROUND / rate - _TRIMMED
+            for a, b in undragged(library, wanted, edges, key.frame, option, rate, (first, end), around):
+                start = pool_frame(library, option) - rate * (key.frame - edges[a])
+                rows.append((number, choice, option.clip, rate, a, b, start))
     return rows
 
 

@@ -1,5 +1,5 @@
-"""What recordings lack is made: speeds between and above them, kicks on the run; offered only where asked for, and
-told."""
+"""What recordings lack is made: speeds between and above them, kicks and taken balls on the run; offered only where asked
+for, and told."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
+from beyond_mocap.evaluation.feet import stance_travel, stances
+from beyond_mocap.files import bvh
 from beyond_mocap.library.keys import Key, standing_in
 from beyond_mocap.library.library import build
-from beyond_mocap.library.made import BLENDED, FASTEST, KICKED, MADE_FOLDER, gaps
+from beyond_mocap.library.made import BLENDED, FASTEST, KICKED, MADE_FOLDER, TAKEN, gaps
+from beyond_mocap.motion.gestures import strike
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
@@ -117,6 +120,36 @@ def test_a_kick_in_a_sprint_is_made(library):
     assert key.clip.startswith(MADE_FOLDER + KICKED)
     assert {"kick", "right", "inside"} <= set(key.words) and key.used_instead is None
     assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
+
+
+@pytest.fixture(scope="module")
+def with_a_receive(tmp_path_factory, clip_file):
+    """Walking, running, and one ball that is taken with the right foot, nearly standing."""
+    folder = tmp_path_factory.mktemp("receive")
+    for name, speed, words in (("stand", 0.0, "standing"), ("walk", 1.4, "walking"), ("run", 4.8, "running")):
+        clip_file(folder / f"{name}.bvh", speed, 4.0, words)
+    taken = strike("receive foot low inside")
+    bvh.write(folder / "take.bvh", taken.motion)
+    words = "receive right foot low inside"
+    (folder / "take.txt").write_text(f"{taken.start:.3f} {taken.end:.3f} {words}\n{taken.key:.3f} {words}\n")
+    return build(folder)
+
+
+@pytest.mark.parametrize("speed, is_made", [(1.0, False), (3.5, True), (7.0, True)])
+def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, speed, is_made):
+    timeline = Timeline(keys=(KeyMoment(3.0, ("receive", "foot", "low")),))
+    take = synthesize(with_a_receive, Plan(track=straight(speed), timeline=timeline))
+    (key,) = take.keys
+    assert key.clip.startswith(MADE_FOLDER + TAKEN) == is_made and key.used_instead is None
+    assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
+    assert any("a ball taken on the run" in line for line in take.warnings) == is_made
+    body, places = identify(take.motion.skeleton), forward_kinematics(take.motion)[0]
+    toes = places[:, [body.left.toe, body.right.toe]]
+    assert stance_travel(toes, stances(take.contacts)).max(initial=0.0) < 0.15
+
+
+def test_where_nobody_takes_a_ball_none_is_made(more):
+    assert not made(more, TAKEN)
 
 
 def test_made_kicks_stand_in_for_the_same_foot_only():
