@@ -30,6 +30,7 @@ OUTWARD = 1.0
 _ROUNDS, _ARMS_ALONE = 16, 4
 _STEP = 0.35
 _LOOKED_OVER, _CLOSE = 8, 0.1  # rounds after which, and metres within which, it is looked anew who is near
+_AROUND = 4  # frames
 
 
 def pushed(
@@ -57,9 +58,13 @@ def pushed(
 
 
 def _near_frames(bodies, placed, pair: tuple[int, int]) -> np.ndarray:
-    """The frames at which two bodies are within _CLOSE of each other."""
+    """The frames at which two bodies are within _CLOSE of each other, and _AROUND before and behind."""
     one, other = pair
-    return np.unique(touching(placed[one], placed[other], (bodies[one].radii, bodies[other].radii), -_CLOSE).frame)
+    found = touching(placed[one], placed[other], (bodies[one].radii, bodies[other].radii), -_CLOSE).frame
+    near = np.zeros(len(placed[one]) + 2 * _AROUND, bool)
+    for step in range(2 * _AROUND + 1):
+        near[found + step] = True
+    return np.flatnonzero(near[_AROUND:-_AROUND])
 
 
 def _contacts(bodies, placed, pairs, near, pressures, first: int, fps: float) -> list[Contact]:
