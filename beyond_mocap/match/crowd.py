@@ -140,7 +140,7 @@ def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], p
     pairs = [(number[one], number[other]) for one, other in episode.pairs]
     pressed = [pressures.setdefault(pair, Pressure()) for pair in episode.pairs]
     now = [curves[body][low:high] for body in episode.bodies]
-    for body, own in zip(episode.bodies, pushed(mine, pairs, now, held, fps, pressed, low)):
+    for body, own in zip(episode.bodies, pushed(mine, pairs, now, pressed, held, fps, low)):
         curves[body][low:high] = own
 
 

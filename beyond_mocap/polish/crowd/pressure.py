@@ -18,20 +18,30 @@ MOST = 0.5
 
 
 class Pressure:
-    """The pressures (K,) m of contacts at frames (K,) that are known by whole numbers; 0 for all others."""
+    """The pressures (K,) m of contacts that are known by whole numbers, and the sides (K, 3) to which the one is pushed
+    out of the other; 0 for all others."""
 
     def __init__(self):
-        self.keys, self.values = np.zeros(0, int), np.zeros(0)
+        self.keys, self.values, self.sides = np.zeros(0, int), np.zeros(0), np.zeros((0, 3))
 
-    def after(self, keys: np.ndarray, lack: np.ndarray, span: tuple[int, int]) -> np.ndarray:
-        """(K,) m that contacts `keys` (K,), no number twice, press with when `lack` (K,) m is missing there; all others
+    def pushes(self, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What contacts `keys` (K,) have pressed with so far: (K,) m and to which side (K, 3) unit."""
+        if not len(self.keys):
+            return np.zeros(len(keys)), np.zeros((len(keys), 3))
+        at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return np.where(self.keys[at] == keys, self.values[at], 0.0), self.sides[at]
+
+    def keep(self, keys: np.ndarray, values: np.ndarray, sides: np.ndarray, span: tuple[int, int]) -> None:
+        """Contacts `keys` (K,), no number twice, press with `values` (K,) m to the sides (K, 3) from now on; all others
         with numbers from span[0] to below span[1] press no more."""
         order = np.argsort(keys, kind="stable")
-        at = np.minimum(np.searchsorted(self.keys, keys), max(len(self.keys) - 1, 0))
-        before = np.where(self.keys[at] == keys, self.values[at], 0.0) if len(self.keys) else np.zeros(len(keys))
-        now = np.clip(before + STEP * lack, 0.0, MOST)
-        kept = order[now[order] > 0.0]
+        kept = order[values[order] > 0.0]
         low, high = np.searchsorted(self.keys, span)
-        self.keys = np.concatenate([self.keys[:low], keys[kept], self.keys[high:]])
-        self.values = np.concatenate([self.values[:low], now[kept], self.values[high:]])
-        return now
+        for name, new in (("keys", keys), ("values", values), ("sides", sides)):
+            old = getattr(self, name)
+            setattr(self, name, np.concatenate([old[:low], new[kept], old[high:]]))
+
+
+def pressed(before: np.ndarray, lack: np.ndarray) -> np.ndarray:
+    """(K,) m that contacts press with which pressed with `before` (K,) m and lack `lack` (K,) m of distance."""
+    return np.clip(before + STEP * lack, 0.0, MOST)
