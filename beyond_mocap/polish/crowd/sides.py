@@ -15,7 +15,7 @@ SECONDS = 0.2
 """Seconds before and behind a moment within which a contact counts for the side at that moment, less the farther."""
 
 
-OUTWARD = 1.0
+OUTWARD = 2.0
 """How much the way between two trunks counts against the side on which two capsules pass."""
 
 
