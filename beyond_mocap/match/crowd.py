@@ -21,6 +21,7 @@ from ..polish.crowd.capsules import FAR, capsules, lines, touching
 from ..polish.crowd.correction import CURVES, Correction, carried
 from ..polish.crowd.crowd_body import CrowdBody, moved
 from ..polish.crowd.episodes import Episode, joined_spans
+from ..polish.crowd.pressure import Pressure
 from ..polish.crowd.pushing import ALLOWED, pushed
 
 REACH = 1.5
@@ -54,6 +55,7 @@ def kept_apart(
     curves = [np.zeros((len(body.lines), CURVES)) for body in bodies]
     done = [Correction.none(fps)] * len(bodies)
     met: list[Span] = []
+    pressures: dict[tuple[int, int], Pressure] = {}
     for turn in range(PASSES):
         placed = [moved(body, own) for body, own in zip(bodies, curves)]
         deep = _touching_spans(bodies, placed, round(REACH * fps), DONE if turn else ALLOWED)
@@ -62,7 +64,7 @@ def kept_apart(
         if not again:
             break
         for episode in again:
-            _part(episode, bodies, curves, fps)
+            _part(episode, bodies, curves, pressures, fps)
         done = [Correction.of(own, start, fps) for own in curves]
         curves = [correction.curves(start, len(body.lines)) for correction, body in zip(done, bodies)]
         bodies = [_as_bent(*each, start) for each in zip(bodies, motions, curves, firsts)]
@@ -128,7 +130,7 @@ def _touching_spans(bodies, placed, reach: int, least: float) -> list[Span]:
     return spans
 
 
-def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], fps: float) -> None:
+def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], pressures, fps: float) -> None:
     """Puts the bodies of one episode out of each other, changing their `curves`."""
     low, high = episode.first, episode.end
     number = {body: row for row, body in enumerate(episode.bodies)}
@@ -136,8 +138,9 @@ def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], f
     whole = [bodies[body].there for body in episode.bodies]
     held = [(low + body.there[0] > there[0], low + body.there[1] < there[1]) for body, there in zip(mine, whole)]
     pairs = [(number[one], number[other]) for one, other in episode.pairs]
+    pressed = [pressures.setdefault(pair, Pressure()) for pair in episode.pairs]
     now = [curves[body][low:high] for body in episode.bodies]
-    for body, own in zip(episode.bodies, pushed(mine, pairs, now, held, fps)):
+    for body, own in zip(episode.bodies, pushed(mine, pairs, now, pressed, held, fps, low)):
         curves[body][low:high] = own
 
 

@@ -8,7 +8,7 @@ negative where they are apart. The radii are those of the low-poly body (`motion
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
@@ -118,6 +118,10 @@ class Touching:
     away: np.ndarray
     at_one: np.ndarray
     at_other: np.ndarray
+
+    def rows(self, kept: np.ndarray) -> Touching:
+        """Some of them, by their numbers."""
+        return Touching(*(getattr(self, field.name)[kept] for field in fields(self)))
 
 
 def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, np.ndarray], least: float = 0.0) -> Touching:

@@ -2,7 +2,9 @@
 
 Each body has twelve curves (`correction`): its root's shift over the ground, its feet's, and the turns of its arms
 about their shoulders. Round after round the contacts are looked for where the bodies are by now, and every body gives
-its share of each (`giving`), half of the way at a time, since what is changed here opens or closes contacts there.
+its share of each (`giving`), a part of the way at a time, since what is changed here opens or closes contacts there.
+Which way and how hard a contact presses is remembered from round to round (`pressure`, `sides`): each round's curves
+are worked out anew from rest, and would let go of whatever is not pressed at any more.
 """
 
 from __future__ import annotations
@@ -15,25 +17,38 @@ import numpy as np
 from .capsules import Touching, touching
 from .crowd_body import Contact, CrowdBody, moved
 from .giving import BASE, Calm, given
+from .pressure import Pressure, pressed
+from .sides import sides, way_out
 
 ALLOWED = 0.005
 """Metres of overlap that are left as they are."""
 
-OUTWARD = 1.0
-"""How much the way between two trunks counts against the shortest way out of a contact."""
+ROOM = 0.03
+"""Metres between two capsules, more than ALLOWED lets them, up to which their contact is followed."""
+
+INERTIA = 4.0
+"""How much a metre of pressure counts for the side it pressed to, against a metre between two lines."""
 
 _ROUNDS, _ARMS_ALONE = 16, 4
-_STEP, _FIRMER = 0.5, 1.1
-_LOOKED_OVER, _CLOSE = 8, 0.1  # rounds after which, and metres within which, it is looked anew who is near
+_STEP = 0.35
+_LOOKED_OVER = 8  # rounds after which it is looked anew who is near
+_CLOSE, _AROUND = 0.1, 4  # metres within which, and frames around which bodies are near
 
 
 def pushed(
-    bodies: Sequence[CrowdBody], pairs: Sequence[tuple[int, int]], curves: Sequence[np.ndarray], held, fps: float
+    bodies: Sequence[CrowdBody],
+    pairs: Sequence[tuple[int, int]],
+    curves: Sequence[np.ndarray],
+    pressures: Sequence[Pressure],
+    held,
+    fps: float,
+    first: int = 0,
 ) -> list[np.ndarray]:
     """The curves (T, 12) of each body with which these pairs are out of each other, as far as they can be.
 
-    curves: those that they have already. held: for each body whether its curves stay what they are at its first and at
-    its last frame. The bodies lie on the same T frames.
+    curves: those that they have already. pressures: of each pair, what its contacts have pressed with so far; changed.
+    held: for each body whether its curves stay what they are at its first and at its last frame. The bodies lie on the
+    same T frames, from frame `first` of the clock of the pressures on.
     """
     now = [np.array(values) for values in curves]
     calm = [Calm.of(body, own, ends, fps) for body, own, ends in zip(bodies, now, held)]
@@ -41,58 +56,63 @@ def pushed(
         placed = [moved(body, values) for body, values in zip(bodies, now)]
         if turn % _LOOKED_OVER == 0:
             near = [_near_frames(bodies, placed, pair) for pair in pairs]
-        contacts = _contacts(bodies, placed, pairs, near)
+        contacts = _contacts(bodies, placed, pairs, near, pressures, first, fps)
         for number, mine in enumerate(contacts):
             if len(mine.frame) and calm[number].count > 3:
-                weight = BASE / fps * _FIRMER**turn
-                wanted = given(calm[number], mine, now[number], placed[number], turn >= _ARMS_ALONE, weight)
+                wanted = given(calm[number], mine, now[number], placed[number], turn >= _ARMS_ALONE, BASE / fps)
                 now[number] = now[number] + _STEP * (wanted - now[number])
     return now
 
 
 def _near_frames(bodies, placed, pair: tuple[int, int]) -> np.ndarray:
-    """The frames at which two bodies are within _CLOSE of each other."""
-    one, other = pair
-    return np.unique(touching(placed[one], placed[other], (bodies[one].radii, bodies[other].radii), -_CLOSE).frame)
+    """The frames at which two bodies are within _CLOSE of each other, and _AROUND before and behind."""
+    found = touching(*(placed[body] for body in pair), tuple(bodies[body].radii for body in pair), -_CLOSE).frame
+    near = np.zeros(len(placed[pair[0]]) + 2 * _AROUND, bool)
+    for step in range(2 * _AROUND + 1):
+        near[found + step] = True
+    return np.flatnonzero(near[_AROUND:-_AROUND])
 
 
-def _contacts(bodies, placed, pairs, near) -> list[Contact]:
+def _contacts(bodies, placed, pairs, near, pressures, first: int, fps: float) -> list[Contact]:
     """The contacts of every body with all others, of each pair at the frames `near`."""
     rows: list[list[tuple]] = [[] for _ in bodies]
-    for (one, other), frames in zip(pairs, near):
+    for (one, other), frames, pressure in zip(pairs, near, pressures):
+        two = placed[one], placed[other]
         radii = bodies[one].radii, bodies[other].radii
-        found = touching(placed[one][frames], placed[other][frames], radii, ALLOWED)
+        found = touching(*(ends[frames] for ends in two), radii, ALLOWED - ROOM)
         found = replace(found, frame=frames[found.frame])
+        found, way, give = _pressing(found, two, pressure, first, fps)
         for body, against, sign in ((one, other, 1.0), (other, one, -1.0)):
-            rows[body].append(_side(found, bodies, placed, body, against, sign))
+            rows[body].append(_share(found, sign * way, give, bodies, placed, (body, against), sign > 0.0))
     empty = (np.zeros(0, int),) * 2 + (np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
     return [Contact(*(np.concatenate(columns) for columns in zip(empty, *mine))) for mine in rows]
 
 
-def _side(found: Touching, bodies, placed, body: int, against: int, sign: float) -> tuple:
-    """One body's side of its contacts with another, as columns of `Contact`."""
-    part, beside = (found.one, found.other) if sign > 0.0 else (found.other, found.one)
-    at = found.at_one if sign > 0.0 else found.at_other
+def _pressing(found: Touching, two, pressure: Pressure, first: int, fps: float) -> tuple:
+    """The contacts of two bodies that press, which way (K, 3), unit, the one is pushed and how far (K,) m."""
+    parts = two[0].shape[1] * two[1].shape[1]
+    keys = (found.frame + first) * parts + found.one * two[1].shape[1] + found.other
+    before, towards = pressure.pushes(keys)
+    side = sides(found, INERTIA * before[:, None] * towards, fps)
+    way, lack = way_out(found, side, _middle(two[0]) - _middle(two[1]), ALLOWED)
+    now = pressed(before, lack)
+    pressure.keep(keys, now, side, (first * parts, (first + len(two[0])) * parts))
+    pressing = np.flatnonzero(lack + now > 0.0)
+    return found.rows(pressing), way[pressing], (lack + now)[pressing]
+
+
+def _share(found: Touching, way, give, bodies, placed, pair: tuple[int, int], is_one: bool) -> tuple:
+    """What one of a pair, of whom is_one tells whether it is the contacts' one, has of them, as columns of `Contact`;
+    way (K, 3) and give (K,) m: where to and how far both have to part."""
+    body, against = pair
+    part, beside = (found.one, found.other) if is_one else (found.other, found.one)
+    at = found.at_one if is_one else found.at_other
     ends = placed[body][found.frame, part]
     place = ends[:, 0] + at[:, None] * (ends[:, 1] - ends[:, 0])
-    firm = [bodies[number].firm[found.frame] for number in (body, against)]
-    way, deep = _way_out(found, placed[body], placed[against], sign)
+    firm = [bodies[number].firm[found.frame] for number in pair]
     arms = [np.array([p.limb == "arm" for p in bodies[n].parts])[c] for n, c in ((body, part), (against, beside))]
-    arm = deep * np.where(arms[0], np.where(arms[1], 0.5, 1.0), 0.0)
-    return found.frame, part, at, place, way, deep * firm[1] / (firm[0] + firm[1]), arm
-
-
-def _way_out(found: Touching, own, others, sign: float) -> tuple[np.ndarray, np.ndarray]:
-    """Which way (K, 3), unit, a body leaves another by at each contact, and how far (K,) m: the shortest way, turned
-    towards the way from the other's trunk to its own, so that limbs that have caught each other come free."""
-    out = _middle(own)[found.frame] - _middle(others)[found.frame]
-    out[:, 2] = 0.0
-    shortest = sign * found.away
-    way = shortest + OUTWARD * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-    off = shortest * (found.radii - found.depth)[:, None]
-    along = np.einsum("kc,kc->k", way, off)
-    return way, np.sqrt(along**2 + (found.radii - ALLOWED) ** 2 - np.einsum("kc,kc->k", off, off)) - along
+    arm = give * np.where(arms[0], np.where(arms[1], 0.5, 1.0), 0.0)
+    return found.frame, part, at, place, way, give * firm[1] / (firm[0] + firm[1]), arm
 
 
 def _middle(lines: np.ndarray) -> np.ndarray:

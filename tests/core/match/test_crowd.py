@@ -68,6 +68,14 @@ def test_who_touches_the_ball_gives_way_less(passing):
     assert moved[0] < 0.5 * moved[1]
 
 
+def test_two_who_both_touch_the_ball_as_they_meet_come_apart_too(passing):
+    """A duel: neither wants to give way, and yet they are not to be in each other."""
+    deepest = overlap_depths(passing[0], passing[2])[0].argmax()
+    firm = [keeping(len(motion), np.array([deepest]), FPS) for motion in passing[0]]
+    found = kept_apart(*passing, FPS, firm)
+    assert max(own.max() for own in overlap_depths(after(passing, found), passing[2])) < 0.02
+
+
 def test_nobody_and_nothing():
     assert kept_apart([], [], [], FPS) == () and overlap_depths([], []) == []
 
