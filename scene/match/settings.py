@@ -24,7 +24,7 @@ FIRST = 60.0
 def show_colours(match, _context) -> None:
     """New colours are seen at once on those who are shown."""
     if match.shown:
-        repaint(colours_of(match))
+        repaint(match.id_data, colours_of(match))
 
 
 class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
