@@ -25,7 +25,7 @@ import numpy as np
 
 from .annotation import ClipAnnotation, KeyMoment, Span, Timeline
 from .ball.way import hermite
-from .errors import InputError, TimedLine
+from .errors import InputError, TimedLine, told_time
 from .evaluation.jerk import jerk, uncut_windows, windowed
 from .library.features import joined as joined_frames
 from .library.library import Clip, Library, described
@@ -499,7 +499,7 @@ def _asked(timeline: Timeline, begin: float, finish: float, at: float, words) ->
     """The timeline with the throw's key moment, without what it leaves no room for; lines about that."""
     kept = [key for key in timeline.keys if not begin < key.in_force < finish]
     told = [
-        TimedLine(f"{key.time:g} s: '{' '.join(key.words)}' lies within the throw, it is not played",
+        TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' lies within the throw, it is not played",
                   (key.time, key.time))
         for key in timeline.keys if key not in kept
     ]  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .. import __version__
-from ..errors import InputError
+from ..errors import InputError, told_time
 from .content_digest import digest_of_file
 from .units import OVERLAP, WINDOW
 
@@ -63,7 +63,7 @@ class MatchOrder:
             if value is not None and math.isnan(value):
                 raise InputError(option, "nan", "seconds of the match's clock")
         if self.start is not None and self.end is not None and self.end <= self.start:
-            raise InputError("--to", f"{self.end:g} s", f"later than --from {self.start:g} s")
+            raise InputError("--to", f"{told_time(self.end)} s", f"later than --from {told_time(self.start)} s")
         if not WINDOWS[0] <= self.window <= WINDOWS[1]:
             raise InputError("window", f"{self.window:g} s", f"{WINDOWS[0]:g} to {WINDOWS[1]:g} s")
         if not 1.0 <= self.overlap <= self.window / 2.0:

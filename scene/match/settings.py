@@ -4,6 +4,7 @@ file, known to undo."""
 from __future__ import annotations
 
 import bpy
+import numpy as np
 from bpy.props import (
     BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty,
 )
@@ -95,6 +96,11 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     shown_first: IntProperty(options={"HIDDEN"}, description="That frame")
     shown_rate: FloatProperty(options={"HIDDEN"}, description="Frames a second of the keys; 0: the scene's")
     shown: StringProperty(options={"HIDDEN"}, description="The folder that is shown; empty where none is")
+
+
+def typed(value: float) -> str:
+    """A float property as somebody has typed it: the shortest decimals that it keeps."""
+    return str(np.float32(value)).removesuffix(".0")
 
 
 CLASSES = (BeyondMocapMatchPlayer, BeyondMocapMatch)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, TimedLine
+from ...errors import InputError, TimedLine, told_time
 from ..runs import runs
 from .data import Track
 from .sampling import GAP_INTERVALS, LONG_GAP
@@ -120,7 +120,7 @@ def _with_missing_rows(times, positions, ball, name: str):
     gaps = np.flatnonzero(steps > GAP_INTERVALS * interval + 1e-9)
     if len(gaps) and steps[gaps].max() > _LONGEST_GAP:
         worst = gaps[np.argmax(steps[gaps])]
-        found = f"nothing between {times[worst]:g} and {times[worst + 1]:g} s"
+        found = f"nothing between {told_time(times[worst])} and {told_time(times[worst + 1])} s"
         raise InputError(name, found, "gaps of an hour at most", "cut the track")
     new = [np.linspace(times[i], times[i + 1], int(round(steps[i] / interval)) + 1)[1:-1] for i in gaps]
     at = np.repeat(gaps + 1, [len(piece) for piece in new])

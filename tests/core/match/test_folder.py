@@ -59,7 +59,9 @@ def test_what_decides_the_results_is_in_the_identity_and_nothing_else(order, tmp
 
 
 @pytest.mark.parametrize("more, told", [
-    ({"start": 5.0, "end": 5.0}, "--to: 5 s; expected later than --from 5 s"), ({"window": 1.0}, "window: 1 s"),
+    ({"start": 5.0, "end": 5.0}, "--to: 5 s; expected later than --from 5 s"),
+    ({"start": 1234.5674, "end": 1234.567}, "--to: 1234.567 s; expected later than --from 1234.5674 s"),
+    ({"window": 1.0}, "window: 1 s"),
     ({"overlap": 200.0}, "overlap: 200 s"), ({"start": np.nan}, "--from: nan"), ({"end": np.nan}, "--to: nan"),
 ])  # fmt: skip
 def test_an_order_without_sense_is_told(order, more, told):
