@@ -28,7 +28,7 @@ from . import stages
 from .folder import MatchFolder, check_folder, file_names, opened, read_state
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
-from .parts import check_texts, parts_of, strange_texts
+from .parts import check_texts, parts_of, strange_texts, unused_lines
 from .pool import Workplace, check_place, ended
 from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import MatchState, begun, now, row_of
@@ -135,7 +135,7 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     told = job.folder.before.get("players", ())
     finished = {row["id"]: row["finished"] for row in told if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: row_of(part, finished.get(part.role.player.id)) for part in parts}
-    state.told["notes"] += strange_texts(job.order.annotations, names.values())
+    state.told["notes"] += [*strange_texts(job.order.annotations, names.values()), *unused_lines(parts, job.order, names)]
     state.took("words", clock)
     state.write()
     clock = now()

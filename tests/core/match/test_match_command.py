@@ -78,6 +78,37 @@ def test_who_is_not_there_and_texts_of_nobody_are_told(match, tmp_path):
     assert not [line for line in error if "home_7.txt" in line]
 
 
+def test_words_for_a_time_at_which_nobody_is_there_are_told(match, tmp_path):
+    words = tmp_path / "words"
+    words.mkdir()
+    (words / "home_7.txt").write_text("13 kick right\n75.25 kick right\n20 21 dribble\n13.5 15 dribble\n")
+    span = {"from": 12, "to": 14, "players": None, "annotations": words}
+    told = "home_7.txt: 2 of your words not used (20 21 dribble ...), since home_7 is there from 12 to 14 s"
+    status, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
+    assert status == 0 and [line for line in error if ".txt" in line] == [f"note: {told}"]
+    assert told in read_state(tmp_path / "out")["notes"]
+    text = tmp_path / "out" / "annotations" / "away_6.txt"
+    text.write_text(text.read_text() + "75.25 kick right\n")
+    _, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
+    told = "away_6.txt: 1 of your words not used (75.25 kick right), since away_6 is there from 12 to 14 s"
+    assert f"note: {told}" in error
+
+
+def test_texts_of_players_who_are_away_are_told_where_everybody_is_asked_for(tmp_path):
+    from pathlib import Path
+
+    from beyond_mocap.match.order import MatchOrder
+    from beyond_mocap.match.parts import unused_lines
+
+    for name in ("home_7", "away_9"):
+        (tmp_path / f"{name}.txt").write_text("13 kick right\n")
+    files = {"home 7": "home_7", "away 9": "away_9", "away 8": "away_8"}
+    order = dict(tracking=Path("t"), library=Path("l"), out=Path("o"), annotations=tmp_path)
+    assert unused_lines([], MatchOrder(**order, players=("home 7",)), files) == []
+    (line,) = unused_lines([], MatchOrder(**order), files)
+    assert line.startswith("home_7.txt, away_9.txt: not used")
+
+
 @pytest.mark.parametrize("written", [["--scene", "x.blend"], ["--scene=x.blend"], ["--sce", "x.blend"], ["--scen=x"]])
 def test_an_option_is_taken_out_however_it_is_written(written):
     assert without(["match", "--seed", "3", *written, "--json"], "--scene") == ["match", "--seed", "3", "--json"]
