@@ -59,6 +59,7 @@ def read_events(
         raise InputError(path, "no events", "some", "export it again")
     events, notes = _with_players(path, rows, match)
     told = [f"{second.name} taken as its second file"] if second and meta is None else []
+    told += [f"{meta}: not used, since events of {provider} are in one file"] if meta and not second else []
     return MatchEvents(tuple(events), provider, str(path), tuple([*told, *notes]))
 
 

@@ -167,6 +167,7 @@ def _check_order(path: Path, before: dict, identity: Mapping[str, object]) -> No
 
 _NAMES = {
     "start": "--from", "end": "--to", "tracking": "tracking file", "meta": "metadata", "events": "events file",
+    "events_meta": "--events-meta", "events_provider": "--events-provider",
     "solve_touches": "--no-solve-touches", "players": "list of players", "fps": "--fps", "seed": "--seed",
     "nearest": "--exact", "provider": "--provider", "form": "version", "software": "version",
 }

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..ball.tracked.solve import SolvedBall
 from ..errors import BeyondMocapError, Cancelled, InputError
+from ..files.event_data import MatchEvents
 from ..files.events import read_events
 from ..files.match_data import Match
 from ..files.tables import write_ball
@@ -85,6 +86,7 @@ def make_match(
     report(0.0, f"Reading {order.tracking.name}")
     match = read_match(order.tracking, order.meta, order.provider or None)
     span = span_of(match, order)
+    events = _events(order, match)
     read = now()
     library, source = _library(order, _part(report, "library"), cancelled)
     known = identity(order, source.key)
@@ -95,7 +97,7 @@ def make_match(
         job = stages.Job(order, folder, state, source, library, place, report, cancelled)
         try:
             with threadpool_limits(limits=1):  # more threads add up in another order
-                _make(job, match, span, report)
+                _make(job, match, events, span, report)
         except BeyondMocapError as error:
             if state.players:  # else nothing was begun
                 state.tell(status="cancelled" if isinstance(error, Cancelled) else "failed", reason=str(error))
@@ -119,7 +121,16 @@ def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, L
     return library, source
 
 
-def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> None:
+def _events(order: MatchOrder, match: Match) -> MatchEvents | None:
+    """What people wrote down, where they did."""
+    if order.events is None:
+        return None
+    return read_events(order.events, order.events_meta, order.events_provider or None, match)
+
+
+def _make(
+    job: stages.Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
+) -> None:
     """All stages behind the reading."""
     state, begin = job.state, now()
     roles = roles_of(match, job.order, span)
@@ -127,7 +138,7 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     solved = _solved(job, match, span, _part(report, "ball"))
     state.took("ball", begin)
     clock = now()
-    words = _words(job, match, solved)
+    words = _words(job, match, events, solved)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
     names = file_names(player.id for player in match.players)
@@ -163,13 +174,11 @@ def _solved(job: stages.Job, match: Match, span: tuple[float, float], report: Pr
         return None
 
 
-def _words(job: stages.Job, match: Match, solved: SolvedBall | None) -> MatchWords:
+def _words(job: stages.Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchWords:
     """Everybody's words, from touches and, where there are some, events."""
-    events, told = None, job.state.told
-    if job.order.events is not None:
-        events = read_events(job.order.events, match=match)
-        if solved is None:
-            told["notes"].append(f"{job.order.events}: not used, since no touch of the ball tells how its clock goes")
+    told = job.state.told
+    if events is not None and solved is None:
+        told["notes"].append(f"{job.order.events}: not used, since no touch of the ball tells how its clock goes")
     words = words_of(match, solved, events)
     told["notes"] += words.notes
     told["events"] = dict(words.figures) or None

@@ -36,6 +36,9 @@ def _asked(scene: bpy.types.Scene) -> list[str]:
     for option, path in (("--meta", match.metadata_file), ("--events", match.events_file)):
         out += [option, absolute(path)] if path else []
     out += ["--provider", match.provider] if match.provider != AUTO else []
+    if match.events_file:
+        out += ["--events-meta", absolute(match.events_metadata_file)] if match.events_metadata_file else []
+        out += ["--events-provider", match.events_provider] if match.events_provider != AUTO else []
     if 0.0 < match.end <= match.start:
         found = f"To ({typed(match.end)} s) is not after From ({typed(match.start)} s)"
         raise InputError("match", found, "a later time",

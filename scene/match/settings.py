@@ -9,12 +9,14 @@ from bpy.props import (
     BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty,
 )
 
+from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.providers import PROVIDERS
 from .kits import USUAL, linear, repaint, written
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
 GIVEN = [(AUTO, "Guess", "By what the file looks like"), *((name, name.capitalize(), name) for name in PROVIDERS)]
+TOLD = [GIVEN[0], *((name, name.capitalize(), name) for name in EVENT_PROVIDERS)]
 KINDS = (
     ("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"),
 )
@@ -48,6 +50,11 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     events_file: StringProperty(
         name="Events", description="What happened, from a provider or as CSV; empty: found in the ball's course", **FILE
     )
+    events_metadata_file: StringProperty(
+        name="Events' Metadata", description="Lineups or metadata of the events; empty: a file beside them that fits",
+        **FILE,
+    )
+    events_provider: EnumProperty(name="Events' Provider", items=TOLD, description="Whose form the events have")
     provider: EnumProperty(name="Provider", items=GIVEN, description="Whose form the files have")
     folder: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},

@@ -104,6 +104,15 @@ def test_the_command_that_makes_it(place):
     assert "--workers" not in room("order").command(bpy.context.scene)
 
 
+def test_what_goes_with_the_events_is_asked_for_where_there_are_events(place):
+    match = a_match(place, "")
+    match.events_metadata_file, match.events_provider = str(place / "f7.xml"), "opta"
+    assert "--events-meta" not in room("order").command(bpy.context.scene)
+    match.events_file = str(place / "f24.xml")
+    text = " ".join(room("order").command(bpy.context.scene))
+    assert f"--events-meta {place / 'f7.xml'} --events-provider opta" in text
+
+
 def test_no_digit_of_a_late_time_is_lost(place, core):
     match = a_match(place, "")
     match.start, match.end = 1234.567, 2700.04

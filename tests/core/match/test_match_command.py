@@ -1,6 +1,8 @@
 """The verb `match`: what it makes, and that everything wrong is one clear line and leaves nothing behind."""
 
 import json
+import shutil
+from pathlib import Path
 
 import pytest
 
@@ -95,8 +97,6 @@ def test_words_for_a_time_at_which_nobody_is_there_are_told(match, tmp_path):
 
 
 def test_texts_of_players_who_are_away_are_told_where_everybody_is_asked_for(tmp_path):
-    from pathlib import Path
-
     from beyond_mocap.match.order import MatchOrder
     from beyond_mocap.match.parts import unused_lines
 
@@ -107,6 +107,25 @@ def test_texts_of_players_who_are_away_are_told_where_everybody_is_asked_for(tmp
     assert unused_lines([], MatchOrder(**order, players=("home 7",)), files) == []
     (line,) = unused_lines([], MatchOrder(**order), files)
     assert line.startswith("home_7.txt, away_9.txt: not used")
+
+
+def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
+    """One that needs no second file says so; two files that lie apart are read, and are of another match."""
+    named = {"events": SMALL / "small_events.csv", "events-meta": SMALL / "small_meta.xml", "events-provider": "csv"}
+    status, _, error = match("--no-figures", **named)
+    assert status == 0 and any("small_meta.xml: not used, since events of csv are in one file" in one for one in error)
+    kloppy = pytest.importorskip("kloppy")
+    folder = Path(kloppy.__file__).parent / "tests" / "files"
+    if not (folder / "opta_f24.xml").is_file():
+        pytest.skip("this kloppy comes without its own test files")
+    (tmp_path / "events").mkdir()
+    apart = shutil.copy(folder / "opta_f24.xml", tmp_path / "events" / "monday.xml")
+    status, _, error = match(events=apart, out=tmp_path / "new")
+    assert status == 2 and "no second file beside it for opta" in error[-1]
+    named = {"events-meta": folder / "opta_f7.xml", "events-provider": "OPTA"}
+    status, _, error = match(events=apart, out=tmp_path / "new", **named)
+    assert status == 2 and "players" in error[-1] and "are not in the tracking" in error[-1]
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("written", [["--scene", "x.blend"], ["--scene=x.blend"], ["--sce", "x.blend"], ["--scen=x"]])
@@ -124,6 +143,11 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"provider": "nobody"}, 2, "provider: 'nobody'"),
     ({"events": "no.csv"}, 2, "no.csv"),
     ({"meta": "no.xml"}, 2, "no.xml"),
+    ({"events": str(SMALL / "small_events.csv"), "events-meta": "no.xml"}, 2, "no.xml"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "x"}, 2, "--events-provider: 'x'; expected one of"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "no second file beside it for opta"),
+    ({"events-meta": "no.xml"}, 2, "--events-meta: no.xml, without --events"),
+    ({"events-provider": "opta"}, 2, "--events-provider: opta, without --events"),
     ({"workers": 0}, 2, "'0' is not 1 to 256"),
     ({"scheduler": "tcp://127.0.0.1:9"}, 2, "not allowed with argument --workers"),
     ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "--scheduler: tcp://127.0.0.1:9 does not answer"),
