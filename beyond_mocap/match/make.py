@@ -92,6 +92,7 @@ def make_match(
     known = identity(order, source.key)
     with opened(order.out, known) as folder:
         state = begun(folder, order, known, match, span)
+        state.told["notes"] += folder.notes
         state.seconds["read"] = round(read[0] - clock[0], 3)
         state.took("library", read)
         job = stages.Job(order, folder, state, source, library, place, report, cancelled)
