@@ -35,7 +35,8 @@ training:
 	@packaging/venv.sh training
 
 # Two things side by side, so that no core idles; what the second says is shown when both are done. Linear algebra takes
-# no threads of its own: they would wait for the other's.
+# no threads of its own: they would wait for the other's. Where there are two Blenders, each tries half of all pairs of an
+# operator and an awkward situation.
 test test-core test-blender test-oldest: export OPENBLAS_NUM_THREADS = 1
 test test-core test-blender test-oldest: export OMP_NUM_THREADS = 1
 test: venv venv-oldest training

@@ -15,6 +15,7 @@ from .library.library import Library
 from .motion import quaternion
 from .motion.humanoid import identify
 from .motion.motion import pose_kinematics
+from .motion.striking import striking_part
 from .motion.track import SampledTrack
 from .own_size import real_ball, size_of
 from .plan import Plan
@@ -33,6 +34,10 @@ from .synthesis.footage import Footage, overlap
 from .synthesis.locomotion import travelled_distance
 from .synthesis.wanted import needed
 from .take import KeyResult
+
+OTHERWISE = 0.4
+"""Seconds before and after a key moment that nothing in the library shows in which the body comes to the ball and goes
+back."""
 
 
 def smoothed(library: Library, plan: Plan, footage: Footage) -> Footage:
@@ -172,12 +177,20 @@ def given(library: Library, plan: Plan, track: SampledTrack, root, pose, standin
 
 
 def touches(library: Library, plan: Plan, edit: EditList, keys: tuple[KeyResult, ...]) -> list[Touch]:
-    """Where the body may meet the ball: every key moment that is played."""
-    found = []
+    """Where the body may meet the ball: every key moment that is played, and every one for which the library has no
+    clip at all, so that something else is shown: there the asked part of that comes to the ball if it is near enough
+    (a runner's head to a header)."""
+    found, served = [], set()
     for placed in edit.keys:
         result = keys[placed.wanted]
         entry, leave = np.multiply(needed(library, placed.key), plan.fps / library.fps)
         found.append(Touch(result.frame, result.words, float(entry), float(leave)))
+        served.add(placed.wanted)
+    alone = OTHERWISE * plan.fps
+    for number, result in enumerate(keys):
+        lacks = result.used_instead is not None and number not in served and not striking_part(result.words)
+        if lacks and all(abs(result.frame - touch.frame) > alone for touch in found):
+            found.append(Touch(result.frame, result.asked.words, alone, alone))
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..annotation import KeyMoment
 from ..library.library import Library
 from ..library.made import MADE_FOLDER
-from ..motion.striking import contact_gap, met_within, striking_part
+from ..motion.striking import contact_gap, meeting_words, met_within
 from ..motion.track import Track
 from ..take import DribbleTouch
 from . import pieces
@@ -139,8 +139,8 @@ def met(played: Played, moment: Moment) -> tuple[float, float]:
 
 
 def touching_words(moment: Moment) -> tuple[str, ...]:
-    """The words that say which part meets the ball: those that are played, else those that were asked for."""
-    return moment.words if striking_part(moment.words) else moment.asked.words
+    """The words that say which part meets the ball (`striking.meeting_words`)."""
+    return meeting_words(moment.words, moment.asked.words)
 
 
 def written_ball(played: Played, frame: int) -> np.ndarray:

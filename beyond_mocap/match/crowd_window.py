@@ -9,14 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..library.library import FPS, Library
-from ..motion.striking import surfaces
+from ..motion.motion import Motion
+from ..motion.striking import meeting_words, surfaces
 from ..polish.crowd.correction import CURVES, Correction, applied
 from ..polish.crowd.spacing import keeping
 from ..take import Take
+from .at_ball import at_ball
 from .crowd import kept_apart, overlap_depths
 from .cut_plan import cut_plan
 from .expand import expanded
-from .match_ball import led_by
+from .match_ball import course, led_by, met
 from .named_edit import part
 from .player_edit import PlayerEdit, Stretch
 
@@ -76,11 +78,13 @@ def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, en
         firm = [_firm(take) for take in flat]
         own, contacts = [take.motion for take in flat], [take.contacts for take in flat]
         corrections = kept_apart(own, contacts, firsts, fps, firm)
+        led = [led_by(take) for take in flat]
         motions = [applied(take.motion, *own) for take, own in zip(flat, zip(corrections, firsts))]
+        motions = [_on_the_ball(*own, led) for own in zip(flat, motions, firsts)]
         before = overlap_depths([take.motion for take in flat], firsts)
         after = overlap_depths(motions, firsts)
     inside = round(start * fps), round(end * fps)
-    rows, out = iter(zip(flat, corrections, firsts, before, after)), []
+    rows, out = iter(zip(corrections, firsts, before, after, led)), []
     for own in takes:
         out.append(_part([next(rows) for _ in own], inside, fps))
     return tuple(out)
@@ -88,27 +92,35 @@ def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, en
 
 def _firm(take: Take) -> np.ndarray:
     """(T,) how firmly a player keeps his way: more where he touches the ball."""
-    touching = [key.frame for key in take.keys if surfaces(take.motion.skeleton, key.words)]
+    words = {key.frame: meeting_words(key.words, key.asked.words) for key in take.keys}
+    touching = [frame for frame, own in words.items() if surfaces(take.motion.skeleton, own)]
     return keeping(len(take.motion), np.array(touching), take.motion.fps)
+
+
+def _on_the_ball(take: Take, motion: Motion, first: int, led: Sequence[tuple[np.ndarray, np.ndarray]]) -> Motion:
+    """A player's corrected motion with its touches at the ball, which everybody has `led`."""
+    if take.ball is None:
+        return motion
+    ball = met(course(take.plan, take.ball.times), first, led)
+    return at_ball(replace(take, motion=motion), ball.positions).motion
 
 
 def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
     """One player's part, out of his takes with what was found of each."""
     frames, depth, before = [np.zeros(0, int)], [np.zeros(0)], 0.0
     led_frames, led = [np.zeros(0, int)], [np.zeros((0, 3))]
-    for take, _, first, deep, deep_after in rows:
+    for _, first, deep, deep_after, (at, off) in rows:
         own = np.flatnonzero(deep_after > 0.0) + first
         mine = (own >= inside[0]) & (own < inside[1])
         frames.append(own[mine])
         depth.append(deep_after[own[mine] - first])
-        at, off = led_by(take)
         mine = (at >= inside[0]) & (at < inside[1])
         led_frames.append(at[mine])
         led.append(off[mine])
         core = slice(max(inside[0] - first, 0), max(inside[1] - first, 0))
         before = max(before, float(deep[core].max(initial=0.0)))
     return CrowdPart(
-        in_turn([correction for _, correction, *_ in rows], fps), np.concatenate(frames), np.concatenate(depth), before,
+        in_turn([correction for correction, *_ in rows], fps), np.concatenate(frames), np.concatenate(depth), before,
         np.concatenate(led_frames), np.concatenate(led),
     )  # fmt: skip
 

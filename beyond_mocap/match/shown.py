@@ -1,5 +1,5 @@
-"""A player of a made match as everybody is to see him: his motion out of his edit list, kept out of others' bodies, and
-his head after the ball."""
+"""A player of a made match as everybody is to see him: his motion out of his edit list, kept out of others' bodies, his
+head after the ball, and what strikes it on it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ..polish.crowd.attention import looking
 from ..polish.crowd.correction import Correction, applied
 from ..synthesize import look_of
 from ..take import BallPath, Take
+from .at_ball import at_ball
 from .expand import expanded
 from .joined_takes import own_part
 from .player_edit import PlayerEdit
@@ -65,7 +66,7 @@ def _finished(library: Library, take: Take, correction: Correction | None, ball:
     own = _cut(ball, first, len(take.motion), take.motion.fps)
     known = np.isfinite(own.positions).all(axis=1)
     motion = looking(take.motion, own.positions, known, look_of(library), take.plan.seed, take.start_time)
-    return replace(take, motion=motion, ball=own)
+    return at_ball(replace(take, motion=motion, ball=own), own.positions)
 
 
 def _cut(ball: BallPath, first: int, count: int, fps: float) -> BallPath:

@@ -42,6 +42,12 @@ def striking_part(words: Iterable[str]) -> str | None:
     return "foot" if _FOOT_WORDS & words else None
 
 
+def meeting_words(played: Iterable[str], asked: Iterable[str]) -> tuple[str, ...]:
+    """The words that say which part meets the ball at a key moment: those that are played, else those asked for."""
+    played = tuple(played)
+    return played if striking_part(played) else tuple(asked)
+
+
 def met_within(words: Iterable[str]) -> float:
     """Seconds after a key moment in which the ball may be met: 0, but for dives by hand, whose key is where the ball is
     met or, in recordings without a ball, where the body takes off."""

@@ -14,7 +14,8 @@ from beyond_mocap.library.library import build
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.motion.track import Track, clean, sample, zero_phase_hann
+from beyond_mocap.motion.striking import HEAD_RADIUS, surfaces
+from beyond_mocap.motion.track import BALL_RADIUS, Track, clean, sample, zero_phase_hann
 from beyond_mocap.plan import METHODS, Plan
 from beyond_mocap.synthesize import synthesize
 
@@ -283,6 +284,26 @@ def test_where_nothing_is_near_locomotion_goes_on_and_is_told(take_of, method):
     take = take_of((4.0, "header"), nearest=True, method=method)
     assert take.keys[0].used_instead == ("walking",) and any("header" in warning for warning in take.warnings)
     assert_whole(take, 241)
+
+
+@pytest.mark.parametrize("up, reached", [(0.45, True), (1.2, False)])
+def test_who_goes_on_walking_for_want_of_a_header_still_puts_his_head_to_a_ball_that_is_near(take_of, track_of, up, reached):
+    track = track_of()
+    plain = take_of((4.0, "header"), nearest=True, track=track)
+    head = head_at(plain, 120)
+    ball = np.tile(head + [0.0, 0.1, up], (len(track.times), 1))
+    take = take_of((4.0, "header"), nearest=True, track=Track(track.times, track.positions, ball))
+    gap = np.linalg.norm(take.ball.positions[120] - head_at(take, 120)) - HEAD_RADIUS - BALL_RADIUS
+    assert (abs(gap) < 0.005) == reached
+    assert np.linalg.norm(take.ball.positions[120] - ball[0]) <= 0.3 + 1e-6
+    moved = np.linalg.norm(head_at(take, 120) - head)
+    assert (0.05 < moved < 0.35) if reached else moved < 0.05
+
+
+def head_at(take, frame) -> np.ndarray:
+    """(3,) m: the middle of the head at an output frame."""
+    posed = pose_kinematics(take.motion.skeleton, take.motion.root_positions[frame], take.motion.rotations[frame])
+    return surfaces(take.motion.skeleton, ("header",))[0].line(*posed)[0]
 
 
 @pytest.mark.parametrize("method", METHODS)

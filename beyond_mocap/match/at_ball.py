@@ -1,0 +1,45 @@
+"""Who meets the ball is on it after he was kept out of others' bodies and has turned his head: both move striking parts
+off the ball by centimetres."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..motion.motion import Motion, pose_kinematics
+from ..motion.striking import ball_gap, meeting_words, surfaces
+from ..motion.track import BALL_RADIUS
+from ..polish.strike_at import Meeting, met_at
+from ..take import KeyResult, Take
+
+CLOSED = 0.15
+"""Metres of gap that are closed, as much as `polish.strike` closes; who misses the ball by more plays as he does."""
+
+OPEN = 1e-3
+"""Metres of gap that are left."""
+
+EASE = 0.3
+"""Seconds before and after a touch in which the part comes to the ball and goes back."""
+
+
+def at_ball(take: Take, ball: np.ndarray) -> Take:
+    """The take with its striking parts on the ball (T, 3) m, NaN where it is not known, at each key moment at which they
+    were meant to be. Frames further than EASE from such a moment keep their bits."""
+    meetings = [meeting for key in take.keys if (meeting := _meeting(take.motion, key, ball)) is not None]
+    return replace(take, motion=met_at(take.motion, take.contacts, meetings).motion) if meetings else take
+
+
+def _meeting(motion: Motion, key: KeyResult, ball: np.ndarray) -> Meeting | None:
+    """What brings a part to the ball at one key moment; None where it is there, or too far."""
+    frame = int(np.clip(np.rint(key.frame), 0, len(motion) - 1))
+    parts = surfaces(motion.skeleton, meeting_words(key.words, key.asked.words))
+    if not parts or not np.isfinite(ball[frame]).all():
+        return None
+    places, world = pose_kinematics(motion.skeleton, motion.root_positions[frame], motion.rotations[frame])
+    gaps = [abs(float(ball_gap(part.line(places, world), part.radius, ball[frame]))) for part in parts]
+    nearest = int(np.argmin(gaps))
+    if not OPEN < gaps[nearest] < CLOSED:
+        return None
+    ease = EASE * motion.fps
+    return Meeting(float(frame), parts[nearest], ball[frame], BALL_RADIUS, ease, ease)

@@ -1,0 +1,62 @@
+"""A player who is pushed off the ball while he strikes it is brought back to it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.files.tables import read_ball
+from beyond_mocap.files.take_npz import read_player
+from beyond_mocap.library.library import build
+from beyond_mocap.match.at_ball import OPEN, at_ball
+from beyond_mocap.match.shown import shown
+from beyond_mocap.motion.motion import pose_kinematics
+from beyond_mocap.motion.striking import contact_gap
+from beyond_mocap.polish.crowd.correction import CURVES, FEET, ROOT, Correction
+from tests.core.match.small_match import LIBRARY, SECONDS
+
+
+@pytest.fixture(scope="module")
+def striker(made, sample_cache):
+    """Library, edit list without correction, ball, the key moment and its frame on the match's clock."""
+    folder, _ = made
+    library = build(LIBRARY, cache_dir=sample_cache)
+    edit, ball = replace(read_player(folder / "home_7.take.npz"), correction=None), read_ball(folder / "ball.csv")
+    (take,) = shown(library, edit, ball, *SECONDS)
+    key = next(key for key in take.keys if gap_at(take, key) < OPEN + 1e-6)
+    return library, edit, ball, key, round(key.frame + SECONDS[0] * 30.0)
+
+
+def gap_at(take, key):
+    """m between the striking surface and the ball at a key moment."""
+    frame = int(np.rint(key.frame))
+    posed = pose_kinematics(take.motion.skeleton, take.motion.root_positions[frame], take.motion.rotations[frame])
+    return abs(float(contact_gap(take.motion.skeleton, *posed, key.words, take.ball.positions[frame])))
+
+
+def pushed_by(metres, frame):
+    """A correction that pushes root and feet aside for half a second on either side of a frame of the match's clock."""
+    first = frame - 18
+    curves = np.zeros((37, CURVES))
+    bump = np.hanning(37)[:, None] * metres / np.sqrt(2.0)
+    curves[:, ROOT] = bump
+    curves[:, FEET] = np.tile(bump, (1, 4))
+    return Correction.of(curves, first, 30.0)
+
+
+def test_a_striker_pushed_aside_by_others_still_meets_the_ball(striker):
+    library, edit, ball, key, frame = striker
+    (plain,) = shown(library, edit, ball, *SECONDS)
+    (take,) = shown(library, replace(edit, correction=pushed_by(0.06, frame)), ball, *SECONDS)
+    assert gap_at(take, key) < OPEN
+    at = round(key.frame)
+    assert np.linalg.norm(take.motion.root_positions[at] - plain.motion.root_positions[at]) > 0.05
+    far = np.abs(np.arange(len(take.motion)) - at) > 60  # the head looks round over some time
+    assert np.array_equal(take.motion.rotations[far], plain.motion.rotations[far])
+
+
+def test_who_is_far_from_the_ball_plays_as_he_does(striker):
+    library, edit, ball, *_ = striker
+    (take,) = shown(library, edit, ball, *SECONDS)
+    assert at_ball(take, take.ball.positions + [0.0, 0.0, 3.0]) is take
+    assert at_ball(take, np.full_like(take.ball.positions, np.nan)) is take
