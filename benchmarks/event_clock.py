@@ -1,4 +1,5 @@
-"""How often events of a match, and of another one, are taken for its own in a short span: `python -m benchmarks.event_clock`.
+"""How often events of a match, and of another one, are taken for its own in a short span:
+`python -m benchmarks.event_clock`.
 
 Spans of a recorded match with its provider's raw times, and of the touches of a recorded half with events made from
 them, late by known seconds. Events of another match are these with players changed among each other, at shuffled times,
@@ -66,7 +67,9 @@ def made(touches: Sequence, lag: float, seed: int, share: float = 0.9, scatter: 
     return MatchEvents(tuple(sorted(rows, key=lambda event: event.time)), "made")
 
 
-def verdicts(events: MatchEvents, touches, halves, starts: Iterable[float], length: float, lag: float | None) -> Counter:
+def verdicts(
+    events: MatchEvents, touches, halves, starts: Iterable[float], length: float, lag: float | None
+) -> Counter:
     """What becomes of the events in spans from `starts` on: right, wrong lag, or for another match's (no lag) accepted;
     told; refused."""
     out = Counter()

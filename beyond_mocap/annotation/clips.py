@@ -53,7 +53,8 @@ def read_annotation_csv(
     """file (as the column spells it) -> its annotations in the table's order.
 
     Columns file, start_frame, end_frame, key_frame, labels; others are ignored. A blank key_frame means none; rows
-    without labels are left out, and those (column -> text) of which `but` is true. InputError names the line of a row that is not of this form.
+    without labels are left out, and those (column -> text) of which `but` is true. InputError names the line of a row
+    that is not of this form.
     """
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     found: dict[str, list[ClipAnnotation]] = {}

@@ -74,8 +74,9 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     write = scene_writer(options.scene, writers) if options.scene else None
     order = MatchOrder(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
-        events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider, cache=options.cache,
-        skeleton=options.skeleton, unit=options.unit, start=options.start, end=options.end, players=tuple(dict.fromkeys(options.players)), fps=options.fps,
+        events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider,
+        cache=options.cache, skeleton=options.skeleton, unit=options.unit, start=options.start, end=options.end,
+        players=tuple(dict.fromkeys(options.players)), fps=options.fps,
         seed=options.seed, nearest=options.nearest, solve_touches=not options.no_solve_touches,
         annotations=options.annotations, bvh=options.bvh, figures=not options.no_figures,
         workers=options.workers or len(_cores()), scheduler=options.scheduler,

@@ -70,9 +70,11 @@ def _with_players(path: Path, rows: list[tuple[MatchEvent, Who | None]], match: 
     few = match is not None and len(known) < _LEAST_KNOWN * len(everybody)
     if few and all(who.number < 0 and not who.name for who in everybody):  # nothing says that it is another match
         ids = ", ".join([who.id for who in everybody if who not in known][:3])
-        notes = [f"{path.name}: {len(everybody) - len(known)} of {len(everybody)} players cannot be assigned, for these "
-                 f"events have neither shirt numbers nor names, and the tracking has other ids than theirs ({ids} ...): "
-                 "what they do is left out"]  # fmt: skip
+        notes = [
+            f"{path.name}: {len(everybody) - len(known)} of {len(everybody)} players cannot be assigned, for these "
+            f"events have neither shirt numbers nor names, and the tracking has other ids than theirs ({ids} ...): "
+            "what they do is left out"
+        ]
     elif few:
         lost = ", ".join(who.said for who in everybody if who not in known)
         found = f"{len(everybody) - len(known)} of {len(everybody)} players ({lost[:80]}) are not in the tracking"

@@ -5,8 +5,8 @@ Touches of the ball are solved from tracking (`solve_ball`); an event of a playe
 all pairs of an event and a touch of the same player, the difference of times that comes most often is the lag of a
 period; a line through the pairs near it takes out what the clocks run apart. People are seconds late, not minutes, so a
 far lag counts for less than a near one, by a Cauchy distribution around none: among few pairs a near one wins, and a
-clock that is minutes off needs some three agreeing pairs more than one that is seconds off. Events are believed where so
-many fit that chance does not explain it, at any lag as likely as theirs. Then each player's events and touches are
+clock that is minutes off needs some three agreeing pairs more than one that is seconds off. Events are believed where
+so many fit that chance does not explain it, at any lag as likely as theirs. Then each player's events and touches are
 brought together in order, as two lines of text are.
 """
 

@@ -147,7 +147,8 @@ def _make(
     told = job.folder.before.get("players", ())
     finished = {row["id"]: row["finished"] for row in told if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: row_of(part, finished.get(part.role.player.id)) for part in parts}
-    state.told["notes"] += [*strange_texts(job.order.annotations, names.values()), *unused_lines(parts, job.order, names)]
+    state.told["notes"] += strange_texts(job.order.annotations, names.values())
+    state.told["notes"] += unused_lines(parts, job.order, names)
     state.took("words", clock)
     state.write()
     clock = now()

@@ -247,7 +247,8 @@ def _same(a, b):
         for left, right in zip(a, b, strict=True):
             _same(left, right)
     elif isinstance(a, float):
-        assert a == pytest.approx(b, rel=0.02, abs=0.01)  # shares of a few dozen steps: one more or less on a rounded frame
+        # shares of a few dozen steps: one more or less on a rounded frame
+        assert a == pytest.approx(b, rel=0.02, abs=0.01)
     else:
         assert a == b
 

@@ -158,7 +158,9 @@ def test_any_content_is_read_or_refused(tmp_path_factory, content):
 
 
 def test_metrica_s_table_of_events_is_read(tmp_path):
-    head = "Team,Type,Subtype,Period,Start Frame,Start Time [s],End Frame,End Time [s],From,To,Start X,Start Y,End X,End Y"
+    head = (
+        "Team,Type,Subtype,Period,Start Frame,Start Time [s],End Frame,End Time [s],From,To,Start X,Start Y,End X,End Y"
+    )
     one = "Away,PASS,HEAD,1,1,2.5,2,2.6,Player7,Player3,0.6,0.25,0.7,0.2"
     other = "Home,BALL LOST,,2,9,2800,9,2800,Player9,,,,,"
     duel = "Away,CHALLENGE,AERIAL-LOST,1,3,3.5,3,3.5,Player3,,0.5,0.5,,"

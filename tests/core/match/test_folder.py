@@ -150,7 +150,8 @@ def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
 
 @pytest.mark.parametrize("text, told", [
     ("{", "no JSON"), ("[]", "no list of players"), ('{"players": [3]}', "no list of players"),
-    ('{"players": [], "version": 99}', "version 99"), ('{"players": []}', "no version"), ("[" * 100000, "no JSON"), ("\0\0", "no JSON"),
+    ('{"players": [], "version": 99}', "version 99"), ('{"players": []}', "no version"), ("[" * 100000, "no JSON"),
+    ("\0\0", "no JSON"),
 ])  # fmt: skip
 def test_a_state_that_cannot_be_read_is_told(tmp_path, text, told):
     (tmp_path / "match.json").write_text(text)
