@@ -4,6 +4,7 @@
 - `effort`    seconds and memory
 - `paper`     Faustino's printed tables and ours below them
 - `misses`    which targets are missed, where in the takes, and what lies behind it
-- `path_editing`  recordings on other paths (`path_shapes`); `path_cycles` on longer and shorter ones; `path_experiments` makes the pictures of docs/ (`path_plots`)
+- `path_editing`  recordings on other paths (`path_shapes`); `path_cycles` on longer and shorter ones;
+  `path_experiments` makes the pictures of docs/ (`path_plots`)
 - `compare`   two ways of one thing, measured once
 """

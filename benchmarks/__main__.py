@@ -3,8 +3,8 @@
 Everything of one run is measured in one process on one core; seconds are the best of three. Written to
 benchmarks/results.md with the command that made it: a summary, Faustino's tables with our rows, then all figures.
 `--compare` measures instead what is decided once, `--paths` recordings on other paths, `--ball` the ball and who
-touches it, `--markers` optical recordings, `--throws` thrown and kicked balls, and writes that section anew. A Blender measures with the numpy that it has:
-`blender -b --python benchmarks/__main__.py -- --out FILE`.
+touches it, `--markers` optical recordings, `--throws` thrown and kicked balls, and writes that section anew. A Blender
+measures with the numpy that it has: `blender -b --python benchmarks/__main__.py -- --out FILE`.
 """
 
 from __future__ import annotations

@@ -8,11 +8,12 @@ The model of the user, every part of it a plain assumption:
 - He pauses (Space) REACTION seconds behind each thing that he sees, steps back to it by single frames (comma), and goes
   on (Space). Every step back counts as a press, though a held key would repeat.
 - A press takes STROKE seconds: 200 strokes a minute, which is 40 words of five letters.
-- Before each annotation he thinks for THOUGHT seconds (the M of the keystroke-level model; Card, Moran and Newell 1983).
+- Before each annotation he thinks for THOUGHT seconds (the M of the keystroke-level model; Card, Moran and Newell
+  1983).
 - He knows the digits of the tree; who does not, reads the menu, and needs longer.
 
-Nobody was timed. Typing the same text file is counted by the same model: its characters are typed in a text editor after
-the same pausing and stepping, with THOUGHT for each line and another for reading its second off the screen.
+Nobody was timed. Typing the same text file is counted by the same model: its characters are typed in a text editor
+after the same pausing and stepping, with THOUGHT for each line and another for reading its second off the screen.
 """
 
 from __future__ import annotations
@@ -187,7 +188,9 @@ def worst(asked: Timeline, made: Timeline) -> float:
 
 def main() -> None:
     """The table."""
-    head = "| scenario | annotations | presses | of them words | by keys, s | typed, s | Faustino typed, s | old tool, s | off by, s |"
+    columns = ("scenario", "annotations", "presses", "of them words", "by keys, s", "typed, s", "Faustino typed, s",
+               "old tool, s", "off by, s")  # fmt: skip
+    head = f"| {' | '.join(columns)} |"
     print(head + "\n|" + "---|" * 9)
     for number in FAUSTINO:
         track, timeline = scenario(number)

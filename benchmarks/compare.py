@@ -95,8 +95,9 @@ def annotation_costs(libraries: dict[str, Library], scenarios: list[int]) -> lis
                 rest = [f"{seams:.0f}", f"{hard:.2f}", f"{off:.2f}", f"{took:.2f}"]
                 lines.append(markdown.row([f"{name}, {method}", told, similarity, printed, *rest]))
     decision = (
-        "Kept: eq. 18. The squared difference counts every further word of a clip against it, meets fewer of the asked words "
-        "with both methods, and takes twice as long; it cuts more smoothly only where it gives the words up (`blocks`)."
+        "Kept: eq. 18. The squared difference counts every further word of a clip against it, meets fewer of the asked "
+        "words with both methods, and takes twice as long; it cuts more smoothly only where it gives the words up "
+        "(`blocks`)."
     )
     return [*lines, "", decision, ""]
 
@@ -130,7 +131,8 @@ def continuity(libraries: dict[str, Library], scenarios: list[int], rows: int = 
     """Distances between blocks worked out when they are needed, against a table of all of them (§4.3)."""
     lines = [
         "### Continuity between blocks: worked out when needed, or kept in a table (Faustino §4.3)", "",
-        "The table holds the continuity cost of every 8-frame block before every other, float32. Building and looking up are",
+        "The table holds the continuity cost of every 8-frame block before every other, float32. Building and looking "
+        "up are",
         f"measured on {rows} of its rows and scaled.", "",
         *markdown.head(TABLE_COLUMNS),
     ]
@@ -145,8 +147,9 @@ def continuity(libraries: dict[str, Library], scenarios: list[int], rows: int = 
         cells = [name, str(count), size, f"{build_seconds:.1f}", needed, f"{took:.3f}", f"{pairs * per_pair:.3f}"]
         lines.append(markdown.row(cells))
     decision = (
-        "Kept: worked out when needed. A library that covers running needs a table larger than most machines' memory, and "
-        "looking distances up there is no faster than working them out; a small library saves some hundredths of a second."
+        "Kept: worked out when needed. A library that covers running needs a table larger than most machines' memory, "
+        "and looking distances up there is no faster than working them out; a small library saves some hundredths of a "
+        "second."
     )
     return [*lines, "", decision, ""]
 
@@ -169,9 +172,11 @@ def made_running(libraries: dict[str, Library], scenarios: list[int], place: Pat
     """Made running against the fastest recording, played faster with longer strides (`Plan.made`)."""
     lines = [
         "### Faster than any recording: made running, or recordings stretched", "",
-        "`path` with and without `--no-made`, by the speed asked, without key moments. Cadence: steps a second, flight: share of frames with",
+        "`path` with and without `--no-made`, by the speed asked, without key moments. Cadence: steps a second, "
+        "flight: share of frames with",
         "neither foot within 3 cm of where it stands; both beside published ones (Dorn 2012 and others,",
-        "`motion/gait_tables`) at the same speeds. Unreal: share of poses farther from the library's own than these are from",
+        "`motion/gait_tables`) at the same speeds. Unreal: share of poses farther from the library's own than these "
+        "are from",
         f"each other. Off real running: the median distance from the nearest pose of {', '.join(FAST_RECORDINGS)}",
         "on the same skeleton, which reach 8.9 m/s.", "",
         *markdown.head(RUNNING_COLUMNS),
@@ -191,10 +196,11 @@ def made_running(libraries: dict[str, Library], scenarios: list[int], place: Pat
                 speeds = f"{low:g}-{high:g}" if np.isfinite(high) else f"above {low:g}"
                 lines.append(markdown.row([name, speeds, *_class_row(of, low, high, told)]))
     decision = (
-        "Kept: made running. It is nearer to real running wherever it steps in, its cadence is within 7 % of the published "
-        "one where stretched strides are a fifth too slow, and its feet stand: away from key moments it skates 2 to 4 cm/s, "
-        "stretched recordings 10 below 6 m/s and 80 above. Seen side by side, stretched strides keep a jogger's upright "
-        "trunk and folded arms at 8 m/s."
+        "Kept: made running. It is nearer to real running wherever it steps in, its cadence is within 7 % of the "
+        "published one where stretched strides are a fifth too slow, and its feet stand: away from key moments it "
+        "skates 2 to 4 cm/s, "
+        "stretched recordings 10 below 6 m/s and 80 above. Seen side by side, stretched strides keep a jogger's "
+        "upright trunk and folded arms at 8 m/s."
     )
     return [*lines, "", decision, ""]
 

@@ -45,7 +45,8 @@ def blas_speed() -> str:
     random = np.random.default_rng(0)
     a, b = (random.normal(size=(2000, 27)).astype(np.float32) for _ in range(2))
     took, _ = seconds(lambda: [a @ b.T for _ in range(10)])
-    return f"numpy multiplies at {10 * 2 * 2000 * 2000 * 27 / took / 1e9:.0f} GFLOP/s (pip's some 100, one without BLAS 2 to 6)"
+    speed = 10 * 2 * 2000 * 2000 * 27 / took / 1e9
+    return f"numpy multiplies at {speed:.0f} GFLOP/s (pip's some 100, one without BLAS 2 to 6)"
 
 
 def bvh_speed() -> str:

@@ -114,7 +114,9 @@ def shares(counts: np.ndarray, least: float = 0.1) -> str:
     """The kinds with most of the frames as text: "key moments 80 %, elsewhere 15 %"."""
     total = counts.sum()
     order = np.argsort(-counts, kind="stable")
-    return ", ".join(f"{KINDS[k]} {counts[k] / total:.0%}" for k in order if total and counts[k] >= least * total) or "-"
+    return (
+        ", ".join(f"{KINDS[k]} {counts[k] / total:.0%}" for k in order if total and counts[k] >= least * total) or "-"
+    )
 
 
 def summary(reports: Mapping[int, Mapping], missed: Sequence[Misses]) -> list[str]:
@@ -143,14 +145,15 @@ def _behind(reports: Mapping[int, Mapping], missed: Sequence[Misses]) -> list[st
     keys = [key for report in reports.values() for key in report["keys"]]
     lacking = sum(of.lacking for of in missed) / max(sum(of.asked for of in missed), 1)
     lines = [
-        f"- speed coverage: the track is faster than the fastest recording x 1.15 in {np.mean(above):.0%} of the frames "
-        f"({' / '.join(f'{share:.0%}' for share in above)} by scenario)",
+        f"- speed coverage: the track is faster than the fastest recording x 1.15 in {np.mean(above):.0%} of the "
+        f"frames ({' / '.join(f'{share:.0%}' for share in above)} by scenario)",
         f"- words: {lacking:.0%} of the frames that ask for words ask for one that no clip carries; "
         f"{sum(key['used_instead'] is not None for key in keys)} of {len(keys)} key moments are played with others",
     ]
     if len(speeds):
         lines.append(
-            f"- key moments: asked at {np.median(speeds[:, 0]):.1f} m/s in the median and up to {speeds[:, 0].max():.1f}, "
+            f"- key moments: asked at {np.median(speeds[:, 0]):.1f} m/s in the median and up to "
+            f"{speeds[:, 0].max():.1f}, "
             f"recorded at {np.median(speeds[:, 1]):.1f} and up to {speeds[:, 1].max():.1f}"
         )
     return lines
@@ -174,4 +177,6 @@ def _keys(reports: Sequence[Mapping], rows) -> str:
     missed = sorted({row.name.partition(".")[2] for row in judged_keys if row.status == "missed"})
     count = sum(len(report["keys"]) for report in reports)
     verdict = f"{met} of {len(judged_keys)}" if met == len(judged_keys) else f"**{met} of {len(judged_keys)}**"
-    return markdown.row([f"figures of {count} key moments", "", "", "", verdict, f"missed: {', '.join(missed) or 'none'}"])
+    return markdown.row(
+        [f"figures of {count} key moments", "", "", "", verdict, f"missed: {', '.join(missed) or 'none'}"]
+    )

@@ -23,7 +23,8 @@ def tables(reports: Reports, scenarios: Sequence[int]) -> list[str]:
     """His Tables 1, 2 and 4 with our rows below his."""
     return [
         "### Table 1: distance from the track, metres", "",
-        "Mean over the whole animation / at the key moments, pelvis and track without any window. His is without catch-up.",
+        "Mean over the whole animation / at the key moments, pelvis and track without any window. His is without "
+        "catch-up.",
         "",
         *_table(scenarios, _pair("distance", "{:.2f}"), reports, _place),
         "### Table 2: annotation similarity", "",
@@ -31,9 +32,11 @@ def tables(reports: Reports, scenarios: Sequence[int]) -> list[str]:
         "",
         *_table(scenarios, _pair("similarity", "{:.2f}"), reports, _similarity),
         "### Table 4: seconds to synthesize", "",
-        "His: without / with foot-skate minimized, i7-5600U. `blocks` answers to the first, `distance` to the second.", "",
+        "His: without / with foot-skate minimized, i7-5600U. `blocks` answers to the first, `distance` to the second.",
+        "",
         *_table(scenarios, _pair("seconds", "{:.0f}"), reports, _seconds),
-        f"Seconds of motion, his: {', '.join(f'{d:g}' for d in DURATIONS)}; ours: {_durations(reports, scenarios)}.", "",
+        f"Seconds of motion, his: {', '.join(f'{d:g}' for d in DURATIONS)}; ours: {_durations(reports, scenarios)}.",
+        "",
     ]
 
 

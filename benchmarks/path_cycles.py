@@ -28,7 +28,8 @@ from benchmarks.path_editing import CLIPS, recording
 from benchmarks.places import DATA
 
 TIMES = (0.3, 0.7, 1.02, 1.5, 2.0, 3.0, 5.0)
-COLUMNS = ("times its length", "rides", "told instead", "own end met", "cycled", "seam jerk / own p95", "above it", "skate cm/s (own)")
+COLUMNS = ("times its length", "rides", "told instead", "own end met", "cycled", "seam jerk / own p95", "above it",
+           "skate cm/s (own)")
 _NEAR = 0.25  # seconds
 
 

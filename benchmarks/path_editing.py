@@ -47,7 +47,8 @@ CLIPS = {
 COLUMNS = {
     "root error cm, mean / p95": ("root_error_m.mean", "root_error_m.p95"),
     "kept speed off %, path / body": ("kept_speed.path.max", "kept_speed.body.total"),
-    "skate cm/s, before -> after (own)": ("skate.before_contact_cm_s", "skate.contact_cm_s", "skate.source_contact_cm_s"),
+    "skate cm/s, before -> after (own)": ("skate.before_contact_cm_s", "skate.contact_cm_s",
+                                          "skate.source_contact_cm_s"),
     "all standing points": ("skate.before_point_cm_s", "skate.point_cm_s", "skate.source_point_cm_s"),
     "stance mm (own)": ("skate.stance_mm_median", "skate.source_stance_mm_median"),
     "over 21 mm % (own)": ("skate.stances_over_21mm", "skate.source_stances_over_21mm"),
@@ -97,7 +98,9 @@ def _row(kind: str, name: str, shape: str, source, settings: RideSettings) -> Ro
 def dotted(value, name: str = "") -> dict[str, float]:
     """Nested figures by dotted name; what is not known is NaN."""
     if isinstance(value, dict):
-        return {k: v for key, entry in value.items() for k, v in dotted(entry, f"{name}.{key}" if name else key).items()}
+        return {
+            k: v for key, entry in value.items() for k, v in dotted(entry, f"{name}.{key}" if name else key).items()
+        }
     return {name: np.nan if value is None else float(value)}
 
 
@@ -176,7 +179,8 @@ def kept(rows: list[Row]) -> str:
     error = np.mean([row.values["root_error_m.mean"] <= 0.005 for row in fair])
     return (
         f"Bends of radius 2 m or more, {len(fair)} rides: feet slide no more than in the recording in {still:.0%}, arc "
-        f"length per frame is kept within 1 % in {speed:.0%}, the root is within 5 mm of the path (mean) in {error:.0%}."
+        f"length per frame is kept within 1 % in {speed:.0%}, the root is within 5 mm of the path (mean) in "
+        f"{error:.0%}."
     )
 
 
@@ -220,7 +224,9 @@ def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
     return [*lines, ""]
 
 
-def section(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(path_shapes.ALL), count: int = 3) -> list[str]:
+def section(
+    kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(path_shapes.ALL), count: int = 3
+) -> list[str]:
     """The lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
     rows = rides(kinds, paths)
     return [

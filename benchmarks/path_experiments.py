@@ -329,7 +329,8 @@ def straightened():
 def rerouted():
     """Figures 5.19 and 5.20: the complex motion on other complex paths."""
     figure, axes = plots.canvas(1, 2, tall=4.6)
-    lines = {"figure of eight": path_shapes.eight(2.8, 1.0), "one bend after the other": path_shapes.winding(length=20.0)}
+    lines = {"figure of eight": path_shapes.eight(2.8, 1.0),
+             "one bend after the other": path_shapes.winding(length=20.0)}
     for ax, (name, line) in zip(axes[0], lines.items()):
         trial = tried("complex", line)
         _prints(ax, trial)

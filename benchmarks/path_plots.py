@@ -102,7 +102,9 @@ def sticks(ax, motion: Motion, frames: np.ndarray, colour: str, along=(1.0, 0.0)
                 ax.plot(*flat[[joint, parent]].T, color=colour, linewidth=1.1, solid_capstyle="round")
 
 
-def bodies(motion: Motion, frames: np.ndarray, side: float, size: int = 640, tilt: float = 0.55, wide: float | None = None):
+def bodies(
+    motion: Motion, frames: np.ndarray, side: float, size: int = 640, tilt: float = 0.55, wide: float | None = None
+):
     """A picture (size, size, 3) of bodies at some frames; side: degrees from +x at which the camera stands."""
     sys.path.insert(0, str(ROOT / "sample_blend"))
     import look

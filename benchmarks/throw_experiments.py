@@ -4,8 +4,8 @@
     .venv-training/bin/python -m benchmarks.throw_experiments                # his sizes and epochs: a day of one core
     .venv-training/bin/python -m benchmarks.throw_experiments --quick --tables  # train nothing, write the tables
 
-Every model is trained on one subject and tested on all others, what is asked for scaled by height. Broken off, by Ctrl-C
-or `--minutes`, the same command goes on. Models and figures go below build/throw-experiments; the tables into
+Every model is trained on one subject and tested on all others, what is asked for scaled by height. Broken off, by
+Ctrl-C or `--minutes`, the same command goes on. Models and figures go below build/throw-experiments; the tables into
 docs/throw-experiments.md.
 """
 
@@ -153,7 +153,8 @@ def _given(run: Run) -> list:
 
 def parameters_of(model) -> int:
     """Numbers in all networks that are not nothing."""
-    return sum(int(np.count_nonzero(part)) for network in model.networks.values() for part in (*network.weights, *network.biases))
+    return sum(int(np.count_nonzero(part)) for network in model.networks.values()
+               for part in (*network.weights, *network.biases))
 
 
 def equal_units(run: Run, scale: Scale, skeleton) -> int:
@@ -209,7 +210,9 @@ def main() -> int:
         wanted: list[Variant] = [every[name] for name in chosen.only or every]
         todo = list(runs([(name, subjects_of(name)) for name in chosen.data], wanted))
         until = time.time() + 60.0 * chosen.minutes if chosen.minutes else float("inf")
-        left = work_off(todo, scale, RESULTS, lambda run: worked(run, folder, scale), until, lambda line: print(line, flush=True))
+        left = work_off(
+            todo, scale, RESULTS, lambda run: worked(run, folder, scale), until, lambda line: print(line, flush=True)
+        )
     else:
         throw_results.tidy(RESULTS, scale.name)
         write_tables(scale)

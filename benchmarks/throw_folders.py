@@ -91,7 +91,8 @@ def _from_markers(name: str, folder: Path) -> dict | None:
         print(f"{name}: left out: {error}", file=sys.stderr)
         return None
     print(f"{name}: {found.side} hand, {found.time:.3f} s, {found.speed:.1f} m/s by the {found.how}", file=sys.stderr)
-    launch = {} if "serve" in name else dict(zip(LAUNCH, found.velocity))  # a racket serves, of which a hand tells little
+    # a racket serves, of which a hand tells little
+    launch = {} if "serve" in name else dict(zip(LAUNCH, found.velocity))
     return {"file": f"{subject}/{out.name}", "subject": subject, "limb": f"{found.side}_hand",
             "release_s": f"{found.time:.6f}", **{axis: f"{value:.6f}" for axis, value in launch.items()}}  # fmt: skip
 

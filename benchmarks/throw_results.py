@@ -1,5 +1,5 @@
-"""What the experiments with throws found, kept beside them so that another machine goes on where this one stopped: figures
-alone, one line a run, in benchmarks/throw_results/SCALE_DATA.jsonl.
+"""What the experiments with throws found, kept beside them so that another machine goes on where this one stopped:
+figures alone, one line a run, in benchmarks/throw_results/SCALE_DATA.jsonl.
 
 A line has what its run was asked for as a `stamp`: a run that would be asked for something else now is done anew.
 """
@@ -66,7 +66,9 @@ def _rows(each) -> dict[str, list]:
     rows: dict[str, list] = {}
     for one in each:
         flat = [value for name in LIMBS for value in one[name]] + [one[name] for name in SINGLES]
-        rows.setdefault(one["subject"], []).append([None if value is None else float(f"{value:.{DIGITS}g}") for value in flat])
+        rows.setdefault(one["subject"], []).append(
+            [None if value is None else float(f"{value:.{DIGITS}g}") for value in flat]
+        )
     return rows
 
 

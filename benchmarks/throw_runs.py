@@ -1,8 +1,8 @@
 """Which networks the experiments train, on whom, and the queue that works them off one after another, resumable.
 
-A run is one model trained on one subject and tested on all others. What it found is one line of `throw_results`, written
-whole, so a queue that was killed goes on where it was, on another machine too: a run with a line is done, a training that
-was broken off goes on from its checkpoint.
+A run is one model trained on one subject and tested on all others. What it found is one line of `throw_results`,
+written whole, so a queue that was killed goes on where it was, on another machine too: a run with a line is done, a
+training that was broken off goes on from its checkpoint.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ HIS = {"conditioned": False, "ik_layer": False, "rollout": 1, "frame": "static",
        "body_weight": 33.0}
 """What all of his models have in common (§7). He names no learning rate."""
 FED = {"conditioned": True, "batch": 128, "rollout": 4, "noise": 0.02, "keep": 1.0, "learning_rate": 1e-3}
-"""What keeps a network that is given its own answers on the road: they are fed back in training too, from poses that are
-somewhat off."""
+"""What keeps a network that is given its own answers on the road: they are fed back in training too, from poses that
+are somewhat off."""
 
 
 LEAST = 96
-"""Units, as shipped weights have them: fewer cannot carry the linear start of the body, which takes two for each answer."""
+"""Units, as shipped weights have them: fewer cannot carry the linear start of the body, which takes two for each
+answer."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,9 @@ class Variant:
 @dataclass(frozen=True)
 class Scale:
     """How large: units of the hierarchy's layers (the single network has twice as many, as his), epochs, frames in a
-    batch, motions of each subject that are tested, None for all. steps: of Adam, in place of epochs, so that whoever has
-    fewer recordings is trained as long. fed: the same of networks that are fed back, whose steps see several frames."""
+    batch, motions of each subject that are tested, None for all. steps: of Adam, in place of epochs, so that whoever
+    has fewer recordings is trained as long. fed: the same of networks that are fed back, whose steps see several
+    frames."""
 
     name: str
     units: int
@@ -74,12 +76,14 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
     second = {**HIS, **dropped, "wrist": "given"}
     single = {**first, **many, "kind": "single"}
     ours = {**FED, **_long(scale.epochs // 2, scale.fed and scale.fed // 2), "guided": True, "carried": True,
-            "linear_start": True, "ridge": 0.0, "start_noise": 0.07, "rollout": 8, "learning_rate": 1e-4, "frame": "hip",
+            "linear_start": True, "ridge": 0.0, "start_noise": 0.07, "rollout": 8, "learning_rate": 1e-4,
+            "frame": "hip",
             "wrist": "given", "units": max(scale.units, LEAST)}
     shipped = {**ours, "epochs": 0, "steps": None, "units": LEAST}
     plain = {"wrist": "given", "frame": "hip", "units": 1, "layers": 1, "guided": False, "carried": False}
     return (
-        *(Variant(name, words, {**plain, **changes}, not name.endswith("raw"), linear=True) for name, words, changes in (
+        *(Variant(name, words, {**plain, **changes}, not name.endswith("raw"), linear=True)
+          for name, words, changes in (
             ("linear", "six linear maps", {"points": 1}), ("linear-phased", "six linear maps, by phase", {}),
             ("linear-raw", "six linear maps", {"points": 1}), ("linear-phased-raw", "six linear maps, by phase", {}),
             ("linear-single-raw", "one linear map, by phase", {"kind": "single"}),
@@ -91,7 +95,8 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
         Variant("hierarchy", "six phase-functioned networks, wrists given", {**second, **few, "layers": 3}, True),
         Variant("feed-forward", "six feed-forward networks, wrists given",
                 {**second, **few, "layers": 8, "points": 1}, True),
-        Variant("single-fed-raw", "one network, its own frames fed back in training", {**single, **again, **FED}, False),
+        Variant("single-fed-raw", "one network, its own frames fed back in training", {**single, **again, **FED},
+                False),
         Variant("hierarchy-fed-raw", "six networks in order, their own frames fed back in training",
                 {**first, **few, **again, **FED, "layers": 3}, False),
         Variant("single-effectors", "one network with the end-effector loss (§9.2)",
@@ -103,7 +108,8 @@ def variants(scale: Scale) -> tuple[Variant, ...]:
         Variant("start", "as the shipped weights: limbs guided, linear by phase, the ridge chosen", shipped, True),
         Variant("start-raw", "as the shipped weights", shipped, False),
         Variant("start-everyone", "as the shipped weights, from all others retargeted (§10.2)", shipped, True, True),
-        Variant("start-warped", "as the shipped weights, phases warped in time (§9.3)", {**shipped, "phase": "warped"}, True),
+        Variant("start-warped", "as the shipped weights, phases warped in time (§9.3)", {**shipped, "phase": "warped"},
+                True),
         Variant("ours", "six networks trained in order, fed back (§9.4)", ours, True),
         Variant("ours-ik", "ours with inverse kinematics inside the loss (§9.4)", {**ours, "ik_layer": True}, True),
         Variant("ours-warped", "ours with phases warped in time (§9.3)", {**ours, "phase": "warped"}, True),
@@ -136,7 +142,9 @@ class Run:
 
     def stamp(self, scale: Scale) -> str:
         """What is asked for, as 12 letters: results of anything else are not this run's."""
-        return _letters(self.variant.config, self.variant.corrected, self.variant.everyone, self.variant.linear, scale.motions)
+        return _letters(
+            self.variant.config, self.variant.corrected, self.variant.everyone, self.variant.linear, scale.motions
+        )
 
 
 def _letters(*asked) -> str:
@@ -155,10 +163,11 @@ def work_off(
     todo: Sequence[Run], scale: Scale, kept: Path, do: Callable[[Run], dict], until: float = float("inf"),
     told: Callable[[str], None] = print,
 ) -> int:
-    """Works off what is not done; how many are left. kept: folder of the results. do: gets a run, returns what it found.
-    until: seconds of the clock (`time.time`) after which no further run is begun."""
+    """Works off what is not done; how many are left. kept: folder of the results. do: gets a run, returns what it
+    found. until: seconds of the clock (`time.time`) after which no further run is begun."""
 
-    def is_done(run: Run) -> bool:  # asked for each anew: another process may work off the same queue from its other end
+    # asked for each anew: another process may work off the same queue from its other end
+    def is_done(run: Run) -> bool:
         found = throw_results.read(kept, scale.name).get(run.key)
         return found is not None and found.get("stamp") == run.stamp(scale)
 

@@ -1,4 +1,5 @@
-"""What throws cost: the networks alone, of several sizes, and a throw of three seconds with the weights that are shipped.
+"""What throws cost: the networks alone, of several sizes, and a throw of three seconds with the weights that are
+shipped.
 
 `python -m benchmarks.throw_speed` prints the tables; OPENBLAS_NUM_THREADS=1 for one core."""
 
@@ -41,7 +42,9 @@ def networks_row(kind: str, points: int, layers: int, units: int) -> str:
 
     spent, _ = seconds(all_frames, _RUNS)
     count = sum(network.parameters for network in made)
-    return row([kind, str(points), str(layers), str(units), f"{count / 1e6:.2f}", f"{2 * count / 1e6:.1f}", f"{spent:.3f}"])
+    return row(
+        [kind, str(points), str(layers), str(units), f"{count / 1e6:.2f}", f"{2 * count / 1e6:.1f}", f"{spent:.3f}"]
+    )
 
 
 def _network(random, inputs: int, outputs: int, settings: ModelSettings) -> PhaseNetwork:

@@ -90,7 +90,8 @@ def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
     his_new, his_old, printed = his if data == "planted" else (None, None, None)
     lines = [f"**{WORDS[data]}**", ""]
     if his[0] is not None:
-        lines += [f"`{old}`:", "", *figure_table(against, his_old), "", f"`{new}`:", "", *figure_table(ours, his_new), ""]
+        lines += [f"`{old}`:", "", *figure_table(against, his_old), "", f"`{new}`:", "", *figure_table(ours, his_new),
+                  ""]
     return [*lines, f"`{new}` - `{old}`:", "", *test_table(ours, against, printed), "",
             *(f"{line}." for line in verdicts(ours, against)), ""]
 
@@ -98,7 +99,8 @@ def pair(found: Found, data: str, new: str, old: str, his) -> list[str]:
 def overview(found: Found, data: str, scale: Scale) -> list[str]:
     """One row per variant: means over its models."""
     lines = markdown.head([
-        "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "as a body, cm", "bodies lost", "impact, m", "head, °", "head turns",
+        "variant", *(f"{name}, cm" for name in EFFECTOR_NAMES), "networks alone, cm", "as a body, cm", "bodies lost",
+        "impact, m", "head, °", "head turns",
         "jerk", "beyond limits", "parameters", "units x layers", "steps of frames", "models",
     ])  # fmt: skip
     for variant in variants(scale):
@@ -147,7 +149,8 @@ def everyone(found: Found) -> list[str]:
             if mine is None or not of_variant(found, data, one):
                 continue
             other = by_tested(found, data, one, mine.subjects)
-            lines += [f"**{heading}**, `{all_}` - `{one}`, by the subject that is tested:", "", *test_table(mine, other), "",
+            lines += [f"**{heading}**, `{all_}` - `{one}`, by the subject that is tested:", "",
+                      *test_table(mine, other), "",
                       *(f"{line}." for line in verdicts(mine, other)), ""]
     return ["### One network from all others (§10.2) or from one of them", "", *lines] if lines else []
 

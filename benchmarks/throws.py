@@ -1,5 +1,5 @@
-"""The section on throws and kicks: the shipped weights on people that they never saw, targets anywhere, seconds, and what
-the experiments found (`python -m benchmarks.throw_experiments`)."""
+"""The section on throws and kicks: the shipped weights on people that they never saw, targets anywhere, seconds, and
+what the experiments found (`python -m benchmarks.throw_experiments`)."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ def unseen_table(model, action: str) -> list[str]:
         report = evaluate_throws(model, unseen(action, model.settings.fps), options).report()
         lines.append(markdown.row([
             words, _centimetres(report["deviation_m"]), _centimetres(report["network_deviation_m"]),
-            *(_number(report[name], form) for name, form in (("impact_m", ".2f"), ("head", ".1f"), ("head_share", ".2f"),
+            *(_number(report[name], form) for name, form in (("impact_m", ".2f"), ("head", ".1f"),
+                                                             ("head_share", ".2f"),
                                                              ("jerk", ".2f"), ("beyond", ".4f"))),
         ]))  # fmt: skip
     return lines
@@ -70,7 +71,9 @@ def unseen_table(model, action: str) -> list[str]:
 
 def target_table(model, action: str) -> list[str]:
     """Targets that nobody aimed at, after the last correction."""
-    lines = markdown.head(["target, m", "ball off, m (0.10)", "moved, cm (5)", "turned, °", "m/s", "raw, cm (3)", "seconds"])
+    lines = markdown.head(
+        ["target, m", "ball off, m (0.10)", "moved, cm (5)", "turned, °", "m/s", "raw, cm (3)", "seconds"]
+    )
     for number, target in enumerate(TARGETS[action]):
         angle = 1.1 * number  # anywhere on the ground
         turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
@@ -81,7 +84,8 @@ def target_table(model, action: str) -> list[str]:
             lines.append(markdown.row([_place(target), f"refused: {error}"[:110], *[""] * 5]))
             continue
         lines.append(markdown.row([
-            _place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.moved:.1f}", f"{np.degrees(thrown.turned):.1f}",
+            _place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.moved:.1f}",
+            f"{np.degrees(thrown.turned):.1f}",
             f"{thrown.speed:.1f}", f"{100 * thrown.raw_deviation:.1f}",
             f"{took:.2f} for {thrown.motion.duration:.1f}",
         ]))  # fmt: skip

@@ -22,7 +22,7 @@ from .ball.contact import WORDS, striking_surface
 from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.way import Placed, needed, placed, way
-from .errors import InputError
+from .errors import InputError, told_time
 from .lay_out import faced, footed, smoothed
 from .library.automatic import automatic_words
 from .library.keys import Key
@@ -133,7 +133,8 @@ def strike_words(library: Library) -> frozenset[str]:
 def _check(orders: Sequence[HitOrder], times: np.ndarray, fps: float) -> None:
     for order in orders:
         if not times[0] - 0.5 / fps <= order.time <= times[-1] + 0.5 / fps:
-            raise InputError("strike", f"at {order.time:g} s", f"within the scene, {times[0]:g} to {times[-1]:g} s")
+            scene = f"{told_time(times[0])} to {told_time(times[-1])} s"
+            raise InputError("strike", f"at {told_time(order.time)} s", f"within the scene, {scene}")
     for before, after in zip(orders, orders[1:]):
         if after.time - before.time < 2.0 / fps:
             raise InputError("strike", f"two of one player at {after.time:g} s", "one at a time")

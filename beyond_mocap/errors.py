@@ -60,6 +60,11 @@ class TimedLine(str):
         return line
 
 
+def told_time(seconds: float) -> str:
+    """Seconds as a line says them: to the microsecond, however many they are, and no zeros behind."""
+    return f"{round(float(seconds), 6):.15g}"
+
+
 def spans_of(line: str) -> tuple[tuple[float, float], ...]:
     """The seconds that a line is about; () for a plain text."""
     return getattr(line, "spans", ())

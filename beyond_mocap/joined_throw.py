@@ -1,4 +1,5 @@
-"""A generated throw or kick within a longer motion: run-up and recovery from a library, or out of another motion and on.
+"""A generated throw or kick within a longer motion: run-up and recovery from a library, or out of another motion and
+on.
 
     way = run_up_and_recovery(library, plan, thrown.motion, thrown.release, at=12.4, action="throw")
     joined = laid_into(way.motion, way.start, thrown.motion, thrown.release, at=12.4)
@@ -25,7 +26,7 @@ import numpy as np
 
 from .annotation import ClipAnnotation, KeyMoment, Span, Timeline
 from .ball.way import hermite
-from .errors import InputError, TimedLine
+from .errors import InputError, TimedLine, told_time
 from .evaluation.jerk import jerk, uncut_windows, windowed
 from .library.features import joined as joined_frames
 from .library.library import Clip, Library, described
@@ -276,7 +277,8 @@ def around(
     """`own`, whose first frame is at `start` s, with a run-up to the throw and a recovery out of `library`.
 
     Both are on one skeleton. The body leaves its own way some seconds before the throw and is back on it some seconds
-    behind, where both show poses most alike; elsewhere it is as it was, bit for bit. `laid_into` then puts in the throw.
+    behind, where both show poses most alike; elsewhere it is as it was, bit for bit. `laid_into` then puts in the
+    throw.
     """
     fps = own.fps
     first = int(round((at - release - start) * fps))
@@ -304,13 +306,18 @@ def around(
     behind = (at_frame - comes + 1) / (fade + 1.0) if high < len(own) else np.zeros(len(own))
     share = eased(np.maximum(before, behind), np.ones(len(own)))
     new = own.root_positions.copy(), own.rotations.copy()
-    new[0][low : low + count], new[1][low : low + count] = way.motion.root_positions[:count], way.motion.rotations[:count]
+    new[0][low : low + count], new[1][low : low + count] = (
+        way.motion.root_positions[:count],
+        way.motion.rotations[:count],
+    )
     root, rotations = _between(own.skeleton, new, (own.root_positions, own.rotations), share)
     seams = [low + leaves, *(way.seams + low), low + comes]
     told = list(way.warnings)
     if not comes_back:
         when = start + end / fps
-        text = f"{when:.1f} s: there is no time to get back to the own way: what follows goes on from where the throw ends"
+        text = (
+            f"{when:.1f} s: there is no time to get back to the own way: what follows goes on from where the throw ends"
+        )
         told.append(TimedLine(text, (when, when)))
     fastest = float(np.linalg.norm(np.diff(root[low:high, :2], axis=0), axis=1).max() * fps)
     if fastest > _TOO_FAST * max(library.fastest, _hurry(own)):
@@ -347,7 +354,8 @@ def _stop(own: Motion, frame: int, side: int) -> tuple[np.ndarray, np.ndarray, i
 
 
 def _from_there(own: Motion, end: int, place: np.ndarray) -> Motion:
-    """The motion, everything from frame `end` on moved so that a body which sets out from `place` (2,) m gets into it."""
+    """The motion, everything from frame `end` on moved so that a body which sets out from `place` (2,) m gets into
+    it."""
     spot, way, _ = _stop(own, min(end, len(own) - 1), 1)
     root = own.root_positions.copy()
     root[end:, :2] += place + way - spot
@@ -499,7 +507,7 @@ def _asked(timeline: Timeline, begin: float, finish: float, at: float, words) ->
     """The timeline with the throw's key moment, without what it leaves no room for; lines about that."""
     kept = [key for key in timeline.keys if not begin < key.in_force < finish]
     told = [
-        TimedLine(f"{key.time:g} s: '{' '.join(key.words)}' lies within the throw, it is not played",
+        TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' lies within the throw, it is not played",
                   (key.time, key.time))
         for key in timeline.keys if key not in kept
     ]  # fmt: skip

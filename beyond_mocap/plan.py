@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .annotation import Timeline
-from .errors import InputError
+from .errors import InputError, told_time
 from .motion.skeleton import frozen_array
 from .motion.track import SMOOTHING_SECONDS, SampledTrack, Track, sample
 
@@ -193,7 +193,7 @@ class Plan:
             mine = [pin for pin in self.pins if pin.part == part]
             for before, after in zip(mine, mine[1:]):
                 if after.time <= before.end:
-                    found = f"two pins of {part} at {after.time:g} s"
+                    found = f"two pins of {part} at {told_time(after.time)} s"
                     raise InputError("pins", found, "one place at a time", "move one, or shorten the hold before it")
 
 

@@ -37,8 +37,8 @@ _INSIDE = (17.0, 1.2, 0.7)  # m/s and m up to which the inside serves, and how o
 
 @dataclass(frozen=True, eq=False)
 class Planted:
-    """A made throw or kick: motion, limb as in `throws.csv`, release s, position (3,) m and velocity (3,) m/s of the ball
-    as it leaves, impact (3,) m where it flies through, words."""
+    """A made throw or kick: motion, limb as in `throws.csv`, release s, position (3,) m and velocity (3,) m/s of the
+    ball as it leaves, impact (3,) m where it flies through, words."""
 
     motion: Motion
     limb: str
@@ -59,7 +59,8 @@ def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RAT
 
 
 def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
-    """A kick of this subject at some place of a goal 8 to 22 m away; of the slower ones many with the inside of the foot."""
+    """A kick of this subject at some place of a goal 8 to 22 m away; of the slower ones many with the inside of the
+    foot."""
     for _ in range(_TRIES):
         target = chance.uniform((8.0, -3.4, 0.3), (22.0, 3.4, 2.2))
         speed = float(chance.uniform(12.0, who.fastest))

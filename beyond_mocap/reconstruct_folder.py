@@ -1,9 +1,9 @@
 """The recipe for a folder of trials: which are statics, which belong to one session, one model for all of a subject.
 
 A folder's own files are one session; where it has folders below, each of these is one. A static trial is told by its
-name, and serves the trials of its session whose markers and body it has. Trials that share a static share the model that is made
-of it, and the models of several sessions of one subject get one skeleton (Fredriksson §5.2.3); trials without a static
-are modelled from their own motion.
+name, and serves the trials of its session whose markers and body it has. Trials that share a static share the model
+that is made of it, and the models of several sessions of one subject get one skeleton (Fredriksson §5.2.3); trials
+without a static are modelled from their own motion.
 """
 
 from __future__ import annotations

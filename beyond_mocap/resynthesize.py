@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, told_time
 from .known_touches import in_force
 from .lay_out import aimed, faced, footed, leaning, met, smoothed, touches, towards_ball
 from .library.library import Library
@@ -117,7 +117,8 @@ def _check(plan: Plan, before: Take, anew: Anew) -> None:
     if plan.method != "path":
         raise InputError("a stretch made anew", f"method {plan.method}", "method path", "synthesize the whole take")
     if not low <= anew.start < anew.end <= high + 0.5 / before.motion.fps:
-        found, expected = f"{anew.start:g} to {anew.end:g} s", f"a stretch within {low:g} to {high:g} s"
+        found = f"{told_time(anew.start)} to {told_time(anew.end)} s"
+        expected = f"a stretch within {told_time(low)} to {told_time(high)} s"
         raise InputError("a stretch made anew", found, expected)
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .annotation import LOCOMOTION_WORDS, avoided_per_frame, spoken
-from .errors import InputError, TimedLine
+from .errors import InputError, TimedLine, told_time
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
 from .known_touches import in_force, untouched, with_course
@@ -311,7 +311,7 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
     placed = {key.wanted for key in edit.keys}
     return [
         TimedLine(
-            f"{key.asked.time:g} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, "
+            f"{told_time(key.asked.time)} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, "
             "it is not played", (key.asked.time, key.asked.time),
         )  # fmt: skip
         for number, key in enumerate(order.keys)
@@ -343,7 +343,7 @@ def _pins_missed(take: Take) -> list[str]:
     """One warning per pin that is missed by more than can be seen."""
     told = []
     for result in take.pins:
-        pin, when = f"{result.pin.time:g} s: the pin of {result.pin.part}", (result.pin.time, result.pin.end)
+        pin, when = f"{told_time(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time, result.pin.end)
         if not np.isfinite(result.miss):
             told.append(f"{pin} lies outside the track, or the skeleton has no such part; it counts for nothing")
         elif result.pin.part == "gaze" and result.miss > GAZE_MISSED:

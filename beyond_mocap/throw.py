@@ -231,8 +231,8 @@ def throw_at(
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """A motion where it belongs, at the asked rate and on the asked skeleton. plan: what it was generated from. release:
-    s. raw: m that hands and feet are from their wanted ways before any correction. limits: of the limb."""
+    """A motion where it belongs, at the asked rate and on the asked skeleton. plan: what it was generated from.
+    release: s. raw: m that hands and feet are from their wanted ways before any correction. limits: of the limb."""
 
     plan: Planned
     motion: Motion
@@ -395,7 +395,9 @@ class _Work:
         steepest = float(arctan2(known[:, 2], np.hypot(known[:, 0], known[:, 1])).max())
         if steep > steepest + _STEEPER:
             found = f"the ball has to leave at {np.degrees(steep):.0f} degrees"
-            expected = f"at most {np.degrees(steepest + _STEEPER):.0f}: the steepest example has {np.degrees(steepest):.0f}"
+            expected = (
+                f"at most {np.degrees(steepest + _STEEPER):.0f}: the steepest example has {np.degrees(steepest):.0f}"
+            )
             raise InputError("target", found, expected, "move it further off or lower")
 
     def _check_human(self, slowest: float) -> None:
@@ -420,8 +422,8 @@ class _Work:
             raise InputError(what, found, most, "ask for less, or train on faster ones")
 
     def _by_pace(self, own: list[int], ahead: float) -> list[Wish]:
-        """The launch asked for, or of those that reach the target the ones most like the examples, and rather not faster
-        than the way asks; the best first, each of another speed."""
+        """The launch asked for, or of those that reach the target the ones most like the examples, and rather not
+        faster than the way asks; the best first, each of another speed."""
         thrown = np.linalg.norm(self.launches[own], axis=1)
         speeds = np.array([self.order.speed]) if self.order.speed else np.maximum(thrown, _MORE * self.arcs.slowest)
         wishes = [self._wish_at(float(speed), ahead) for speed in speeds]

@@ -51,8 +51,8 @@ _UNDER_FLOOR = 0.5  # m that a target may lie under what is taken for the floor
 
 @dataclass(frozen=True)
 class Action:
-    """What is looked for. words: any of them. limbs: indices of LIMBS. before, after: s around the release that are wanted
-    at least, and at most. wall: m ahead where an unknown target is thought to be. ball: its kind."""
+    """What is looked for. words: any of them. limbs: indices of LIMBS. before, after: s around the release that are
+    wanted at least, and at most. wall: m ahead where an unknown target is thought to be. ball: its kind."""
 
     words: frozenset[str]
     limbs: tuple[int, int]
@@ -96,8 +96,9 @@ def examples_in(
     """The examples of `action` ("throw" or "kick") below `folder`, at `fps` frames per second, each in its own frame.
 
     skeleton: bring all of them to this one; None leaves each its own. told: gets one line for each throw that is left
-    out, and why, and one for all recordings without any. mirror: of each also its mirror image, done with the other hand
-    or foot. InputError: no folder, no example in it, a table that cannot be read, a skeleton without hands or feet.
+    out, and why, and one for all recordings without any. mirror: of each also its mirror image, done with the other
+    hand or foot. InputError: no folder, no example in it, a table that cannot be read, a skeleton without hands or
+    feet.
     """
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
@@ -146,7 +147,9 @@ def _tell_strangers(words: Annotations, action: Action, folder: Path, told: Call
         named = [name for name, its in rows.items() if any(action.words & set(one.words) for one in its)]
         missing = [name for name in named if not (place / name).is_file()]
         if missing:
-            told(f"{place / ANNOTATIONS_NAME}: names {len(missing)} recordings that are not there, such as {missing[0]}")
+            told(
+                f"{place / ANNOTATIONS_NAME}: names {len(missing)} recordings that are not there, such as {missing[0]}"
+            )
 
 
 def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -> InputError:
@@ -157,7 +160,9 @@ def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -
         count = sum(_told_of(path, its, words, rows.get(path.relative_to(folder).as_posix())) for path in clips)
         if other != action and count:
             found = f"{len(clips)} BVH files, none with a {action}, {count} with a {other}"
-            return InputError(folder, found, f"recordings of a {action}", f"choose another folder, or the action {other}")
+            return InputError(
+                folder, found, f"recordings of a {action}", f"choose another folder, or the action {other}"
+            )
     wanted = " or ".join(sorted(ACTIONS[action].words))
     return InputError(
         folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the word {wanted}",
@@ -330,11 +335,14 @@ def _example(name: str, motion: Motion, known: _Known, action: Action, fps: floa
 
 
 def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:
-    """The target (3,) m that somebody wrote down. InputError where no ball that leaves `position` so flies through it."""
+    """The target (3,) m that somebody wrote down. InputError where no ball that leaves `position` so flies through
+    it."""
     way = target - position
     away, (low, high) = float(np.linalg.norm(way)), _TARGET_AWAY
     if not low <= away <= high:
-        raise InputError("target", f"{away:.3g} m from the ball as it leaves", f"{low:g} to {high:g} m", "check the unit")
+        raise InputError(
+            "target", f"{away:.3g} m from the ball as it leaves", f"{low:g} to {high:g} m", "check the unit"
+        )
     if target[2] < -_UNDER_FLOOR:
         raise InputError("target", f"{-target[2]:.2f} m under the floor", "a place above it", "is Z up in the table?")
     if way[:2] @ launch[:2] <= 0.0:

@@ -13,8 +13,8 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_add_pin(Verb, bpy.types.Operator):
-    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the present frame. Move it with
-G; time and hold stand in the list of pins"""
+    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the present frame. Move it
+with G; time and hold stand in the list of pins"""
 
     bl_idname = "beyond_mocap.add_pin"
     bl_label = "Add Pin"
@@ -25,7 +25,8 @@ G; time and hold stand in the list of pins"""
         description="Where the pin is made",
     )
     hold: bpy.props.FloatProperty(
-        name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE", description="Seconds for which it stays there"
+        name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
+        description="Seconds for which it stays there"
     )
 
     @classmethod

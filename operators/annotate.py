@@ -1,4 +1,5 @@
-"""Annotate by Keys: words at the playhead by number keys while the match plays; a shell over the core's `annotating`."""
+"""Annotate by Keys: words at the playhead by number keys while the match plays; a shell over the core's
+`annotating`."""
 
 from __future__ import annotations
 

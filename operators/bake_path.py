@@ -10,8 +10,8 @@ from .rider_verb import RiderVerb
 
 
 class BEYOND_MOCAP_OT_bake_path(RiderVerb, bpy.types.Operator):
-    """Keep the motion on its new path as an ordinary action with a key on every frame. The original action and the curve stay in
-the file"""
+    """Keep the motion on its new path as an ordinary action with a key on every frame. The original action and the
+curve stay in the file"""
 
     bl_idname = "beyond_mocap.bake_path"
     bl_label = "Keep"

@@ -16,7 +16,11 @@ from .verb import Verb
 TARGETS = (
     ("CHOSEN", "The Chosen Rig", "The rig that the panel shows"),
     ("SELECTED", "Selected Armatures", "The same motion onto every selected armature but the source"),
-    ("PLAYERS", "All Ticked Players", "Each ticked player's motion onto that player's rig, or a copy of the chosen one"),
+    (
+        "PLAYERS",
+        "All Ticked Players",
+        "Each ticked player's motion onto that player's rig, or a copy of the chosen one",
+    ),
 )
 
 

@@ -20,8 +20,9 @@ DEGREE = {"name": "Degree", "default": 3, "min": 2, "max": 5,
 
 
 class BEYOND_MOCAP_OT_edit_path(Verb, bpy.types.Operator):
-    """Lay the selected armature's motion on a curve along its path: edit the curve (Tab), and the motion follows. A selected
-curve becomes the path instead, also of who rides already. The original action is put aside; Leave brings it back"""
+    """Lay the selected armature's motion on a curve along its path: edit the curve (Tab), and the motion follows. A
+selected curve becomes the path instead, also of who rides already. The original action is put aside; Leave brings it
+back"""
 
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
@@ -47,7 +48,9 @@ curve becomes the path instead, also of who rides already. The original action i
         drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
         riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
         if drawn is None and len(riding) == len(chosen):
-            raise InputError(f"armature {chosen[0].name}", "it rides already", "one that does not", "edit its curve, or press Leave")
+            raise InputError(
+                f"armature {chosen[0].name}", "it rides already", "one that does not", "edit its curve, or press Leave"
+            )
         begun, used = [], drawn
         try:
             for body, _ in riding if drawn is not None else ():
@@ -74,4 +77,6 @@ curve becomes the path instead, also of who rides already. The original action i
 def bodies(context) -> list[bpy.types.Object]:
     """The armatures that are meant: the active one first, and the other selected ones."""
     active = context.view_layer.objects.active
-    return sorted((thing for thing in context.selected_objects if thing.type == "ARMATURE"), key=lambda thing: thing != active)
+    return sorted(
+        (thing for thing in context.selected_objects if thing.type == "ARMATURE"), key=lambda thing: thing != active
+    )

@@ -14,7 +14,8 @@ from .timeline_verb import TimelineVerb
 
 
 class BEYOND_MOCAP_OT_export_words(TimelineVerb, ExportHelper, bpy.types.Operator):
-    """Write what the strips and key moments say into a file, a line each: 'START END words' and 'TIME words', seconds"""
+    """Write what the strips and key moments say into a file, a line each: 'START END words' and 'TIME words',
+seconds"""
 
     bl_idname = "beyond_mocap.export_words"
     bl_label = "Export Words"

@@ -9,7 +9,8 @@ from .clip_verb import ClipVerb
 
 
 class BEYOND_MOCAP_OT_import_clip(ClipVerb, bpy.types.Operator):
-    """Bring this clip of the library into the scene as it was recorded: an armature with a body and the clip's action"""
+    """Bring this clip of the library into the scene as it was recorded: an armature with a body and the clip's
+action"""
 
     bl_idname = "beyond_mocap.import_clip"
     bl_label = "Import Clip"

@@ -1,4 +1,5 @@
-"""Import Motion Clips: BVH, FBX, glTF or USD files, one, many or a folder of them, each as an armature with an action."""
+"""Import Motion Clips: BVH, FBX, glTF or USD files, one, many or a folder of them, each as an armature with an
+action."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ from .verb import ImportVerb
 
 
 class BEYOND_MOCAP_OT_import_clips(ImportVerb, bpy.types.Operator):
-    """Import motion clips (BVH, FBX, glTF, USD) as armatures; choose files, or a folder without a file for all below it.
-Of a file with a body only the motion is taken, hips up and in metres"""
+    """Import motion clips (BVH, FBX, glTF, USD) as armatures; choose files, or a folder without a file for all below
+it. Of a file with a body only the motion is taken, hips up and in metres"""
 
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"

@@ -13,8 +13,8 @@ from .verb import ImportVerb
 
 
 class BEYOND_MOCAP_OT_import_words(ImportVerb, bpy.types.Operator):
-    """Import a text of words ('START END words', 'TIME words') as strips: of the active player, or of the library's clip
-whose armature is active. Strips that are there are replaced"""
+    """Import a text of words ('START END words', 'TIME words') as strips: of the active player, or of the library's
+clip whose armature is active. Strips that are there are replaced"""
 
     bl_idname = "beyond_mocap.import_words"
     bl_label = "Import Words"

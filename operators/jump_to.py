@@ -23,8 +23,8 @@ goes to the next. Shift-click also brings the body into view"""
     )
     stops: StringProperty(
         name="Stops", options={"SKIP_SAVE"},
-        description="Seconds with blanks between, instead: to the next one behind the current frame, from the last to the "
-        "first"
+        description="Seconds with blanks between, instead: to the next one behind the current frame, from the last to "
+        "the first"
     )
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Whose body; empty: the active player's")
     frame_view: BoolProperty(

@@ -60,12 +60,13 @@ same acts in others. What is learned is kept in a file, which serves any library
 
         out = Path(order.out) if order.out else cache.place(Path(order.folder), order.cache)[0] / keep.NAME
         looked = lambda done, text: progress(0.7 * done, text)  # noqa: E731
-        examples = examples_of(order.folder, order.unit, looked, order.cache, cancelled)
+        notes = []
+        examples = examples_of(order.folder, order.unit, looked, order.cache, cancelled, notes.append)
         known = trained(examples, lambda done, text: progress(0.7 + 0.3 * done, text), cancelled)
         if not order.out:
             out.parent.mkdir(parents=True, exist_ok=True)
         keep.write(out, known)
-        return str(out), known.told()
+        return str(out), (*known.told(), *notes)
 
     def apply(self, scene, result):
         """Propose Words uses it from now on."""

@@ -10,7 +10,8 @@ from .rider_verb import RiderVerb
 
 
 class BEYOND_MOCAP_OT_leave_path(RiderVerb, bpy.types.Operator):
-    """Give the armature its original motion back, exactly as it was. The curve stays, and Edit Path takes it up again"""
+    """Give the armature its original motion back, exactly as it was. The curve stays, and Edit Path takes it up
+again"""
 
     bl_idname = "beyond_mocap.leave_path"
     bl_label = "Leave"

@@ -65,7 +65,9 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         chosen = clips.active(context.window_manager)
         wanted = list(rows) if self.which == "SHOWN" else [chosen] if chosen else []
         if not wanted:
-            raise InputError("assets", "no clip in the list", "clips of the library", "press Build Library or List Clips")
+            raise InputError(
+                "assets", "no clip in the list", "clips of the library", "press Build Library or List Clips"
+            )
         folder = recordings.folder_of(settings)
         files = tuple((row.path, *recordings.file_of(settings, row.path), row.figures) for row in wanted)
         return Order(folder, files, ())
@@ -148,7 +150,9 @@ def _playing(context) -> list[bpy.types.Object]:
         if channels.playing(rig)[0].library is not None:
             raise InputError(rig.name, "its action belongs to another file", "actions of this file")
         if rig.beyond_mocap_ride.on:
-            raise InputError(rig.name, "its motion still rides a path", "a motion of its own", "press Keep in Path Editing first")
+            raise InputError(
+                rig.name, "its motion still rides a path", "a motion of its own", "press Keep in Path Editing first"
+            )
     return rigs
 
 

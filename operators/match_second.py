@@ -8,6 +8,7 @@ from bpy.props import FloatProperty, StringProperty
 from ..beyond_mocap.errors import InputError
 from ..scene import channels
 from ..scene.match import ours
+from ..scene.match.settings import typed
 from ..scene.measure import frames_per_second
 from .verb import Verb
 
@@ -40,7 +41,8 @@ seconds"""
         last = _last(scene)
         if not shown.shown_first <= frame <= last:
             end = shown.shown_start + (last - shown.shown_first) / rate
-            raise InputError("match", f"{self.seconds:g} s is not shown", f"{shown.shown_start:g} to {end:g} s",
+            expected = f"{typed(shown.shown_start)} to {typed(end)} s"
+            raise InputError("match", f"{typed(self.seconds)} s is not shown", expected,
                              "choose From and To around it and press Show Match")
         body = self.body(scene)
         scene.frame_set(frame)

@@ -12,8 +12,8 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_path_curve(Verb, bpy.types.Operator):
-    """Give the rider another curve: along the original path, straight, or as the path is now with other points. The curve before
-is removed if it was made here and nobody else rides it"""
+    """Give the rider another curve: along the original path, straight, or as the path is now with other points. The
+curve before is removed if it was made here and nobody else rides it"""
 
     bl_idname = "beyond_mocap.path_curve"
     bl_label = "New Curve"

@@ -10,8 +10,8 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_save_words(Verb, bpy.types.Operator):
-    """Write the words of the active clip's strips to NAME.txt beside the clip, or into the annotations.csv that speaks of
-it. What is written there already is overwritten only when you say so"""
+    """Write the words of the active clip's strips to NAME.txt beside the clip, or into the annotations.csv that speaks
+of it. What is written there already is overwritten only when you say so"""
 
     bl_idname = "beyond_mocap.save_words"
     bl_label = "Save Words"
@@ -42,7 +42,9 @@ it. What is written there already is overwritten only when you say so"""
         if not there:
             return self.execute(context)
         self.overwrite = True
-        what = f"Replace the words in {target.name}?" if form == "TEXT" else f"Replace this clip's rows in {target.name}?"
+        what = (
+            f"Replace the words in {target.name}?" if form == "TEXT" else f"Replace this clip's rows in {target.name}?"
+        )
         return context.window_manager.invoke_confirm(self, event, title=what, confirm_text="Replace", icon="WARNING")
 
     def do(self, context):

@@ -12,8 +12,8 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_set_static(OnMarkers, Verb, bpy.types.Operator):
-    """The active cloud is a static trial: the other selected clouds, or all others where none is selected, get the places of
-their joints from it"""
+    """The active cloud is a static trial: the other selected clouds, or all others where none is selected, get the
+places of their joints from it"""
 
     bl_idname = "beyond_mocap.set_static"
     bl_label = "Set Static Trial"

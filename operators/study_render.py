@@ -58,6 +58,8 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
         sources = [(clip, _read(folder, clip)) for clip in wanted]
         size = self.width // 2 * 2, self.height // 2 * 2  # of pixels in H.264
         look = filming.Look(filming.engine_here(self.engine), size, self.fps, self.samples, not self.pictures)
+        if self.engine == "CYCLES" != look.engine:
+            self.report({"WARNING"}, "The Cycles add-on is off: EEVEE renders instead")
         out.mkdir(exist_ok=True)
         windows = context.window_manager
         windows.progress_begin(0, max(len(sources), 1))

@@ -1,8 +1,8 @@
 """One player after the other: the verbs that make takes share a queue, a thread and one modal operator.
 
 Called from a script everything is made at once. Pressed as a button, players queue: the first verb that is pressed
-works the queue off, those pressed meanwhile only add to it. Each player's result is written as it arrives, with an undo step of
-its own, and only where the player still asks for what it was made of.
+works the queue off, those pressed meanwhile only add to it. Each player's result is written as it arrives, with an undo
+step of its own, and only where the player still asks for what it was made of.
 """
 
 from __future__ import annotations

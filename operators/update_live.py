@@ -18,7 +18,8 @@ class BEYOND_MOCAP_OT_update_live(TurnsVerb, bpy.types.Operator):
 
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
     kind: bpy.props.EnumProperty(
-        name="Kind", items=(("quick", "Quick", "By a narrow search"), ("whole", "Whole", "As well as can be, with figures")),
+        name="Kind", items=(("quick", "Quick", "By a narrow search"),
+                            ("whole", "Whole", "As well as can be, with figures")),
         description="How it is made",
     )
 

@@ -6,7 +6,8 @@ The panels are registered in the order of CLASSES, which is the order on the scr
 import bpy
 
 from . import (
-    annotate, ball, library, markers, match, menus, path, players, preferences, presets, quality, result, rig, synthesis,
+    annotate, ball, library, markers, match, menus, path, players, preferences, presets, quality, result, rig,
+    synthesis,
     throws, timeline, video, view,
 )
 

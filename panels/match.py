@@ -62,8 +62,11 @@ class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
 def more_files(layout, match) -> None:
     """What the tracking file's name does not lead to."""
     column = split(layout)
-    for name in ("metadata_file", "events_file", "provider"):
+    for name in ("metadata_file", "provider", "events_file"):
         column.prop(match, name)
+    if match.events_file:
+        for name in ("events_metadata_file", "events_provider"):
+            column.prop(match, name)
 
 
 def people(layout, match) -> None:

@@ -124,7 +124,9 @@ def _grid(draw, view: View, step: float = 0.5) -> None:
         draw.rectangle([0, 0, view.size, horizon], fill=SKY)
 
 
-def sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220, wide=2.2):
+def sheet(
+    motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220, wide=2.2
+):
     """Writes the contact sheet of `frames` (N,) to `out`. side: degrees from +x at which the camera stands; ball:
     (N, 3) m or None; labels: N texts or None; wide: metres across a tile of the following camera."""
     from PIL import Image, ImageDraw
@@ -164,7 +166,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("take", help="BVH that synthesize wrote")
     parser.add_argument("--out", required=True, help="PNG to write")
     parser.add_argument("--ball", help="its ball CSV")
-    parser.add_argument("--provenance", help="its provenance CSV: marks standing feet (L, R) and seams (|) on the labels")
+    parser.add_argument(
+        "--provenance", help="its provenance CSV: marks standing feet (L, R) and seams (|) on the labels"
+    )
     parser.add_argument("--camera", choices=("follow", "fixed", "strobe"), default="follow")
     parser.add_argument("--side", type=float, default=-90.0, help="degrees from +x at which the camera stands")
     parser.add_argument("--from", dest="start", type=float, default=0.0, help="seconds from the take's first frame")
@@ -187,7 +191,9 @@ def run(options) -> None:
     motion = bvh.read(options.take, unit=0.01).motion
     last = len(motion) - 1 if options.end is None else min(options.end * motion.fps, len(motion) - 1)
     step = max(options.every * motion.fps, 1.0)
-    frames = np.unique(np.rint(np.arange(options.start * motion.fps, last + 0.5, step)).astype(int).clip(0, len(motion) - 1))
+    frames = np.unique(
+        np.rint(np.arange(options.start * motion.fps, last + 0.5, step)).astype(int).clip(0, len(motion) - 1)
+    )
     if not len(frames):
         raise InputError("--from", f"{options.start:g} s", f"before the take's end, {motion.duration:g} s")
     ball = read_ball(options.ball).positions if options.ball else None

@@ -166,7 +166,8 @@ def words_of(clip: Clip) -> Timeline:
 
 
 def _by_speed(motion: Motion) -> list[Span]:
-    """Stretches of one gait each by the speed of the root smoothed over a second; short ones go with what was before."""
+    """Stretches of one gait each by the speed of the root smoothed over a second; short ones go with what was
+    before."""
     width = int(motion.fps)
     window = np.hanning(width + 2)[1:-1]
     padded = np.pad(

@@ -44,7 +44,9 @@ def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
     linked.refuse(body)
     channels.check_free(body)
     if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
-        raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not", "press Keep or Leave first")
+        raise InputError(
+            f"armature {body.name}", "its motion rides a path", "an armature that does not", "press Keep or Leave first"
+        )
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:
         raise InputError(f"armature {body.name}", f"no bone {', '.join(missing[:3])}", "a bone for every joint")

@@ -89,7 +89,9 @@ def _done(context: bpy.types.Context, command: Command) -> Done:
     if isinstance(command, AtPlayhead):
         return _at_playhead(context, command.what)
     if isinstance(command, Go):
-        return Done(_next_player(context, command.step) if command.to == "player" else _next_moment(context, command.step))
+        return Done(
+            _next_player(context, command.step) if command.to == "player" else _next_moment(context, command.step)
+        )
     return Done(command.line if isinstance(command, Tell) else "")
 
 
@@ -147,7 +149,8 @@ def _at_playhead(context: bpy.types.Context, what: str) -> Done:
 
 
 def _found(context, target, clock: Clock) -> PlacedMoment | PlacedSpan | None:
-    """The key moment nearest to the playhead within a frame or AT_PLAYHEAD, else the stretch that is asked for there."""
+    """The key moment nearest to the playhead within a frame or AT_PLAYHEAD, else the stretch that is asked for
+    there."""
     time = clock.seconds(context.scene.frame_current_final)
     reach = max(AT_PLAYHEAD, 1.0 / clock.fps) + 1e-6
     near = [moment for moment in _asked_moments(target) if abs(moment.time - time) <= reach]

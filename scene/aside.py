@@ -9,8 +9,8 @@ import bpy
 
 @contextmanager
 def scene_aside(name: str):
-    """A new scene, in the window where there is one, else in the context; all data that comes in meanwhile is removed at
-    the end, and the scene and view layer from before are shown again."""
+    """A new scene, in the window where there is one, else in the context; all data that comes in meanwhile is removed
+    at the end, and the scene and view layer from before are shown again."""
     before, window = set(_all_data()), bpy.context.window
     home, layer = (window.scene, window.view_layer.name) if window is not None else (None, "")
     scene = bpy.data.scenes.new(name)

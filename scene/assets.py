@@ -1,7 +1,7 @@
 """Motions as assets: actions with a catalog, tags, a description and a picture of their key pose.
 
-Works without a window: pictures are drawn by the core. Catalogs stand in Blender's own text beside the file; each has an
-identity that follows from its name, so that the same catalog is the same everywhere.
+Works without a window: pictures are drawn by the core. Catalogs stand in Blender's own text beside the file; each has
+an identity that follows from its name, so that the same catalog is the same everywhere.
 """
 
 from __future__ import annotations
@@ -76,9 +76,11 @@ def catalog_id(catalog: str) -> str:
     return str(uuid.uuid5(_SPACE, catalog))
 
 
-def make(context: bpy.types.Context, drafts: list[Draft], pictures: list, apart: bool = False) -> list[bpy.types.Action]:
-    """The drafts as assets: their own actions marked, or new ones made; returns the actions. apart: own actions are left
-    as they are, and copies of them marked."""
+def make(
+    context: bpy.types.Context, drafts: list[Draft], pictures: list, apart: bool = False
+) -> list[bpy.types.Action]:
+    """The drafts as assets: their own actions marked, or new ones made; returns the actions. apart: own actions are
+    left as they are, and copies of them marked."""
     made, rigs = [], []
     try:
         for one, pixels in zip(drafts, pictures):
@@ -120,7 +122,9 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
     """Add catalogs to the definitions that hold for files in `folder`: the nearest above it, else its own, written
     beside and renamed; returns that file. InputError where it cannot be written."""
     folder = Path(folder)
-    target = next((place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()), folder / CATALOGS)
+    target = next(
+        (place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()), folder / CATALOGS
+    )
     try:
         text = target.read_text("utf-8") if target.is_file() else _HEAD
     except (OSError, UnicodeDecodeError) as error:

@@ -220,7 +220,7 @@ def load(path: Path) -> dict[str, str]:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (.json)", "check the path") from None
-    except (ValueError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(path, f"not JSON ({error})", form, "mend the file") from None
     table = found.get("bones") if isinstance(found, dict) else None
     if not isinstance(table, dict) or not all(isinstance(bone, str) for bone in table.values()):

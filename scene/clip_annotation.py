@@ -1,7 +1,7 @@
 """Words of a library's clip as NLA strips on the armature that shows it: opened, proposed, read back.
 
-The strips are a player's own (`lanes`, `lay_strips`); their clock stands at 0 seconds on the frame on which the armature
-plays the recording's first.
+The strips are a player's own (`lanes`, `lay_strips`); their clock stands at 0 seconds on the frame on which the
+armature plays the recording's first.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def said_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipAnnotati
 
 
 def remove(rig: bpy.types.Object) -> None:
-    """Take the armature, its body and its actions out of the file, where nobody else uses them. What the user hung on it
-    stays where it is, and an action that was made an asset stays too."""
+    """Take the armature, its body and its actions out of the file, where nobody else uses them. What the user hung on
+    it stays where it is, and an action that was made an asset stays too."""
     things = [rig, *(child for child in rig.children if _moved_by(child, rig))]
     for child in rig.children:
         if child not in things:

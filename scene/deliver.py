@@ -1,4 +1,5 @@
-"""A take, or a whole match, as a file of Blender's or of its exporters (.blend, .fbx, .glb, .usdc), for the command line.
+"""A take, or a whole match, as a file of Blender's or of its exporters (.blend, .fbx, .glb, .usdc), for the command
+line.
 
 It is put into an empty file of its own, at its own rate: a take with its armature, body and ball, a match as it is
 shown in the scene; nothing that is open is asked for, since a command has nothing open that it could lose.

@@ -1,7 +1,8 @@
 """Tracks that are drawn or animated in Blender: a curve with a speed at each point, or any object that moves.
 
-The speed of a control point, in metres per second, is its Radius (Item tab, Alt-S), and the seconds that are waited at a
-point of speed 0 its Weight: both are kept with the point when the curve is subdivided or cut, and saved by Blender itself.
+The speed of a control point, in metres per second, is its Radius (Item tab, Alt-S), and the seconds that are waited at
+a point of speed 0 its Weight: both are kept with the point when the curve is subdivided or cut, and saved by Blender
+itself.
 """
 
 from __future__ import annotations
@@ -59,7 +60,8 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
 
 
 def line_of(scene: bpy.types.Scene, drawn: bpy.types.Object) -> Line:
-    """The first spline of a curve object, as it is drawn now, also in edit mode; InputError where it is no open line."""
+    """The first spline of a curve object, as it is drawn now, also in edit mode; InputError where it is no open
+    line."""
     spline = next((spline for spline in drawn.data.splines if len(points_of(spline)) > 1), None)
     if spline is None:
         raise InputError(f"curve {drawn.name}", "no line", "two points or more", "add points in edit mode")
@@ -146,7 +148,9 @@ def _animated(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> 
 def _stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
     """What is another where an object's own keys or the frames in which it moves have changed."""
     action, slot = channels.playing(moving)
-    keys = [channels.keys_of(curve)["co"].tobytes() for curve in channels.curves(action, slot).values()] if action else []
+    keys = (
+        [channels.keys_of(curve)["co"].tobytes() for curve in channels.curves(action, slot).values()] if action else []
+    )
     return *_range(scene, moving), hash(tuple(keys))
 
 

@@ -1,4 +1,5 @@
-"""Motions as files of Blender's own exporters: what the rig shows becomes one action on a plain copy, and that is written.
+"""Motions as files of Blender's own exporters: what the rig shows becomes one action on a plain copy, and that is
+written.
 
 The copy stands in a scene of its own and is taken away afterwards; the user's scene stays as it is. On the copy there
 are no constraints, drivers or NLA strips left that an exporter could read otherwise than Blender shows them.
@@ -46,7 +47,8 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What Blender shows of an armature: bones' poses (F, B, 4, 4) in its space, the object's (F, 4, 4) in the world."""
+    """What Blender shows of an armature: bones' poses (F, B, 4, 4) in its space, the object's (F, 4, 4) in the
+    world."""
 
     bones: list[str]
     poses: np.ndarray
@@ -248,8 +250,8 @@ def _axis(vector: np.ndarray) -> np.ndarray:
 
 
 def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
-    """Only the kept bones stay in the copy, each below the nearest kept one, turned and scaled with it in the plain way;
-    with `hips` a root bone is added above all. Returns bone -> parent."""
+    """Only the kept bones stay in the copy, each below the nearest kept one, turned and scaled with it in the plain
+    way; with `hips` a root bone is added above all. Returns bone -> parent."""
     parents = {name: _above(rig, name, kept) for name in kept}
     layer = stage.view_layers[0]
     layer.update()
@@ -405,7 +407,8 @@ def _save(stage, copies, wanted: Wanted) -> None:
 
 
 def with_ending(path: Path, ending: str) -> Path:
-    """A path with this ending: in place of another form's, else behind what stands there ("walk.v2" keeps its ".v2")."""
+    """A path with this ending: in place of another form's, else behind what stands there ("walk.v2" keeps its
+    ".v2")."""
     if path.suffix.lower() in {ending, *SUFFIXES.values()}:
         return path.with_suffix(ending)
     return path.with_name(path.name + ending)
@@ -437,7 +440,8 @@ def _fbx(path: str, engine: str, selected: bool) -> None:
     forward, up = _FBX_AXES[engine]
     bpy.ops.export_scene.fbx(
         filepath=path, check_existing=False, use_selection=selected, object_types={"ARMATURE", "MESH", "EMPTY"},
-        axis_forward=forward, axis_up=up, apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY" else "FBX_SCALE_NONE",
+        axis_forward=forward, axis_up=up, apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY"
+        else "FBX_SCALE_NONE",
         add_leaf_bones=False, bake_anim=True, bake_anim_use_all_bones=True, bake_anim_use_nla_strips=False,
         bake_anim_use_all_actions=False, bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0,
     )

@@ -1,8 +1,8 @@
 """Live: sees that what a player is made of has been edited, waits until the hand has come to rest, and has him updated.
 
 Blender says after every change what has changed; that the change matters is found by comparing what is asked now with
-what the newest take was made of, so that neither the preview itself nor a walk along the timeline starts anything. First
-a quick take is made, and when nothing has changed for a while a whole one in its place.
+what the newest take was made of, so that neither the preview itself nor a walk along the timeline starts anything.
+First a quick take is made, and when nothing has changed for a while a whole one in its place.
 """
 
 from __future__ import annotations

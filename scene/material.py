@@ -1,4 +1,4 @@
-"""Plain colours: one material per name, made once."""
+"""Plain colours as materials."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ import bpy
 def colour(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
     """The material `name`, made with this colour (linear RGB) where the file has none of that name of its own yet."""
     found = bpy.data.materials.get((name, None))  # a linked one cannot be changed
-    if found is not None:
-        return found
+    return found if found is not None else made(name, rgb, roughness)
+
+
+def made(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
+    """A new material of this colour (linear RGB), `name` or with a number behind it where that is taken."""
     material = bpy.data.materials.new(name)
     material["beyond_mocap_take"] = True  # ours: may go when nothing wears it any more
     if material.node_tree is None:  # Blender before 5.0 makes it on request

@@ -25,8 +25,8 @@ LIKE = 0.05  # seconds: ends of stretches nearer than that are the same
 @dataclass(frozen=True)
 class How:
     """What is wanted. kind: "whole" a new take; "update" what has changed since the last; "quick" the same, by a narrow
-    search where it has to be made as a whole, and without figures; "stretch" another solution from second start to end; "variants" as many
-    takes as `count` says, each another solution."""
+    search where it has to be made as a whole, and without figures; "stretch" another solution from second start to end;
+    "variants" as many takes as `count` says, each another solution."""
 
     kind: str = "whole"
     start: float = 0.0
@@ -146,13 +146,15 @@ def _single(order: Order, clips, progress, cancelled, hurry) -> One:
 
 
 def _same_span(plan: Plan, before: Take | None) -> bool:
-    """Whether an edit of the take may be made in part: a drawn track that has become longer has to be made as a whole."""
+    """Whether an edit of the take may be made in part: a drawn track that has become longer has to be made as a
+    whole."""
     old = before.plan.track if before is not None and before.plan is not None else None
     return old is not None and np.array_equal(plan.track.times[[0, -1]], old.times[[0, -1]])
 
 
 class _AfterFirst:
-    """Says "hurry" from the third question on: a search that is hurried from its second slot on has one to begin with."""
+    """Says "hurry" from the third question on: a search that is hurried from its second slot on has one to begin
+    with."""
 
     def __init__(self, hurry):
         self.asked, self.hurry = 0, hurry

@@ -1,8 +1,8 @@
 """Four cameras on riders and their paths: from above, from the side, from three quarters, and following behind a body.
 
 They are ordinary cameras in a collection of their own. Each remembers how it was laid; laid again are only those that
-nobody has moved, animated or changed since. The fourth hangs on an empty that runs along with the body, so that it can be
-moved to another place from which it follows.
+nobody has moved, animated or changed since. The fourth hangs on an empty that runs along with the body, so that it can
+be moved to another place from which it follows.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def route(scene: bpy.types.Scene, first: bpy.types.Object | None = None) -> Rout
         rides.renew(scene, body)
         known[body] = rides.shown(body)
     if not known:
-        raise InputError("path cameras", "nobody rides a path", "an armature that does", "select one and press Edit Path")
+        raise InputError(
+            "path cameras", "nobody rides a path", "an armature that does", "select one and press Edit Path"
+        )
     places = np.concatenate([part for shown in known.values() for part in (shown.line, shown.ridden.origin)])
     shown = known.get(first) or next(iter(known.values()))
     frames = shown.first + np.arange(len(shown.ridden.origin), dtype=float)
@@ -63,8 +65,8 @@ def route(scene: bpy.types.Scene, first: bpy.types.Object | None = None) -> Rout
 
 
 def set_up(scene: bpy.types.Scene, route: Route) -> list[str]:
-    """Lay all cameras that are missing or as they were laid last; the names of those that are kept as somebody has moved
-    them."""
+    """Lay all cameras that are missing or as they were laid last; the names of those that are kept as somebody has
+    moved them."""
     collection, kept = _collection(scene), []
     corners = _corners(route.places)
     for kind in KINDS:
@@ -77,14 +79,17 @@ def set_up(scene: bpy.types.Scene, route: Route) -> list[str]:
             _hang(scene, collection, camera)
         else:
             _frame(scene, camera, kind, corners, _side(route.places))
-        camera.data.clip_end = max(camera.data.clip_end, 4.0 * float(np.ptp(corners, axis=0).max()) * units_per_metre(scene))
+        camera.data.clip_end = max(
+            camera.data.clip_end, 4.0 * float(np.ptp(corners, axis=0).max()) * units_per_metre(scene)
+        )
         camera[LAID] = _laid(camera)
     follow(scene, route)
     return kept
 
 
 def follow(scene: bpy.types.Scene, route: Route) -> None:
-    """Let the focus of the last camera run along with the body; nothing happens where it is gone or has keys of others."""
+    """Let the focus of the last camera run along with the body; nothing happens where it is gone or has keys of
+    others."""
     focus = _marked(scene, FOCUS)
     if focus is None:
         return
@@ -93,7 +98,8 @@ def follow(scene: bpy.types.Scene, route: Route) -> None:
         return
     place, turn = followed(route, frames_per_second(scene))
     rotation = np.column_stack([np.zeros((len(turn), 2)), turn])
-    curves = {"location": ("Object Transforms", place * units_per_metre(scene)), "rotation_euler": ("Object Transforms", rotation)}
+    curves = {"location": ("Object Transforms", place * units_per_metre(scene)),
+              "rotation_euler": ("Object Transforms", rotation)}
     channels.discard(focus, MARK)
     channels.animate(focus, FOCUS, route.frames, curves)[MARK] = True
 
@@ -199,8 +205,9 @@ def _frame(scene: bpy.types.Scene, camera: bpy.types.Object, kind: str, corners:
 def fitted(corners: np.ndarray, axes: np.ndarray, half: np.ndarray) -> np.ndarray:
     """The nearest place (3,) from which a camera sees all corners (N, 3), the nearest ones being at its frame's edge.
 
-    axes: (3, 3) the camera's own, in columns: right, up, back. half: (2,) half its frame's width and height at 1 m. With
-    f the depth of a corner, it is inside where |x - X| <= (f - F) half, four half-spaces whose tips are the solution.
+    axes: (3, 3) the camera's own, in columns: right, up, back. half: (2,) half its frame's width and height at 1 m.
+    With f the depth of a corner, it is inside where |x - X| <= (f - F) half, four half-spaces whose tips are the
+    solution.
     """
     seen = corners @ axes * [1.0, 1.0, -1.0]
     right, left = (np.max(sign * seen[:, :2] - seen[:, 2:] * half, axis=0) for sign in (1.0, -1.0))

@@ -1,4 +1,5 @@
-"""What waits to be made: one entry a player, first come, first served; beside the file, so that undo leaves it alone."""
+"""What waits to be made: one entry a player, first come, first served; beside the file, so that undo leaves it
+alone."""
 
 from __future__ import annotations
 
@@ -11,9 +12,9 @@ _busy = [False]  # whether somebody works it off
 
 @dataclass(eq=False)
 class Entry:
-    """A player's turn. scene: the scene's session_uid. how: what is to be made, in the words of whoever makes it. order:
-    all that the work needs. fingerprint: of what the player asked for when the order was written; a result of another
-    one is not written. tries: how often it has been ordered."""
+    """A player's turn. scene: the scene's session_uid. how: what is to be made, in the words of whoever makes it.
+    order: all that the work needs. fingerprint: of what the player asked for when the order was written; a result of
+    another one is not written. tries: how often it has been ordered."""
 
     scene: int
     player: str

@@ -24,9 +24,9 @@ def folder_of(settings) -> Path:
 
 
 def file_of(settings, path: str, folder: str = "") -> tuple[Path, float | None]:
-    """The BVH file to read for a clip, and the metres per unit to read it with (None: guessed). path: below the library's
-    folder; folder: as a setting spells it, the scene's own where empty. InputError where it is missing, or waits to be
-    converted."""
+    """The BVH file to read for a clip, and the metres per unit to read it with (None: guessed). path: below the
+    library's folder; folder: as a setting spells it, the scene's own where empty. InputError where it is missing, or
+    waits to be converted."""
     from ..beyond_mocap.library import cache
     from ..beyond_mocap.library.converted import Conversions, is_foreign
 

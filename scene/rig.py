@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty,
+)
 
 from ..beyond_mocap.errors import BeyondMocapError
 
@@ -44,7 +46,9 @@ WHO = (
 class BeyondMocapRigBone(bpy.types.PropertyGroup):
     """A line of the bone map; its name is the part of the body."""
 
-    bone: StringProperty(name="Bone", description="The bone, or control, that moves this part; empty where there is none")
+    bone: StringProperty(
+        name="Bone", description="The bone, or control, that moves this part; empty where there is none"
+    )
 
 
 def is_armature(_settings, candidate: bpy.types.Object) -> bool:
@@ -109,7 +113,9 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
     root: EnumProperty(name="Root Motion", items=ROOTS, default="KEEP", description="What the root bone carries")
     steps: EnumProperty(name="Steps", items=STEPS, default="AUTO", description="What legs of another length do")
     ik: EnumProperty(name="IK", items=IK, default="MUTE", description="What becomes of inverse kinematics on the rig")
-    plants: BoolProperty(name="Plant Feet", default=True, description="Hold standing feet on the ground with the rig's own legs")
+    plants: BoolProperty(
+        name="Plant Feet", default=True, description="Hold standing feet on the ground with the rig's own legs"
+    )
     reduces: BoolProperty(name="Fewer Keys", default=False, description="Leave out keys that the curves do not need")
     tolerance: FloatProperty(
         name="Off by", default=0.002, min=0.0001, max=0.1, precision=4, unit="LENGTH", subtype="DISTANCE",

@@ -43,8 +43,8 @@ IK_FOLLOWERS = (
 @dataclass(frozen=True)
 class Wishes:
     """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are
-    alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again. exact: the motion is
-    on the driven skeleton already and is played as it is."""
+    alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again. exact: the motion
+    is on the driven skeleton already and is played as it is."""
 
     root: str = "KEEP"
     keeps_travel: bool | None = None
@@ -301,11 +301,14 @@ class _Fit:
         self.told = self._lines(driven, planted.miss if wishes.plants else None, points, keeps)
 
     def _lines(self, driven: Driven, miss: np.ndarray | None, points: np.ndarray, keeps: bool) -> list[str]:
-        lines = [f"legs {self.scale:.2f} of the source's; {'footprints kept' if keeps else 'steps scaled with the legs'}"]
+        lines = [
+            f"legs {self.scale:.2f} of the source's; {'footprints kept' if keeps else 'steps scaled with the legs'}"
+        ]
         before, bare, after = self.slides
         lines.append(
             f"standing feet slide {after.cm_s:.1f} cm/s, worst stance {after.worst_mm:.0f} mm "
-            f"(source {before.cm_s:.1f} and {before.worst_mm:.0f}; before planting {bare.cm_s:.1f} and {bare.worst_mm:.0f})"
+            f"(source {before.cm_s:.1f} and {before.worst_mm:.0f}; before planting {bare.cm_s:.1f} and "
+            f"{bare.worst_mm:.0f})"
         )
         lines.append(f"floor: the front of the foot stands {100 * driven.sole:.1f} cm high, as in the rig's rest pose")
         short = np.where(points.any(axis=2), miss, 0.0) if miss is not None else np.zeros((1, 2))
@@ -368,7 +371,8 @@ def _raised(motion: Motion, by: float) -> Motion:
 
 
 def _wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
-    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that the driven bones are to have, and lines told."""
+    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that the driven bones are to have, and lines
+    told."""
     heads, world = forward_kinematics(motion)
     hips = heads[:, driven.parts.index("hips")]
     told = []
@@ -378,7 +382,9 @@ def _wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
         back = quaternion.multiply(root_turn[:1], quaternion.inverse(root_turn))
         world = quaternion.multiply(back[:, None], world)
         hips = quaternion.rotate(back, hips - root_place) + root_place[:1]
-        root_turn, root_place = np.repeat(root_turn[:1], len(hips), axis=0), np.repeat(root_place[:1], len(hips), axis=0)
+        root_turn, root_place = np.repeat(root_turn[:1], len(hips), axis=0), np.repeat(
+            root_place[:1], len(hips), axis=0
+        )
     if root in ("SMOOTH", "STRAIGHT") and "root" not in driven.table:
         told.append("no root bone: the hips carry all of the motion; Export Motion can add one to a copy")
     lie_turn, lie_origin = placements(driven.rig, driven.scene, frames)

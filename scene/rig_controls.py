@@ -1,9 +1,9 @@
 """What a rig's controls do, found out by moving them: then a pose asked for in the world becomes values of channels.
 
 Between a control and the bones that carry it a rig may put anything: helper bones, constraints, drivers. Instead of
-following these, all driven bones are turned by chance a few times, and for each one the driven bone is sought on which it
-rides: with B the frame that a bone has while its own channels are at rest and M_d the pose of bone d, M_d^-1 B is the
-same in all trials for the one that carries it. Turning, place and the axes of the location channels may ride on
+following these, all driven bones are turned by chance a few times, and for each one the driven bone is sought on which
+it rides: with B the frame that a bone has while its own channels are at rest and M_d the pose of bone d, M_d^-1 B is
+the same in all trials for the one that carries it. Turning, place and the axes of the location channels may ride on
 different bones. From there on a pose of all frames is plain arithmetic, without asking Blender for each frame.
 """
 

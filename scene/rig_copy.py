@@ -7,8 +7,8 @@ import bpy
 
 def copied(rig: bpy.types.Object, name: str) -> bpy.types.Object:
     """A copy of an armature object and of its children, which share their data with the original; beside it in its
-    collections, or in the scene's own where these are another file's. What pointed to the original within them points to
-    the copy; the copy plays nothing."""
+    collections, or in the scene's own where these are another file's. What pointed to the original within them points
+    to the copy; the copy plays nothing."""
     family = [rig, *rig.children_recursive]
     twins = {one: one.copy() for one in family}
     for one, twin in twins.items():

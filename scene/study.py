@@ -59,9 +59,11 @@ def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> 
 
 def engine_here(wanted: str) -> str:
     """Blender's name of an engine in this version: EEVEE has had two. AUTO is Cycles where there is no window, for
-    EEVEE is very slow where there is no graphics card."""
+    EEVEE is very slow where there is no graphics card. Where the Cycles add-on is off, EEVEE takes its place."""
     if wanted == "AUTO":
         wanted = "CYCLES" if bpy.app.background else "EEVEE"
+    if wanted == "CYCLES" and not hasattr(bpy.types.Scene, "cycles"):
+        wanted = "EEVEE"
     names = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
     if wanted == "EEVEE":
         return "BLENDER_EEVEE" if "BLENDER_EEVEE" in names else "BLENDER_EEVEE_NEXT"

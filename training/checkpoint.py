@@ -23,8 +23,8 @@ NEXT_STEP = "give the same command again, or leave --resume out to begin anew"
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """How far a training is. state: parameters and optimizer's state, a tree of arrays. epoch: epochs done. seconds: time
-    spent. losses: (E,) mean loss of each epoch. fits: what it was trained on and how, as one text to compare."""
+    """How far a training is. state: parameters and optimizer's state, a tree of arrays. epoch: epochs done. seconds:
+    time spent. losses: (E,) mean loss of each epoch. fits: what it was trained on and how, as one text to compare."""
 
     state: object
     epoch: int

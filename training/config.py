@@ -87,7 +87,9 @@ def read_config(path: str | os.PathLike | None, **changes) -> TrainingConfig:
     an unknown name, a value out of its range.
     """
     told = {} if path is None else _object(Path(path))
-    return config_of({**told, **{name: value for name, value in changes.items() if value is not None}}, path or "config")
+    return config_of(
+        {**told, **{name: value for name, value in changes.items() if value is not None}}, path or "config"
+    )
 
 
 def config_of(told: dict, where: object = "config") -> TrainingConfig:

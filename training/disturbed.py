@@ -1,5 +1,5 @@
-"""Poses a little beside the truth. In use a network is given what networks said before, never quite the truth; from poses
-beside it that lead back to it, networks learn to come back (Holden, Komura and Saito 2017 do so with dropout)."""
+"""Poses a little beside the truth. In use a network is given what networks said before, never quite the truth; from
+poses beside it that lead back to it, networks learn to come back (Holden, Komura and Saito 2017 do so with dropout)."""
 
 from __future__ import annotations
 
@@ -41,4 +41,6 @@ def small_turns(vectors, xp=np):
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     zero = xp.zeros_like(x)
     skew = xp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*vectors.shape[:-1], 3, 3)
-    return np.eye(3, dtype=vectors.dtype) + xp.sin(angle) / angle * skew + (1 - xp.cos(angle)) / angle**2 * (skew @ skew)
+    return (
+        np.eye(3, dtype=vectors.dtype) + xp.sin(angle) / angle * skew + (1 - xp.cos(angle)) / angle**2 * (skew @ skew)
+    )

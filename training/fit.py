@@ -29,8 +29,8 @@ CLIP = 1.0
 
 
 class Problem(Protocol):
-    """What is trained. lengths: frames of each example. fits: settings and recordings as one text. data: a tree of arrays
-    that the loss is given."""
+    """What is trained. lengths: frames of each example. fits: settings and recordings as one text. data: a tree of
+    arrays that the loss is given."""
 
     lengths: Sequence[int]
     fits: str
@@ -48,8 +48,8 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Trained:
-    """params: as the problem has them. epochs: done. seconds: spent. losses: of each epoch. parts: of the last epoch, by
-    name."""
+    """params: as the problem has them. epochs: done. seconds: spent. losses: of each epoch. parts: of the last epoch,
+    by name."""
 
     params: dict
     epochs: int
@@ -104,8 +104,8 @@ def fit(
 
 
 def rate_at(share: float, config: TrainingConfig) -> float:
-    """Adam's rate when `share` of the training is done: along half a cosine from learning_rate to final_rate of it, after
-    a short rise."""
+    """Adam's rate when `share` of the training is done: along half a cosine from learning_rate to final_rate of it,
+    after a short rise."""
     falling = config.final_rate + (1.0 - config.final_rate) * 0.5 * (1.0 + np.cos(np.pi * share))
     return config.learning_rate * falling * min(1.0, 0.1 + share / 0.01)
 
@@ -117,7 +117,8 @@ def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | 
 
 
 def _clipped() -> optax.GradientTransformation:
-    """Gradients no longer than CLIP, each network's by itself, so that networks trained alone do not know each other."""
+    """Gradients no longer than CLIP, each network's by itself, so that networks trained alone do not know each
+    other."""
 
     def update(updates, state, params=None):
         clip = optax.clip_by_global_norm(CLIP).update

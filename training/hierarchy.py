@@ -45,12 +45,13 @@ class Networks:
         self, recorded: Recordings, chains: Chains, config: TrainingConfig, leg_reach: dict, limits: JointLimits,
         held: np.ndarray | None = None,
     ):
-        """leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3. limits: which say the way in which elbows
-        and knees bend. held: (N,) examples that `linear` can leave out. InputError where networks that are trained alone
-        are asked to feed frames back."""
+        """leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3. limits: which say the way in which
+        elbows and knees bend. held: (N,) examples that `linear` can leave out. InputError where networks that are
+        trained alone are asked to feed frames back."""
         if config.rollout > 1 and not config.settings.conditioned and config.settings.kind == "hierarchy":
             raise InputError("training: rollout", f"{config.rollout} frames without conditioned",
-                             "conditioned true, or rollout 1", "networks trained alone have no frame to feed back")  # fmt: skip
+                             "conditioned true, or rollout 1",
+                             "networks trained alone have no frame to feed back")  # fmt: skip
         self.config, self.settings, self.chains, self.leg_reach = config, config.settings, chains, leg_reach
         self.axes = hinge_axes(chains, limits).astype(np.float32)
         self.lengths = recorded.lengths
@@ -83,8 +84,8 @@ class Networks:
         return told._replace(pose=disturbed(self.chains, told.pose, *(one.astype(np.float32) for one in off)))
 
     def _sums_of(self, name: str, parts: list, theta, held) -> list[Sums]:
-        """What regression needs of inputs and answers (F, in), (F, out): of rows that are not held out, and of those that
-        are."""
+        """What regression needs of inputs and answers (F, in), (F, out): of rows that are not held out, and of those
+        that are."""
         scales, guided = self.scales[name], guides(name, self.chains, self.settings)
         found = []
         for rows in (~held, held):

@@ -16,7 +16,8 @@ from .arrays import ARRAYS
 
 
 def joint_error(y, wanted, scale):
-    """The first term of eq. 7.4: mean square of what answers y (B, out) miss, each value in its own deviations (out,)."""
+    """The first term of eq. 7.4: mean square of what answers y (B, out) miss, each value in its own deviations
+    (out,)."""
     return jnp.mean(((y - wanted) / scale) ** 2)
 
 
@@ -34,8 +35,8 @@ def effector_error(
 
 
 def missed_ends(name: str, chains: Chains, settings: ModelSettings, y, wanted):
-    """Mean square distance, m^2, of the ends that answers y (B, out) lead to from those of the truth, in the chain's own
-    reference frame."""
+    """Mean square distance, m^2, of the ends that answers y (B, out) lead to from those of the truth, in the chain's
+    own reference frame."""
     reached, told = (ends(name, chains, settings, one, ARRAYS) for one in (y, wanted))
     return _mean_square(reached - told)
 

@@ -117,7 +117,8 @@ def _columns(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
 
 
 def scales_of(values: np.ndarray, smallest: float = SMALLEST_SCALE) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and standard deviation of each column, float32, the latter at least `smallest` (its share of the largest)."""
+    """Mean and standard deviation of each column, float32, the latter at least `smallest` (its share of the
+    largest)."""
     mean, scale = values.mean(0), values.std(0)
     return mean.astype(np.float32), np.maximum(scale, smallest).astype(np.float32)
 

@@ -22,8 +22,8 @@ _ALIKE = 1.05  # so much more than the least still counts as the least: of those
 
 
 def held_out(examples: Sequence[Example]) -> np.ndarray:
-    """Which examples (N,) are left out while the ridge is chosen: all of the last subject, or a fourth of one subject's;
-    none of three examples or fewer. An example's mirror image goes with it."""
+    """Which examples (N,) are left out while the ridge is chosen: all of the last subject, or a fourth of one
+    subject's; none of three examples or fewer. An example's mirror image goes with it."""
     subjects = list(dict.fromkeys(example.subject for example in examples))
     if len(subjects) > 1:
         return np.array([example.subject == subjects[-1] for example in examples])
@@ -56,7 +56,8 @@ def least_astray(
 
 
 def _off(model: ThrowModel, example: Example) -> float:
-    """Metres by which what the networks say misses, mean over frames, hands and feet; a body that is lost is far off."""
+    """Metres by which what the networks say misses, mean over frames, hands and feet; a body that is lost is far
+    off."""
     try:
         with np.errstate(all="ignore"):
             made = generate(model, describe(example), options=_RAW)

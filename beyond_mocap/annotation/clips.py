@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ..errors import InputError
@@ -46,11 +47,14 @@ def clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ..
     return tuple(sorted(out, key=lambda a: (a.start, a.end, -1 if a.key is None else a.key)))
 
 
-def read_annotation_csv(path: str | os.PathLike) -> dict[str, tuple[ClipAnnotation, ...]]:
+def read_annotation_csv(
+    path: str | os.PathLike, but: Callable[[Mapping], bool] | None = None
+) -> dict[str, tuple[ClipAnnotation, ...]]:
     """file (as the column spells it) -> its annotations in the table's order.
 
     Columns file, start_frame, end_frame, key_frame, labels; others are ignored. A blank key_frame means none; rows
-    without labels are left out. InputError names the line of a row that is not of this form.
+    without labels are left out, and those (column -> text) of which `but` is true. InputError names the line of a row
+    that is not of this form.
     """
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     found: dict[str, list[ClipAnnotation]] = {}
@@ -59,7 +63,7 @@ def read_annotation_csv(path: str | os.PathLike) -> dict[str, tuple[ClipAnnotati
         for row in reader:
             place = f"{path}:{reader.line_num}"
             words = tuple(dict.fromkeys((row["labels"] or "").lower().split()))
-            if words:
+            if words and not (but and but(row)):
                 found.setdefault(_file(row, place), []).append(_from_row(row, words, place))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, told_time
 from .timeline import LONGEST_TIME, MUST_NOT, NUMBER, KeyMoment, Span, Timeline, spelled
 
 _FORM = "'START END words...' or 'TIME words...'"
@@ -104,7 +104,7 @@ def _seconds(token: str, unit: str, fps: float | None, start: float, place: str)
 
 def _span(times: list[float], words: list[str], number: int, place: str) -> Span:
     if times[1] <= times[0]:
-        found = f"the end {times[1]:g} is not after the start {times[0]:g}"
+        found = f"the end {told_time(times[1])} is not after the start {told_time(times[0])}"
         raise InputError(place, found, "START < END", "for a key moment write one time")
     return _placed(Span, place, *times, words, number)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, told_time
 from .vocabulary import CONTINUOUS, DISCRETE, TRANSITION, nearest, similar_words, vocabulary_words, words_below
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
@@ -41,7 +41,7 @@ def checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
 def _checked_time(value: float, where: str) -> float:
     time = float(value)
     if not abs(time) <= LONGEST_TIME:
-        raise InputError(where, f"the time {time:g}", "a time within the track, in seconds")
+        raise InputError(where, f"the time {told_time(time)}", "a time within the track, in seconds")
     return time
 
 
@@ -262,17 +262,19 @@ def _unknown_word(word: str, item: Span | KeyMoment, known: frozenset[str], plac
 def _time_problems(item: Span | KeyMoment, start: float | None, end: float | None, place: str) -> list[InputError]:
     times = (item.start, item.end) if isinstance(item, Span) else (item.time,)
     if len(times) == 2 and times[1] <= times[0]:
-        return [InputError(place, f"the end {times[1]:g} is not after the start {times[0]:g}", "START < END")]
+        found = f"the end {told_time(times[1])} is not after the start {told_time(times[0])}"
+        return [InputError(place, found, "START < END")]
     low = -math.inf if start is None else start - EDGE_TOLERANCE
     high = math.inf if end is None else end + EDGE_TOLERANCE
     if low <= times[0] and times[-1] <= high:
         return []
     outside = times[0] if times[0] < low else times[-1]
-    return [InputError(place, f"the time {outside:g} s is outside the track", _range(start, end), "correct the time")]
+    found = f"the time {told_time(outside)} s is outside the track"
+    return [InputError(place, found, _range(start, end), "correct the time")]
 
 
 def _range(start: float | None, end: float | None) -> str:
-    parts = [f"{word} {value:g} s" for word, value in (("from", start), ("to", end)) if value is not None]
+    parts = [f"{word} {told_time(value)} s" for word, value in (("from", start), ("to", end)) if value is not None]
     return "times " + " ".join(parts)
 
 
@@ -294,7 +296,7 @@ def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
 
 
 def _named(item: Span | KeyMoment) -> str:
-    times = f"{item.start:g} {item.end:g}" if isinstance(item, Span) else f"{item.time:g}"
+    times = f"{told_time(item.start)} {told_time(item.end)}" if isinstance(item, Span) else f"{told_time(item.time)}"
     return f"'{' '.join((times, *spelled(item)))}'" + ("" if item.line is None else f" (line {item.line})")
 
 

@@ -48,9 +48,11 @@ def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | N
     return Arcs(length(found.velocity[flat]), found.velocity[flat], seconds[flat])
 
 
-def out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: float, spin: np.ndarray | None = None) -> bool:
-    """Whether no launch from `start` (3,) m of at most `speed` m/s comes as far as `target` (3,) m: a fan of flights, far
-    quicker than looking for the launch, and never wrong about a target that can be reached."""
+def out_of_reach(
+    start: np.ndarray, target: np.ndarray, ball: Ball, speed: float, spin: np.ndarray | None = None
+) -> bool:
+    """Whether no launch from `start` (3,) m of at most `speed` m/s comes as far as `target` (3,) m: a fan of flights,
+    far quicker than looking for the launch, and never wrong about a target that can be reached."""
     way = np.asarray(target, float) - start
     level = float(np.hypot(way[0], way[1]))
     rise = np.minimum(np.arctan2(way[2], level) + _ELEVATIONS, np.radians(89.0))
@@ -58,7 +60,9 @@ def out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: float
     velocity = _SLACK * speed * (np.cos(rise)[:, None] * ahead + np.sin(rise)[:, None] * [0.0, 0.0, 1.0])
     count = np.zeros(len(rise), int)
     spin = np.zeros(3) if spin is None else np.asarray(spin, float)
-    balls = batch.Balls(np.tile(np.asarray(start, float), (len(rise), 1)), velocity, np.tile(spin, (len(rise), 1)), count, count)
+    balls = batch.Balls(
+        np.tile(np.asarray(start, float), (len(rise), 1)), velocity, np.tile(spin, (len(rise), 1)), count, count
+    )
     longest = 2.0 * speed / ball.gravity + 1.0
     for _ in range(int(np.ceil(longest / batch.STEP))):
         before = balls.position

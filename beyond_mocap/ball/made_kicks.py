@@ -1,7 +1,7 @@
 """Made kicks at a target: of all ways to swing the leg of `motion.kicks`, the one whose foot sends the ball there.
 
-What a foot gives a ball that lies is `released.struck`'s law. A kick is aimed as people aim: the whole approach turns to
-the target, a harder kick is swung faster, and the ball rises as the foot meets it lower or with its toes less down.
+What a foot gives a ball that lies is `released.struck`'s law. A kick is aimed as people aim: the whole approach turns
+to the target, a harder kick is swung faster, and the ball rises as the foot meets it lower or with its toes less down.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ def kick(
 ) -> Kick:
     """A kick out of three steps of a ball that lies at the origin, through `target` (3,) m.
 
-    speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's adult.
-    style: a name of KICKS, or somebody's own. InputError for a target out of reach at that speed, an unknown foot or
-    style.
+    speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
+    adult. style: a name of KICKS, or somebody's own. InputError for a target out of reach at that speed, an unknown
+    foot or style.
     """
     how = style if isinstance(style, KickStyle) else KICKS.get(style)
     if foot not in ("left", "right") or how is None:
@@ -93,7 +93,8 @@ class _Aim:
         return np.stack([(_CLEAR - ends[:, 1, 2]) / (self.neutral.leg / LEG), lofts], axis=-1)
 
     def launches_of(self, ways: np.ndarray) -> np.ndarray:
-        """The ball's place m, velocity m/s and spin rad/s (N, 9) at the table's pace, in ways (N, 2) of (lift, loft)."""
+        """The ball's place m, velocity m/s and spin rad/s (N, 9) at the table's pace, in ways (N, 2) of (lift,
+        loft)."""
         ends, velocities = contact(self.style, self.neutral, self.foot, ways)
         middle = velocities.mean(axis=1)
         centre = np.stack([_touching(*each, self.ball.radius) for each in zip(ends, middle)])

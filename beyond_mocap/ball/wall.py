@@ -15,11 +15,11 @@ def meets_wall(
     position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
     spin: np.ndarray = (0.0, 0.0, 0.0),
 ) -> tuple[np.ndarray, float]:
-    """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground where
-    that comes first, and where it is after 6 s or four times what it would take without air where neither does.
+    """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground
+    where that comes first, and where it is after 6 s or four times what it would take without air where neither does.
 
-    position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground, ahead
-    (2,): from where it is thrown towards it, the wall's normal.
+    position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground,
+    ahead (2,): from where it is thrown towards it, the wall's normal.
     """
     unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
     free = position[2] > ball.radius or velocity[2] > LEAST_HOP  # else it bounces as it is launched

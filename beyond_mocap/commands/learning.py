@@ -40,7 +40,9 @@ def run(options, told: Told) -> None:
         raise InputError(options.propose, what, "a new file", "choose another name, then put the rows together")
     known = keep.read(options.learned) if options.learned else None
     if options.learn:
-        examples = examples_of(options.library, options.unit, told.progress, options.cache, told.cancelled)
+        examples = examples_of(
+            options.library, options.unit, told.progress, options.cache, told.cancelled, told.note
+        )
         known = trained(examples, told.progress, told.cancelled)
         keep.write(options.learn, known)
         told.end()

@@ -22,6 +22,8 @@ def add(verbs):
     verb.add_argument("--tracking", type=Path, required=True, metavar="FILE", help="a provider's tracking")
     verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: looked for beside")
     verb.add_argument("--events", type=Path, metavar="FILE", help="what happened, from a provider or as CSV")
+    verb.add_argument("--events-meta", type=Path, metavar="FILE", help="of the events; default: looked for beside them")
+    verb.add_argument("--events-provider", metavar="NAME", default="", help="whose form the events have; as above")
     verb.add_argument("--provider", metavar="NAME", default="", help="whose form FILE has; default: guessed")
     verb.add_argument("--library", type=Path, required=True)
     verb.add_argument("--out", type=_named, required=True, metavar="FOLDER", help="is made; goes on where it was left")
@@ -72,8 +74,9 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     write = scene_writer(options.scene, writers) if options.scene else None
     order = MatchOrder(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
-        provider=options.provider, cache=options.cache, skeleton=options.skeleton, unit=options.unit,
-        start=options.start, end=options.end, players=tuple(dict.fromkeys(options.players)), fps=options.fps,
+        events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider,
+        cache=options.cache, skeleton=options.skeleton, unit=options.unit, start=options.start, end=options.end,
+        players=tuple(dict.fromkeys(options.players)), fps=options.fps,
         seed=options.seed, nearest=options.nearest, solve_touches=not options.no_solve_touches,
         annotations=options.annotations, bvh=options.bvh, figures=not options.no_figures,
         workers=options.workers or len(_cores()), scheduler=options.scheduler,

@@ -106,7 +106,8 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     for note in (*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)):
         told.note(note)
     gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # where it begins anew it is set back
-    print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} m{_unit(clip, options)}")
+    print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} "
+          f"m{_unit(clip, options)}")
 
 
 def _left_over(source, ridden, path, options) -> list[str]:

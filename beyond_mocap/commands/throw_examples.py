@@ -38,5 +38,6 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     )
     told.end()
     seconds = time.perf_counter() - begun
-    what = f"{count} {options.action}{'s' * (count > 1)} of {options.subjects} {'person' if options.subjects == 1 else 'people'}"
+    who = "person" if options.subjects == 1 else "people"
+    what = f"{count} {options.action}{'s' * (count > 1)} of {options.subjects} {who}"
     print(f"{options.out}: {what}, with {TABLE_NAME}, in {seconds:.1f} s")

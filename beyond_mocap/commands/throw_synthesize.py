@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from .. import __version__
-from ..errors import InputError
+from ..errors import InputError, told_time
 from .numbers import between, positive, whole
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
@@ -186,7 +186,8 @@ class _Player:
 
         track, _ = clean(read_track_csv(options.track))
         if not track.times[0] <= options.time <= track.times[-1]:
-            raise InputError("--time", f"{options.time:g} s", f"{track.times[0]:g} to {track.times[-1]:g} s, the track")
+            expected = f"{told_time(track.times[0])} to {told_time(track.times[-1])} s, the track"
+            raise InputError("--time", f"{told_time(options.time)} s", expected)
         fps = options.fps or 30.0
         timeline = Timeline()
         if options.annotations:

@@ -12,7 +12,9 @@ from .outputs import Writer, check_outputs
 from .told import Told
 
 FOUND, EXPECTED = "this Python has no training", "jax and optax, and the project's folder"
-NEXT_STEP = "in the project's folder run 'make training', then .venv-training/bin/python -m beyond_mocap throw train ..."
+NEXT_STEP = (
+    "in the project's folder run 'make training', then .venv-training/bin/python -m beyond_mocap throw train ..."
+)
 
 
 def add(verbs):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..errors import InputError
+from ..errors import InputError, told_time
 from .outputs import Writer, check_outputs
 from .told import Told
 
@@ -41,7 +41,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     begun = time.perf_counter()
     check_outputs(options.out, options.ball, options.report, never=(options.input, options.meta))
     if options.start is not None and options.end is not None and options.end <= options.start:
-        raise InputError("--to", f"{options.end:g} s", f"later than --from {options.start:g} s")
+        raise InputError("--to", f"{told_time(options.end)} s", f"later than --from {told_time(options.start)} s")
     source = _read(options)
     loaded = time.perf_counter()
     solved = solve_ball(source, told.progress, told.cancelled, options.start, options.end)

@@ -13,7 +13,7 @@ from collections import Counter
 import numpy as np
 
 from ..annotation import Timeline, words_per_frame
-from ..errors import TimedLine
+from ..errors import TimedLine, told_time
 from ..library.library import Library
 from ..library.landings import LANDING_FOLDER
 from ..library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN
@@ -228,7 +228,7 @@ def _out_of_reach(played: Played, keys: list[Moment]) -> TimedLine | None:
 
 def _at_moments(what: str, found: list[tuple[float, float]], form: str) -> TimedLine | None:
     """The line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None where there are none."""
-    told = ", ".join(f"{time:g} s by {form.format(value)}" for time, value in found)
+    told = ", ".join(f"{told_time(time)} s by {form.format(value)}" for time, value in found)
     return TimedLine(f"{what}: {told}", *((time, time) for time, _ in found)) if found else None
 
 

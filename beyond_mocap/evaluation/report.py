@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..annotation import Timeline
-from ..errors import spans_of
+from ..errors import InputError, spans_of
 from ..library.library import Library
 from ..motion.track import Track
 from ..take import Take
@@ -18,6 +18,9 @@ from .played import Played, played_from_take
 from .view import View
 
 VERSION = 1
+DEEPEST = 30
+"""Objects and lists in each other, of which no report has so many."""
+
 SECONDS = ("load", "library", "search", "construct", "polish", "total")
 
 
@@ -114,17 +117,34 @@ def table(reports: Mapping[str, dict]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def flat(value, name: str = "") -> dict[str, object]:
-    """A report as one row per figure: nested names joined with dots, key moments numbered from 1, warnings counted."""
+def check_depth(value, where: object) -> None:
+    """InputError, with `where` it is from, for a value out of JSON that is nested deeper than any report is."""
+    level, depth = [value], 0
+    while level:
+        if depth > DEEPEST:
+            raise InputError(where, f"nested more than {DEEPEST} deep", "a report", "make it again")
+        inner = [list(one.values()) if isinstance(one, Mapping) else one for one in level
+                 if isinstance(one, (Mapping, list))]  # fmt: skip
+        level, depth = [entry for entries in inner for entry in entries], depth + 1
+
+
+def flat(report: Mapping) -> dict[str, object]:
+    """A report as one row per figure: nested names joined with dots, key moments numbered from 1, warnings counted.
+    InputError as `check_depth`."""
+    check_depth(report, "report")
+    return _flat(report, "")
+
+
+def _flat(value, name: str) -> dict[str, object]:
     if name == "warnings":
         return {name: len(value)}
     if name == "warning_seconds":
         return {}
     if isinstance(value, Mapping):
-        return {k: v for key, entry in value.items() for k, v in flat(entry, f"{name}.{key}" if name else key).items()}
+        return {k: v for key, entry in value.items() for k, v in _flat(entry, f"{name}.{key}" if name else key).items()}
     if isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
         pairs = [(f"{name} {i}", entry) for i, entry in enumerate(value, 1)]
-        return {k: v for label, entry in pairs for k, v in flat(entry, label).items()}
+        return {k: v for label, entry in pairs for k, v in _flat(entry, label).items()}
     return {name: value}
 
 

@@ -59,6 +59,7 @@ def read_events(
         raise InputError(path, "no events", "some", "export it again")
     events, notes = _with_players(path, rows, match)
     told = [f"{second.name} taken as its second file"] if second and meta is None else []
+    told += [f"{meta}: not used, since events of {provider} are in one file"] if meta and not second else []
     return MatchEvents(tuple(events), provider, str(path), tuple([*told, *notes]))
 
 
@@ -66,7 +67,15 @@ def _with_players(path: Path, rows: list[tuple[MatchEvent, Who | None]], match: 
     """The events with the tracking's ids, by period and time, and notes."""
     everybody = list(dict.fromkeys(who for _, who in rows if who is not None))
     known, notes = same_players(everybody, match)
-    if match is not None and everybody and len(known) < _LEAST_KNOWN * len(everybody):
+    few = match is not None and len(known) < _LEAST_KNOWN * len(everybody)
+    if few and all(who.number < 0 and not who.name for who in everybody):  # nothing says that it is another match
+        ids = ", ".join([who.id for who in everybody if who not in known][:3])
+        notes = [
+            f"{path.name}: {len(everybody) - len(known)} of {len(everybody)} players cannot be assigned, for these "
+            f"events have neither shirt numbers nor names, and the tracking has other ids than theirs ({ids} ...): "
+            "what they do is left out"
+        ]
+    elif few:
         lost = ", ".join(who.said for who in everybody if who not in known)
         found = f"{len(everybody) - len(known)} of {len(everybody)} players ({lost[:80]}) are not in the tracking"
         raise InputError(path, found, "events of the same match, with ids, numbers or names", "check both files")

@@ -1,5 +1,5 @@
-"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws-training.md): a zip of plain arrays, with one JSON
-text for what is no array. Nothing in it is ever executed."""
+"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws-training.md): a zip of plain arrays, with one
+JSON text for what is no array. Nothing in it is ever executed."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
 def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) -> None:
     """Write a model as `read_model` reads it, number for number; the same model gives the same bytes.
 
-    half: weights and the examples' rotations as float16 and all else as float32, a quarter of the size: for weights that
-    are shipped. InputError where it cannot be written, or where a weight is too large for float16.
+    half: weights and the examples' rotations as float16 and all else as float32, a quarter of the size: for weights
+    that are shipped. InputError where it cannot be written, or where a weight is too large for float16.
     """
     arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
     arrays |= _body_out(model) | _networks_out(model) | _examples_out(model)

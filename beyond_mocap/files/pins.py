@@ -1,4 +1,5 @@
-"""Pins as a table: `time_s,part,x_m,y_m,z_m,hold_s`, a line for each place where a hand, a foot or the gaze has to be."""
+"""Pins as a table: `time_s,part,x_m,y_m,z_m,hold_s`, a line for each place where a hand, a foot or the gaze has to
+be."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ COLUMNS = ("time_s", "part", "x_m", "y_m", "z_m", "hold_s")
 
 
 def read_pins(path: str | os.PathLike) -> tuple[Pin, ...]:
-    """The pins of a CSV file, in the order of its lines: seconds on the track's clock, metres in the world, Z up. hold_s
-    may be missing or blank (a moment). InputError names the line that is not of this form."""
+    """The pins of a CSV file, in the order of its lines: seconds on the track's clock, metres in the world, Z up.
+    hold_s may be missing or blank (a moment). InputError names the line that is not of this form."""
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     try:
         missing = [name for name in COLUMNS[:-1] if name not in (reader.fieldnames or ())]

@@ -92,7 +92,8 @@ def _pass_out(one: Pass) -> dict:
 def _scene(whole) -> PassScene:
     read = {
         "players": _list_of(_player), "repeat": whole_number, "fps": number, "seed": whole_number, "ball": _ball,
-        "net": _net, "serve": _serve, "transition": number, "lead_in": number, "lead_out": number, "directions": whole_number,
+        "net": _net, "serve": _serve, "transition": number, "lead_in": number, "lead_out": number,
+        "directions": whole_number,
         "watch": truth, "weights": _weights,
     }  # fmt: skip
     known = {*read, "passes", "defaults", "errors"}

@@ -135,7 +135,8 @@ def read_rows(
     """(place, row) for every row of a CSV file that is not empty; place is `file:line`, names and cells are stripped.
 
     others: other names that stand for `required` ones, or for more. separators: the first with which the header is one
-    counts; with others than a comma, a comma in a number is its decimal point, as spreadsheets of many countries have it.
+    counts; with others than a comma, a comma in a number is its decimal point, as spreadsheets of many countries have
+    it.
 
     InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells.
     """
@@ -150,7 +151,9 @@ def read_rows(
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) < len(names):
-                raise InputError(place, f"{len(cells)} cells", f"{len(names)} as in the header", "complete or delete the row")
+                raise InputError(
+                    place, f"{len(cells)} cells", f"{len(names)} as in the header", "complete or delete the row"
+                )
             cells = [cell.strip() for cell in cells]
             yield place, dict(zip(names, cells if separator == "," else map(_with_point, cells)))
     except csv.Error as error:

@@ -10,8 +10,8 @@ from .library import Library
 
 
 def automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> list[tuple[str, ...]]:
-    """(T,) the words of each frame's gait, index (T,) into the library's; where the library also has it in the direction in
-    which a body that faces the ball would go (`annotation.gaze`), in that direction."""
+    """(T,) the words of each frame's gait, index (T,) into the library's; where the library also has it in the
+    direction in which a body that faces the ball would go (`annotation.gaze`), in that direction."""
     recorded = {row.words for clip in library.clips for row in clip.annotations}
     words: list[tuple[str, ...]] = []
     for number, direction in zip(gait, direction_words(wanted_offset(track), track.fps)):

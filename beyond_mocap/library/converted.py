@@ -1,7 +1,7 @@
 """Recordings in forms that only Blender reads (FBX, glTF, USD), converted once to BVH and kept beside the cache.
 
-`CACHE/converted/` mirrors the library's folders: `kicks/low.fbx` becomes `CACHE/converted/kicks/low.fbx.bvh`. A table of
-each source's size and time says whether a conversion still stands for it; one that does not is never read. Blender
+`CACHE/converted/` mirrors the library's folders: `kicks/low.fbx` becomes `CACHE/converted/kicks/low.fbx.bvh`. A table
+of each source's size and time says whether a conversion still stands for it; one that does not is never read. Blender
 converts (the extension's Build Library does it first); the command line reads what has been converted.
 """
 
@@ -62,7 +62,9 @@ class Conversions:
             target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             found = f"cannot be written ({error.strerror})"
-            raise InputError(target.parent, found, "a folder for converted clips", "choose another cache folder") from None
+            raise InputError(
+                target.parent, found, "a folder for converted clips", "choose another cache folder"
+            ) from None
         return target
 
     def keep(self, path: Path, stamp: list[int]) -> None:

@@ -31,9 +31,9 @@ _HEAD = 1 << 16  # bytes of a file's head in which its number of frames stands
 
 @dataclass(frozen=True)
 class Listed:
-    """One clip. path: below the library's folder. words: all that it carries, key moments' first. moments: number of key
-    moments. seconds: its length. speed, fastest: m/s, mean and highest, NaN where nobody has measured. mark: GOOD, FAIR,
-    POOR or UNKNOWN; told: lines 'name: value' behind the mark."""
+    """One clip. path: below the library's folder. words: all that it carries, key moments' first. moments: number of
+    key moments. seconds: its length. speed, fastest: m/s, mean and highest, NaN where nobody has measured. mark: GOOD,
+    FAIR, POOR or UNKNOWN; told: lines 'name: value' behind the mark."""
 
     path: str
     words: tuple[str, ...]

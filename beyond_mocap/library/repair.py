@@ -6,11 +6,11 @@ is cut and joined from such clips would carry all of it into every result. What 
 
 The travel is mended before the feet: wherever a foot stands, the *pelvis* is moved with the opposite of its slide,
 smoothly, because there the suit's dead reckoning is wrong, not the leg; only what is left is taken out by bending the
-legs. Feet keep their heights meanwhile: pressed onto one plane, the runs of four libraries got 1.5 to 1.7 times the jerk
-(95th percentile of a clip, median), with their own heights 1.0 to 1.1 times, and they slide less.
+legs. Feet keep their heights meanwhile: pressed onto one plane, the runs of four libraries got 1.5 to 1.7 times the
+jerk (95th percentile of a clip, median), with their own heights 1.0 to 1.1 times, and they slide less.
 
-Nobody's foot stands dead still: the faster the run, the faster its ball rolls and creeps. A clip slides where it does so
-by more than recordings of its speed from good volumes.
+Nobody's foot stands dead still: the faster the run, the faster its ball rolls and creeps. A clip slides where it does
+so by more than recordings of its speed from good volumes.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ from ..polish.foot_plant import plant
 _POP = np.radians(12.0)
 _POP_SHARE = 4.0
 _POP_SECONDS = 0.04  # longer than a pop
-# balls of feet that slide faster than sqrt(a^2 + (b v)^2) in the middle of stances (m/s, mean over a clip that goes at v):
-# optical recordings have 0.01 to 0.1 where they stand or walk and up to 0.067 v in runs, suits 0.12 to 0.25 at any speed
+# balls of feet that slide faster than sqrt(a^2 + (b v)^2) in the middle of stances (m/s, mean over a clip that goes at
+# v): optical recordings have 0.01 to 0.1 where they stand or walk and up to 0.067 v in runs, suits 0.12 to 0.25 at any
+# speed
 _SLIDES, _SLIDES_SHARE = 0.13, 0.065
 # stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
 _LOW_SECONDS, _DRIFT = 1.5, 0.13
@@ -91,10 +92,11 @@ def without_pops(motion: Motion) -> tuple[Motion, int]:
 
 
 def without_drift(motion: Motion) -> tuple[Motion, float]:
-    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres while it lasts, and by how much it did.
+    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres while it lasts, and by how much it
+    did.
 
-    The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can rise by
-    half a metre in five seconds, and `_levelled` knows only feet that are seen to stand.
+    The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
+    rise by half a metre in five seconds, and `_levelled` knows only feet that are seen to stand.
     """
     low = forward_kinematics(motion)[0][..., 2].min(axis=1)
     width = max(1, int(round(_LOW_SECONDS * motion.fps)))
@@ -130,11 +132,12 @@ def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = False) -> Repaired:
-    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), with feet that stand still.
+    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), with feet that stand
+    still.
 
     standing (T, 2, 2) bool: left and right, heel and toe; found where it is not given. Feet are held, and the way is
-    corrected, in clips that slide (`slides`); with `plants` feet are held in any case (a body that got other feet). Bones
-    and rate stay.
+    corrected, in clips that slide (`slides`); with `plants` feet are held in any case (a body that got other feet).
+    Bones and rate stay.
     """
     standing = contacts.points(motion) if standing is None else standing
     motion, drift = _levelled(motion, standing)
@@ -148,7 +151,8 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 
 
 def slides(motion: Motion, standing: np.ndarray) -> bool:
-    """Whether feet that stand, by `standing` (T, 2, 2), slide faster than good recordings of the motion's speed show."""
+    """Whether feet that stand, by `standing` (T, 2, 2), slide faster than good recordings of the motion's speed
+    show."""
     way = np.linalg.norm(np.diff(motion.root_positions[:, :2], axis=0), axis=1)
     speed = way.mean() * motion.fps if len(way) else 0.0
     return _ball_slide(motion, standing) > np.hypot(_SLIDES, _SLIDES_SHARE * speed)

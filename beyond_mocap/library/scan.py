@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
@@ -48,8 +49,8 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
 
 
 def own_recordings(folder: str | Path) -> list[Path]:
-    """The recordings that are a library's clips, as `find_recordings`: of two of one name (`kick.bvh` beside `kick.fbx`)
-    the BVH file."""
+    """The recordings that are a library's clips, as `find_recordings`: of two of one name (`kick.bvh` beside
+    `kick.fbx`) the BVH file."""
     found = find_recordings(folder)
     plain = {path.with_suffix("") for path in found if not is_foreign(path)}
     return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
@@ -90,9 +91,10 @@ def _absolute(path: Path) -> Path:
 class Annotations:
     """What was written about the clips of a library, found as ../shared/contract.md describes "Library annotations"."""
 
-    def __init__(self, folder: Path, clips: list[Path]):
-        """Reads every table that may apply; InputError where one is broken."""
-        self.tables = {_absolute(table.parent): read_annotation_csv(table) for table in find_tables(folder, clips)}
+    def __init__(self, folder: Path, clips: list[Path], but: Callable[[Mapping], bool] | None = None):
+        """Reads every table that may apply, `but` rows as `read_annotation_csv`; InputError where one is broken."""
+        tables = find_tables(folder, clips)
+        self.tables = {_absolute(table.parent): read_annotation_csv(table, but) for table in tables}
 
     def of(self, clip: Path, fps: float) -> tuple[ClipAnnotation, ...]:
         """Rows of one clip: NAME.txt beside it, else the nearest table from its folder upward that has rows for it."""

@@ -1,7 +1,8 @@
 """Who said a clip's words, where it was not a person: each automatic row's source and how sure it was.
 
 In a text it stands behind a line as a comment, `156f kick right low  # learned 0.93`, in a table in the columns
-`source` and `confidence`, where it has them. Nothing else reads it; a row that a person has changed has none.
+`source` and `confidence`, where it has them. Only learning reads it; a row that a person has changed has none. A table
+of proposals says in a third column, `why`, what was seen: it is empty as soon as somebody has accepted the row.
 """
 
 from __future__ import annotations
@@ -35,6 +36,11 @@ def cells(row: ClipAnnotation, sources: Sources) -> dict[str, str]:
     """What stands in a table's COLUMNS."""
     source, confidence = sources.get(row, ("", 0.0))
     return {"source": source, "confidence": f"{confidence:.2f}" if source else ""}
+
+
+def is_open(row: Mapping) -> bool:
+    """Whether a table's row (column -> text) was proposed and nobody has accepted it yet."""
+    return (row.get("source") or "").strip() in (RULES, LEARNED) and bool((row.get("why") or "").strip())
 
 
 def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Found:

@@ -24,8 +24,8 @@ EASE = 0.3
 
 
 def at_ball(take: Take, ball: np.ndarray) -> Take:
-    """The take with its striking parts on the ball (T, 3) m, NaN where it is not known, at each key moment at which they
-    were meant to be. Frames further than EASE from such a moment keep their bits."""
+    """The take with its striking parts on the ball (T, 3) m, NaN where it is not known, at each key moment at which
+    they were meant to be. Frames further than EASE from such a moment keep their bits."""
     meetings = [meeting for key in take.keys if (meeting := _meeting(take.motion, key, ball)) is not None]
     return replace(take, motion=met_at(take.motion, take.contacts, meetings).motion) if meetings else take
 

@@ -3,7 +3,10 @@ run apart from the cameras'.
 
 Touches of the ball are solved from tracking (`solve_ball`); an event of a player belongs to one of his touches. Over
 all pairs of an event and a touch of the same player, the difference of times that comes most often is the lag of a
-period; a line through the pairs near it takes out what the clocks run apart. Then each player's events and touches are
+period; a line through the pairs near it takes out what the clocks run apart. People are seconds late, not minutes, so a
+far lag counts for less than a near one, by a Cauchy distribution around none: among few pairs a near one wins, and a
+clock that is minutes off needs some three agreeing pairs more than one that is seconds off. Events are believed where
+so many fit that chance does not explain it, at any lag as likely as theirs. Then each player's events and touches are
 brought together in order, as two lines of text are.
 """
 
@@ -20,7 +23,7 @@ from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
 from ..files.match_data import Half
 
 MOST_LAG = 300.0
-"""Seconds by which clocks may differ."""
+"""Seconds by which clocks may differ: a feed whose clock begins elsewhere, if enough of its events say so."""
 
 WINDOW = 2.0
 """Seconds from its place on the mended clock within which an event's touch is looked for."""
@@ -33,6 +36,11 @@ _INSIDE = 4  # passes and shots within what was solved, below which a lag may be
 _SURE = 30  # pairs from which a drift is told from scatter
 _TELLING = 15  # of them, below which events that do not fit may be of this match all the same
 _LEAST_MATCHED, _ABOVE_CHANCE = 0.3, 1.6  # share of the certain events that must fit, and how much more than by chance
+_USUAL_LAG = 5.0  # s
+_LEAST_CHANCE = 0.04  # of an event to fit with a wrong lag: few events in a short span show it badly
+_LEAST_SURE = 4.0  # nats
+_PAIR = 2.7  # nats that a pair is worth
+_DOUBTFUL = 0.3  # of an event that may be no touch, where one that is a touch for certain counts 1
 _SENDING = {"pass", "shot", "clearance"}
 _TAKING = {"receive", "catch", "pick-up"}
 _SENT = {"kick", "header", "throw-in"}  # kinds of touches
@@ -47,7 +55,8 @@ _NO_TOUCH = 1.4  # s that an event without a touch is worth
 class PeriodClock:
     """lag: s that events of a period are later than their touches, at its begin; drift: s that it grows each second.
     spread: s, the usual distance from it (median absolute deviation times 1.48). matched: share of the events that are
-    touches for certain which have one; by_chance: the same with wrong lags. told: how many these events are."""
+    touches for certain which have one; by_chance: the same with wrong lags. told: how many these events are. sure:
+    nats, how unlikely it is that so many fit by chance at a lag as far off (`_sure`)."""
 
     lag: float
     drift: float
@@ -55,11 +64,12 @@ class PeriodClock:
     matched: float
     by_chance: float
     told: int
+    sure: float
 
     @property
     def fits(self) -> bool:
         """Whether its events fit touches better than by chance."""
-        return self.matched >= max(_LEAST_MATCHED, _ABOVE_CHANCE * self.by_chance)
+        return self.sure >= _LEAST_SURE and self.matched >= max(_LEAST_MATCHED, _ABOVE_CHANCE * self.by_chance)
 
 
 @dataclass(frozen=True)
@@ -116,7 +126,7 @@ def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndar
         clock = _clock(events, since, touches, zero, span)
         if clock is not None:
             tried.append((clock, zero + (since - clock.lag) / (1.0 + clock.drift)))
-    return max(tried, key=lambda one: one[0].matched, default=None)
+    return max(tried, key=lambda one: one[0].sure, default=None)
 
 
 def _told(number: int, clock: PeriodClock) -> str:
@@ -144,35 +154,35 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     if len(set(early)) < _FEWEST:
         return None
     early, late, certain = np.array(early), np.array(late), np.array(origin)
-    lag = _commonest(early - late, np.where(certain, 1.0, 0.3))
+    lag = _commonest(early - late, np.where(certain, 1.0, _DOUBTFUL))
     lag, drift = _line(early, late, lag)
-    certain_events = [
-        (time, event.player) for event, time in zip(events, since) if event.kind in CERTAIN and event.player
-    ]
-    rest = early - late * (1.0 + drift) - lag
-    there = [start + (time - lag) / (1.0 + drift) for time, _ in certain_events]
-    inside = sum(span[0] <= time <= span[1] for time in there)
-    if inside < _INSIDE:
+    fit = _Fit(events, since, when, who, (span[0] - start, span[1] - start), drift)
+    right, wrong = fit.at([lag]), fit.at([lag + by for by in _CHANCES])
+    if right[0, 1] < _INSIDE:
         return None
+    rest = early - late * (1.0 + drift) - lag
     near = rest[np.abs(rest) < 3.0 * _SPREAD]
     spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
-
-    def share(extra: float) -> float:
-        return _matched(certain_events, when, who, lag + extra, drift, start, span)
-
-    chance = float(np.mean([share(by) for by in _CHANCES]))
-    return PeriodClock(float(lag), float(drift), spread, share(0.0), chance, inside)
+    matched, chance = right[0, 0] / right[0, 1], wrong[0, 0] / max(wrong[0, 1], 1)
+    sure = _sure(*right[0], chance) + _DOUBTFUL * _sure(*right[1], wrong[1, 0] / max(wrong[1, 1], 1)) - _far(lag)
+    return PeriodClock(float(lag), float(drift), spread, float(matched), float(chance), int(right[0, 1]), float(sure))
 
 
 def _commonest(lags: np.ndarray, weights: np.ndarray) -> float:
-    """The lag (s) around which most weight lies, within _SPREAD; of equal ones the least."""
+    """The lag (s) around which most weight lies, within _SPREAD, less what a far one costs; of equal ones the least."""
     edges = np.arange(-MOST_LAG - 1.0, MOST_LAG + 1.0 + _BIN, _BIN)
     counts, _ = np.histogram(lags, edges, weights=weights)
     reach = np.arange(-15, 16) * _BIN
-    smooth = np.convolve(counts, np.exp(-0.5 * (reach / _SPREAD) ** 2), "same")
     middles = 0.5 * (edges[1:] + edges[:-1])
+    smooth = np.convolve(counts, np.exp(-0.5 * (reach / _SPREAD) ** 2), "same") - _far(middles) / _PAIR
+    smooth -= smooth.min()
     best = np.flatnonzero(smooth >= smooth.max() * (1.0 - 1e-9))
     return float(middles[best[np.abs(middles[best]).argmin()]])
+
+
+def _far(lag):
+    """Nats by which a lag (s) is less likely than none: long tails (Cauchy's) around the usual ones."""
+    return np.log1p((lag / _USUAL_LAG) ** 2)
 
 
 def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float]:
@@ -197,15 +207,42 @@ def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float
     return found, drift
 
 
-def _matched(events, when, who, lag: float, drift: float, start: float, span) -> float:
-    """Share of events (time, player) with a touch of the player within _NEAR, of those within the solved span."""
-    fits = count = 0
-    for time, player in events:
-        there = (time - lag) / (1.0 + drift)
-        if span[0] <= start + there <= span[1]:
-            count += 1
-            fits += bool(np.any(np.abs(when[who == player] - there) <= _NEAR))
-    return fits / count if count else 0.0
+class _Fit:
+    """Which events of players have a touch of theirs within _NEAR, at one lag or another. when (T,) s and who (T,) of
+    touches, since (E,) s of events and span s on the period's clock."""
+
+    def __init__(self, events, since: np.ndarray, when: np.ndarray, who: np.ndarray, span, drift: float):
+        self._span, self._drift, self._rows = span, drift, []
+        known = np.isfinite(since)
+        named = np.array([event.player for event in events])
+        certain = np.array([event.kind in CERTAIN for event in events], bool)
+        played = known & np.array([event.played for event in events], bool) & (named != "")
+        for player in np.unique(named[played]):
+            own = played & (named == player)
+            edges = np.concatenate([[-np.inf], np.sort(when[who == player]), [np.inf]])
+            self._rows.append((since[own], certain[own], edges))
+
+    def at(self, lags) -> np.ndarray:
+        """[fitting, all] within the span: of those that are touches for certain, and of the others; over all `lags`."""
+        out = np.zeros((2, 2), int)
+        for since, certain, edges in self._rows:
+            there = (since - np.reshape(lags, (-1, 1))) / (1.0 + self._drift)
+            after = np.searchsorted(edges, there)
+            near = np.minimum(edges[after] - there, there - edges[after - 1]) <= _NEAR
+            inside = (there >= self._span[0]) & (there <= self._span[1])
+            for row, which in enumerate((certain, ~certain)):
+                out[row] += np.count_nonzero(inside & near & which), np.count_nonzero(inside & which)
+        return out
+
+
+def _sure(fitting: int, count: int, chance: float) -> float:
+    """Nats: how unlikely it is that as many of `count` fit by `chance` (Chernoff's bound of a binomial's tail)."""
+    chance = min(max(chance, _LEAST_CHANCE), 0.99)
+    share = fitting / max(count, 1)
+    if share <= chance:
+        return 0.0
+    rest = (1.0 - share) * np.log((1.0 - share) / (1.0 - chance)) if share < 1.0 else 0.0
+    return float(count * (share * np.log(share / chance) + rest))
 
 
 def _check(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:

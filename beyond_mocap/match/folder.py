@@ -31,17 +31,19 @@ VERSION = 1
 _WORK, _LOCK = ".work", "lock"
 _LONGEST = 100  # characters of a file's name
 _PART = re.compile(r"\..+\.\d+\.\d+\.part")  # what `files.whole.beside` writes before it has its name
+_HEAD, _DIGEST = 1000, re.compile(rb'"digest": *"([0-9a-f]+)"')  # bytes in which match.json says whose it is
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # names that Windows keeps for itself
 
 
 @dataclass(eq=False)
 class MatchFolder:
     """A folder while somebody works in it. path: the folder; before: what its match.json said when it was opened, {}
-    where there was none; digest: of the order that is worked on."""
+    where there was none, or a damaged one; digest: of the order that is worked on; notes: lines for people."""
 
     path: Path
     digest: str
     before: dict = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def of(self, player_file: str, ending: str) -> Path:
         """The file of one player's that ends so, such as "take.npz"."""
@@ -74,27 +76,61 @@ class MatchFolder:
 def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     """The folder for an order whose results are decided by `identity`, made where there is none.
 
-    InputError where it cannot be made or written, holds results of another order or files that are none of a match, or
-    somebody else works in it.
+    A match.json that is damaged is set aside, which `notes` tell, where there are pieces of work beside it. InputError
+    where it cannot be made or written, holds results of another order or files that are none of a match, or somebody
+    else works in it.
     """
     check_folder(path)
-    new = not path.exists()
+    new, kept = not path.exists(), (path / _WORK).exists()
+    if (path / STATE).exists() and not _has_pieces(path):
+        read_state(path)
     try:
         (path / _WORK).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         found = f"cannot be written ({error.strerror or error})"
         raise InputError(path, found, "a folder that can be written", "choose another place") from None
     with _locked(path / _WORK / _LOCK, path):
-        before = read_state(path) if (path / STATE).exists() else {}
+        before, notes = _state_before(path, identity)
         _check_order(path, before, identity)
         _sweep(path)
         try:
-            yield MatchFolder(path, digest_of(identity), before)
+            yield MatchFolder(path, digest_of(identity), before, notes)
         finally:
-            if not (path / STATE).exists():  # nothing was begun
+            if not (path / STATE).exists() and not kept:  # nothing was begun
                 shutil.rmtree(path / _WORK, ignore_errors=True)
                 with contextlib.suppress(OSError):  # the user's own folder, or one with texts in it
                     path.rmdir() if new else None
+
+
+def _has_pieces(path: Path) -> bool:
+    """Whether there is work of ours that a run can go on from."""
+    return any((path / _WORK).glob("*/*.npz"))
+
+
+def _state_before(path: Path, identity: Mapping[str, object]) -> tuple[dict, tuple[str, ...]]:
+    """What match.json says, and lines for people: a damaged one is set aside. InputError where it is another version's,
+    or is damaged and still says that it is another order's."""
+    if not (path / STATE).exists():
+        return {}, ()
+    try:
+        state = read_state(path)
+        if not isinstance(state.get("digest"), str):
+            raise _Damaged(path / STATE, "no digest")
+        return state, ()
+    except _Damaged as error:
+        told = _DIGEST.search((path / STATE).read_bytes()[:_HEAD]) if (path / STATE).is_file() else None
+        if told:
+            _check_order(path, {"digest": told[1].decode()}, identity)
+        os.replace(path / STATE, path / f"{STATE}.damaged")
+        return {}, (f"{error.what}: kept as {STATE}.damaged, and what is done is found by its pieces",)
+
+
+class _Damaged(InputError):
+    """A match.json that is not as we write it. what: where and what, without the next step."""
+
+    def __init__(self, path: Path, found: str):
+        super().__init__(path, found, "the state of a match", "make the match in another folder")
+        self.what = f"{path}: {found}"
 
 
 def _sweep(path: Path) -> None:
@@ -111,13 +147,14 @@ def read_state(folder: str | os.PathLike) -> dict:
     try:
         state = json.loads(content(path, "the state of a match"))
     except (ValueError, RecursionError) as error:
-        found = f"no JSON ({' '.join(str(error).split())[:80]})"
-        raise InputError(path, found, "the state of a match", "make the match in another folder") from None
+        raise _Damaged(path, f"no JSON ({' '.join(str(error).split())[:80]})") from None
     players = state.get("players") if isinstance(state, dict) else None
     if not isinstance(players, list) or not all(isinstance(one, dict) and "id" in one for one in players):
-        raise InputError(path, "no list of players", "the state of a match", "make the match in another folder")
-    if state.get("version") != VERSION:
-        raise InputError(path, f"version {state.get('version')}", f"{VERSION}", "make the match anew with this version")
+        raise _Damaged(path, "no list of players")
+    if "version" not in state:
+        raise _Damaged(path, "no version")
+    if state["version"] != VERSION:
+        raise InputError(path, f"version {state['version']}", f"{VERSION}", "make the match anew with this version")
     return state
 
 
@@ -167,6 +204,7 @@ def _check_order(path: Path, before: dict, identity: Mapping[str, object]) -> No
 
 _NAMES = {
     "start": "--from", "end": "--to", "tracking": "tracking file", "meta": "metadata", "events": "events file",
+    "events_meta": "--events-meta", "events_provider": "--events-provider",
     "solve_touches": "--no-solve-touches", "players": "list of players", "fps": "--fps", "seed": "--seed",
     "nearest": "--exact", "provider": "--provider", "form": "version", "software": "version",
 }

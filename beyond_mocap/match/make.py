@@ -16,6 +16,7 @@ import numpy as np
 
 from ..ball.tracked.solve import SolvedBall
 from ..errors import BeyondMocapError, Cancelled, InputError
+from ..files.event_data import MatchEvents
 from ..files.events import read_events
 from ..files.match_data import Match
 from ..files.tables import write_ball
@@ -28,7 +29,7 @@ from . import stages
 from .folder import MatchFolder, check_folder, file_names, opened, read_state
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
-from .parts import check_texts, parts_of, strange_texts
+from .parts import check_texts, parts_of, strange_texts, unused_lines
 from .pool import Workplace, check_place, ended
 from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import MatchState, begun, now, row_of
@@ -85,17 +86,19 @@ def make_match(
     report(0.0, f"Reading {order.tracking.name}")
     match = read_match(order.tracking, order.meta, order.provider or None)
     span = span_of(match, order)
+    events = _events(order, match)
     read = now()
     library, source = _library(order, _part(report, "library"), cancelled)
     known = identity(order, source.key)
     with opened(order.out, known) as folder:
         state = begun(folder, order, known, match, span)
+        state.told["notes"] += folder.notes
         state.seconds["read"] = round(read[0] - clock[0], 3)
         state.took("library", read)
         job = stages.Job(order, folder, state, source, library, place, report, cancelled)
         try:
             with threadpool_limits(limits=1):  # more threads add up in another order
-                _make(job, match, span, report)
+                _make(job, match, events, span, report)
         except BeyondMocapError as error:
             if state.players:  # else nothing was begun
                 state.tell(status="cancelled" if isinstance(error, Cancelled) else "failed", reason=str(error))
@@ -119,7 +122,16 @@ def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, L
     return library, source
 
 
-def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> None:
+def _events(order: MatchOrder, match: Match) -> MatchEvents | None:
+    """What people wrote down, where they did."""
+    if order.events is None:
+        return None
+    return read_events(order.events, order.events_meta, order.events_provider or None, match)
+
+
+def _make(
+    job: stages.Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
+) -> None:
     """All stages behind the reading."""
     state, begin = job.state, now()
     roles = roles_of(match, job.order, span)
@@ -127,7 +139,7 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     solved = _solved(job, match, span, _part(report, "ball"))
     state.took("ball", begin)
     clock = now()
-    words = _words(job, match, solved)
+    words = _words(job, match, events, solved)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
     names = file_names(player.id for player in match.players)
@@ -136,6 +148,7 @@ def _make(job: stages.Job, match: Match, span: tuple[float, float], report: Prog
     finished = {row["id"]: row["finished"] for row in told if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: row_of(part, finished.get(part.role.player.id)) for part in parts}
     state.told["notes"] += strange_texts(job.order.annotations, names.values())
+    state.told["notes"] += unused_lines(parts, job.order, names)
     state.took("words", clock)
     state.write()
     clock = now()
@@ -163,13 +176,11 @@ def _solved(job: stages.Job, match: Match, span: tuple[float, float], report: Pr
         return None
 
 
-def _words(job: stages.Job, match: Match, solved: SolvedBall | None) -> MatchWords:
+def _words(job: stages.Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchWords:
     """Everybody's words, from touches and, where there are some, events."""
-    events, told = None, job.state.told
-    if job.order.events is not None:
-        events = read_events(job.order.events, match=match)
-        if solved is None:
-            told["notes"].append(f"{job.order.events}: not used, since no touch of the ball tells how its clock goes")
+    told = job.state.told
+    if events is not None and solved is None:
+        told["notes"].append(f"{job.order.events}: not used, since no touch of the ball tells how its clock goes")
     words = words_of(match, solved, events)
     told["notes"] += words.notes
     told["events"] = dict(words.figures) or None

@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .. import __version__
-from ..errors import InputError
+from ..errors import InputError, told_time
+from ..files.event_providers import EVENT_PROVIDERS
 from .content_digest import digest_of_file
 from .units import OVERLAP, WINDOW
 
@@ -23,6 +24,7 @@ class MatchOrder:
     """One match to make.
 
     tracking, meta, events: the provider's files (None: looked for beside, none); provider: whose form, "" guessed.
+    events_meta, events_provider: the same of the events.
     library, cache, skeleton, unit: as `library.build` has them. out: the folder of the results. start, end: seconds on
     the match's clock, None from its first to its last sample. players: ids, () everybody. fps: of what comes out. seed:
     of every random choice. nearest: whether words that the library lacks give way to the nearest it has. solve_touches:
@@ -30,7 +32,8 @@ class MatchOrder:
     bvh: whether every player is written as BVH too; figures: whether reports, provenance and the page are made. window,
     overlap: seconds that a piece of the search has, and shares with the next. variety: as a plan has it. workers,
     scheduler: `pool.Workplace`.
-    InputError for numbers outside their limits, a span that ends before it begins, and times that are no numbers.
+    InputError for numbers outside their limits, a span that ends before it begins, times that are no numbers, and
+    what is said of events where there are none or of a provider whose events nobody reads.
     """
 
     tracking: Path
@@ -57,17 +60,27 @@ class MatchOrder:
     variety: float = 0.6
     workers: int = 1
     scheduler: str = ""
+    events_meta: Path | None = None
+    events_provider: str = ""
 
     def __post_init__(self):
         for option, value in (("--from", self.start), ("--to", self.end)):
             if value is not None and math.isnan(value):
                 raise InputError(option, "nan", "seconds of the match's clock")
         if self.start is not None and self.end is not None and self.end <= self.start:
-            raise InputError("--to", f"{self.end:g} s", f"later than --from {self.start:g} s")
+            raise InputError("--to", f"{told_time(self.end)} s", f"later than --from {told_time(self.start)} s")
         if not WINDOWS[0] <= self.window <= WINDOWS[1]:
             raise InputError("window", f"{self.window:g} s", f"{WINDOWS[0]:g} to {WINDOWS[1]:g} s")
         if not 1.0 <= self.overlap <= self.window / 2.0:
             raise InputError("overlap", f"{self.overlap:g} s", f"1 s to half of the window, {self.window / 2.0:g} s")
+        self._check_events()
+
+    def _check_events(self) -> None:
+        for option, value in (("--events-meta", self.events_meta), ("--events-provider", self.events_provider)):
+            if value and self.events is None:
+                raise InputError(option, f"{value}, without --events", "--events FILE too", "name the events")
+        if self.events_provider and self.events_provider.lower() not in EVENT_PROVIDERS:
+            raise InputError("--events-provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}")
 
     def told(self) -> dict:
         """The order as plain values, for people."""
@@ -75,8 +88,8 @@ class MatchOrder:
 
 
 _RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "window", "overlap",
-            "variety")
-_FILES = ("tracking", "meta", "events")
+            "variety", "events_provider")
+_FILES = ("tracking", "meta", "events", "events_meta")
 
 
 def identity(order: MatchOrder, library_key: str) -> dict[str, object]:

@@ -6,27 +6,28 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..annotation import Timeline
+from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
-from ..errors import InputError
+from ..errors import InputError, told_time
 from ..known_touches import course_of
 from ..plan import Plan
 from .folder import MatchFolder
 from .order import MatchOrder
 from .player_edit import kept
 from .roles import Role
-from .words import MatchWords, Moment, timeline_of
+from .words import USER, MatchWords, Moment, timeline_of
 from .words_text import edited, read_words, write_words
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
     """A role with its orders. file: what the player's files are called; plans: one for each stretch, as files keep
-    them; () where he cannot be made (`role.reason`)."""
+    them; () where he cannot be made (`role.reason`). unused: the user's words for times at which he is not there."""
 
     role: Role
     file: str
     plans: tuple[Plan, ...] = ()
+    unused: tuple[Moment, ...] = ()
 
 
 def parts_of(
@@ -42,7 +43,8 @@ def parts_of(
         try:
             moments = () if role.reason else _moments(file, role, words, order, folder, known_words)
             plans = tuple(_plan(role, number, moments, solved, order) for number in range(len(role.asked)))
-            out.append(Part(role, file, () if role.reason else plans))
+            unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
+            out.append(Part(role, file, () if role.reason else plans, unused))
         except InputError as error:
             out.append(Part(replace(role, reason=str(error)), file))
     return out
@@ -60,6 +62,30 @@ def strange_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
     known = {f"{file}.txt" for file in files}
     texts = [] if annotations is None else sorted(annotations.glob("*.txt"))
     return [f"{text}: not used, since nobody of the match is called so" for text in texts if text.name not in known]
+
+
+def unused_lines(parts: Iterable[Part], order: MatchOrder, files: Mapping[str, str]) -> list[str]:
+    """A line for each player whose text has words of the user's for times at which he is not there, and one for texts
+    in `order.annotations` of players who are not there at all. files: id -> what the player's files are called."""
+    out, there = [], {part.role.player.id for part in parts}
+    away = [] if order.players else [file for player, file in files.items() if player not in there]
+    idle = [f"{file}.txt" for file in away if _own_text(order.annotations, file) is not None]
+    if idle:
+        out.append(f"{', '.join(idle)}: not used, since nobody of them is there in that time")
+    for part in parts:
+        if part.unused:
+            first = format_timeline(timeline_of(part.unused[:1])).strip()
+            edges = [(track.times[0], track.times[-1]) for track in part.role.asked]
+            there = ", ".join(f"{told_time(start)} to {told_time(end)} s" for start, end in edges)
+            found = f"{len(part.unused)} of your words not used ({first}{' ...' * (len(part.unused) > 1)})"
+            out.append(f"{part.file}.txt: {found}, since {part.role.player.id} is there from {there}")
+    return out
+
+
+def _is_used(moment: Moment, role: Role) -> bool:
+    """Whether any stretch of a player's has it, or a part of it."""
+    cut = (timeline_of([moment], float(track.times[0]), float(track.times[-1])) for track in role.asked)
+    return any(one.spans or one.keys for one in cut)
 
 
 def _moments(

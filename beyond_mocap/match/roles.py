@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, told_time
 from ..files.match_data import Match, MatchPlayer
 from ..motion.track import Track, clean
 from ..polish.crowd.spacing import keeping, spaced
@@ -45,8 +45,9 @@ def span_of(match: Match, order: MatchOrder) -> tuple[float, float]:
     start = first if order.start is None else max(order.start, first)
     end = last if order.end is None else min(order.end, last)
     if end - start < SHORTEST:
-        low, high = (f"{value:g}" if value is not None else "" for value in (order.start, order.end))
-        raise InputError("--from, --to", f"{low} to {high} s", f"a second or more within {first:g} to {last:g} s")
+        low, high = (told_time(value) if value is not None else "" for value in (order.start, order.end))
+        expected = f"a second or more within {told_time(first)} to {told_time(last)} s"
+        raise InputError("--from, --to", f"{low} to {high} s", expected)
     return start, end
 
 
@@ -67,7 +68,7 @@ def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tupl
         for which in asked if (role := _role(match, *which, span, order.fps)) is not None
     ]  # fmt: skip
     if not roles:
-        raise InputError("--from, --to", f"nobody is there from {span[0]:g} to {span[1]:g} s", "a time of play")
+        raise InputError("--from, --to", f"nobody is there {_from_to(span)}", "a time of play")
     return tuple(roles)
 
 
@@ -75,7 +76,11 @@ def absent_lines(order: MatchOrder, roles: Sequence[Role], span: tuple[float, fl
     """A line for each player whom the order names and who is not there in `span` s."""
     there = {role.player.id for role in roles}
     away = [player for player in order.players if player not in there]
-    return [f"player {player} is not made: he is not there from {span[0]:g} to {span[1]:g} s" for player in away]
+    return [f"player {player} is not made: he is not there {_from_to(span)}" for player in away]
+
+
+def _from_to(span: tuple[float, float]) -> str:
+    return f"from {told_time(span[0])} to {told_time(span[1])} s"
 
 
 def _sampled(match: Match, span: tuple[float, float]) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import Timeline
-from ..errors import BeyondMocapError
+from ..errors import BeyondMocapError, told_time
 from ..files.take_npz import write_player
 from ..files.tables import plain
 from ..files.whole import atomic_write
@@ -169,7 +169,8 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
     for number, result in _spread(job, missing(), part_crowd, CROWD):
         if isinstance(result, Failed):
             start, end = windows[number]
-            job.state.told["notes"].append(f"{start:g}-{end:g} s: bodies are not kept apart: {result.reason}")
+            when = f"{told_time(start)}-{told_time(end)} s"
+            job.state.told["notes"].append(f"{when}: bodies are not kept apart: {result.reason}")
             continue
         keep_parts(job.folder.place(CROWD, names[number]), result)
         found[number] = result

@@ -42,8 +42,8 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
     """A player's body for `skeleton`; `height`: stature in metres that girths belong to, default by the legs' length.
 
     example: any recording on the skeleton; it tells how bones are twisted where the rest pose is no standing one,
-    without it feet and hands of such skeletons may sit turned (see `neutral.neutral_stance`). The face looks ahead as the
-    rest pose does, where that stands upright. Raises InputError where hips or legs cannot be found."""
+    without it feet and hands of such skeletons may sit turned (see `neutral.neutral_stance`). The face looks ahead as
+    the rest pose does, where that stands upright. Raises InputError where hips or legs cannot be found."""
     neutral = neutral_stance(skeleton, example)
     if example is not None and rests_upright(skeleton):
         neutral = _level_head(neutral, neutral_stance(skeleton))
@@ -63,8 +63,8 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
 
 
 def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
-    """The stance with its head as it rests, unless that would have the example's people look up: who kicks or walks looks
-    down at the ground ahead, but some suits rest with a bowed head."""
+    """The stance with its head as it rests, unless that would have the example's people look up: who kicks or walks
+    looks down at the ground ahead, but some suits rest with a bowed head."""
     carrier = _head_carrier(identify(neutral.skeleton))
     ahead = quaternion.multiply(neutral.rotations[carrier], quaternion.inverse(rest.rotations[carrier]))
     if quaternion.rotate(ahead, np.array([1.0, 0.0, 0.0]))[2] > 0.0:
@@ -163,7 +163,8 @@ class _Build:
                 self.material.append(material)
 
     def ball(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
-        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half and half with `other` where given."""
+        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half and half with `other` where
+        given."""
         rings = [
             (centre + self.scale * np.array([0, 0, -radii[2] * np.cos(a)]), radii[0] * np.sin(a), radii[1] * np.sin(a))
             for a in np.radians([25, 55, 90, 125, 155])

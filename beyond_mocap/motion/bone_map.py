@@ -42,7 +42,7 @@ def load(path: str | Path) -> dict[str, str]:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (JSON)", "check the path") from None
-    except (ValueError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(path, f"not JSON ({error})", _FORM, "mend the file") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):
         raise InputError(path, "not an object of names", _FORM, "mend the file")

@@ -63,7 +63,8 @@ class FootPath:
 
 
 def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutral) -> FootPath:
-    """The foot at `share` (T,) of its stances `which` (T,): it rolls over heel, ball and toe tip, none of which slides."""
+    """The foot at `share` (T,) of its stances `which` (T,): it rolls over heel, ball and toe tip, none of which
+    slides."""
     sizes = steps.step_size(neutral.leg / tables.LEG)
     before = np.concatenate([sizes[:1], sizes])[which]
     after = np.concatenate([sizes, sizes[-1:]])[which]
@@ -79,7 +80,8 @@ def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutr
 
 
 def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Forward rolls heel to toe; backward the other way round and less (T); sideways the heel hardly leaves the ground."""
+    """Forward rolls heel to toe; backward the other way round and less (T); sideways the heel hardly leaves the
+    ground."""
     ahead, back = np.maximum(np.cos(direction), 0.0) ** 2, np.maximum(-np.cos(direction), 0.0) ** 2
     forward_roll = tables.stance_pitch(share, speed)
     backward_roll = tables.stance_pitch(1.0 - share, speed)
@@ -184,7 +186,8 @@ def _edge_speeds(steps: Footsteps, which: np.ndarray, neutral: Neutral) -> tuple
 
 
 def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Ankle ahead of and above the hip joint (N,), (N,) metres, and the sole's pitch (N,), from the published angles."""
+    """Ankle ahead of and above the hip joint (N,), (N,) metres, and the sole's pitch (N,), from the published
+    angles."""
     parts = []
     for at in (share, 1.0 - share):
         thigh, knee, ankle = np.moveaxis(tables.swing_angles(at, speed), -1, 0)

@@ -11,7 +11,8 @@ from .gait_tables import smooth_step
 
 
 def keyed(rows, times: np.ndarray) -> np.ndarray:
-    """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the last."""
+    """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the
+    last."""
     first, last, curve = _curve(tuple(map(tuple, rows)))
     return curve(np.clip(times, first, last))
 

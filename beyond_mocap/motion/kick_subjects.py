@@ -61,7 +61,8 @@ def styled(base: KickStyle, manner: KickManner, effort: float = 1.0) -> KickStyl
         strides=tuple(manner.stride * (0.8 + 0.2 * effort) * stride for stride in base.strides),
         leg=_swung(base.leg, back, 0.72 + 0.28 * effort, follow),
         pelvis=tuple((t, side, tilt, _turned(t, about, turn, manner.approach)) for t, side, tilt, about in base.pelvis),
-        spine=tuple((t, side - manner.lean * _near_contact(t), tilt, turn * about) for t, side, tilt, about in base.spine),
+        spine=tuple((t, side - manner.lean * _near_contact(t), tilt, turn * about)
+                    for t, side, tilt, about in base.spine),
         left_arm=arms[0],
         right_arm=arms[1],
     )

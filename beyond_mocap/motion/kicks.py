@@ -2,8 +2,8 @@
 
 Instants, angles and rates of the instep kick follow Lees and Nolan 1998 (J. Sports Sci. 16, 211-234), Nunome, Asai,
 Ikegami and Sakurai 2002 (Med. Sci. Sports Exerc. 34, 2028-2036) and Kellis and Katis 2007 (J. Sports Sci. Med. 6,
-154-165): an approach of 3 m/s at some 35 degrees, the foot planted beside the ball 0.11 s before the contact, the pelvis
-turned back by 30 degrees and then through, a knee bent by 105 degrees that extends at 1500 degrees a second, the
+154-165): an approach of 3 m/s at some 35 degrees, the foot planted beside the ball 0.11 s before the contact, the
+pelvis turned back by 30 degrees and then through, a knee bent by 105 degrees that extends at 1500 degrees a second, the
 trunk inclined to the standing leg. Here is the body alone; what its foot gives the ball stands in `ball.made_kicks`.
 """
 
@@ -40,11 +40,12 @@ _FREE, _DOWN = (-0.29, -0.19), (0.26, 0.50)  # s, between which the leg leaves t
 class KickStyle:
     """How a right foot kicks towards +X; seconds from the contact, degrees, metres of an adult.
 
-    approach: degrees that the way up to the ball is turned to the kicking leg. strides: lengths of the three steps. leg:
-    rows (time, thigh forward, knee bent). plane: rows (time, turn of the plane in which the leg swings, abduction). foot:
-    rows (time, bent down at the ankle, toes turned out). pelvis: rows (time, list, tilt, turn), spine: rows (time, list,
-    tilt, turn), both as in a `Posture`. left_arm, right_arm: rows (time, brought forward, abduction, inward turn, elbow).
-    hips: rows (time, ahead of where they are at the contact, left of it, lowered), from the planting on.
+    approach: degrees that the way up to the ball is turned to the kicking leg. strides: lengths of the three steps.
+    leg: rows (time, thigh forward, knee bent). plane: rows (time, turn of the plane in which the leg swings,
+    abduction). foot: rows (time, bent down at the ankle, toes turned out). pelvis: rows (time, list, tilt, turn),
+    spine: rows (time, list, tilt, turn), both as in a `Posture`. left_arm, right_arm: rows (time, brought forward,
+    abduction, inward turn, elbow). hips: rows (time, ahead of where they are at the contact, left of it, lowered), from
+    the planting on.
     """
 
     approach: float
@@ -75,16 +76,21 @@ _INSTEP = KickStyle(
         (0.45, 0, 2, 10), (0.8, 0, 4, 0), (1.3, 0, 2, 0),
     ),
     spine=(
-        (-1.5, 0, 4, 0), (-0.95, 0, 6, -6), (-0.6, 0, 7, 8), (-0.3, -3, 2, 26), (-0.14, -8, -4, 42), (-0.05, -14, 4, 26),
+        (-1.5, 0, 4, 0), (-0.95, 0, 6, -6), (-0.6, 0, 7, 8), (-0.3, -3, 2, 26), (-0.14, -8, -4, 42),
+        (-0.05, -14, 4, 26),
         (0.0, -15, 12, 4), (0.12, -9, 22, -22), (0.25, -5, 20, -24), (0.5, 0, 10, -10), (1.3, 0, 3, 0),
     ),
     left_arm=(
-        (-1.5, 2, 10, 12, 18), (-1.0, -18, 14, 12, 30), (-0.65, 26, 18, 18, 45), (-0.4, 0, 50, 8, 32), (-0.16, -30, 84, 0, 18),
-        (-0.03, 16, 72, 14, 26), (0.12, 50, 40, 32, 42), (0.3, 44, 28, 30, 46), (0.7, 12, 20, 16, 34), (1.3, 2, 10, 12, 18),
+        (-1.5, 2, 10, 12, 18), (-1.0, -18, 14, 12, 30), (-0.65, 26, 18, 18, 45), (-0.4, 0, 50, 8, 32),
+        (-0.16, -30, 84, 0, 18),
+        (-0.03, 16, 72, 14, 26), (0.12, 50, 40, 32, 42), (0.3, 44, 28, 30, 46), (0.7, 12, 20, 16, 34),
+        (1.3, 2, 10, 12, 18),
     ),
     right_arm=(
-        (-1.5, 2, 10, 12, 18), (-1.0, 22, 12, 16, 45), (-0.65, -22, 18, 10, 38), (-0.35, 14, 26, 16, 46), (-0.16, 34, 30, 20, 46),
-        (0.0, -20, 44, 8, 32), (0.14, -40, 42, 0, 24), (0.35, -24, 32, 8, 28), (0.7, -4, 20, 12, 28), (1.3, 2, 10, 12, 18),
+        (-1.5, 2, 10, 12, 18), (-1.0, 22, 12, 16, 45), (-0.65, -22, 18, 10, 38), (-0.35, 14, 26, 16, 46),
+        (-0.16, 34, 30, 20, 46),
+        (0.0, -20, 44, 8, 32), (0.14, -40, 42, 0, 24), (0.35, -24, 32, 8, 28), (0.7, -4, 20, 12, 28),
+        (1.3, 2, 10, 12, 18),
     ),
     hips=(
         (-0.11, -0.19, 0.15, 0.11), (0.0, 0.0, 0.0, 0.09), (0.1, 0.18, -0.05, 0.055), (0.25, 0.42, -0.08, 0.05),
@@ -111,12 +117,16 @@ _INSIDE = KickStyle(
         (0.0, -9, 10, 10), (0.12, -6, 14, -6), (0.25, -3, 12, -8), (0.5, 0, 8, -4), (1.3, 0, 3, 0),
     ),
     left_arm=(
-        (-1.5, 2, 10, 12, 18), (-1.0, -14, 14, 12, 28), (-0.65, 20, 18, 18, 42), (-0.4, 0, 40, 8, 34), (-0.16, -18, 62, 2, 26),
-        (-0.03, 10, 56, 12, 30), (0.12, 32, 36, 24, 40), (0.3, 28, 26, 24, 42), (0.7, 8, 18, 14, 30), (1.3, 2, 10, 12, 18),
+        (-1.5, 2, 10, 12, 18), (-1.0, -14, 14, 12, 28), (-0.65, 20, 18, 18, 42), (-0.4, 0, 40, 8, 34),
+        (-0.16, -18, 62, 2, 26),
+        (-0.03, 10, 56, 12, 30), (0.12, 32, 36, 24, 40), (0.3, 28, 26, 24, 42), (0.7, 8, 18, 14, 30),
+        (1.3, 2, 10, 12, 18),
     ),
     right_arm=(
-        (-1.5, 2, 10, 12, 18), (-1.0, 18, 12, 16, 42), (-0.65, -18, 18, 10, 36), (-0.35, 12, 24, 16, 42), (-0.16, 24, 26, 18, 42),
-        (0.0, -10, 36, 10, 32), (0.14, -22, 34, 6, 28), (0.35, -12, 26, 10, 28), (0.7, 0, 18, 12, 26), (1.3, 2, 10, 12, 18),
+        (-1.5, 2, 10, 12, 18), (-1.0, 18, 12, 16, 42), (-0.65, -18, 18, 10, 36), (-0.35, 12, 24, 16, 42),
+        (-0.16, 24, 26, 18, 42),
+        (0.0, -10, 36, 10, 32), (0.14, -22, 34, 6, 28), (0.35, -12, 26, 10, 28), (0.7, 0, 18, 12, 26),
+        (1.3, 2, 10, 12, 18),
     ),
     hips=(
         (-0.11, -0.17, 0.10, 0.10), (0.0, 0.0, 0.0, 0.09), (0.1, 0.15, -0.04, 0.07), (0.25, 0.34, -0.07, 0.06),
@@ -134,7 +144,8 @@ def kicked(
     style: KickStyle, neutral: Neutral, foot: str = "right", lift: float = 0.0, loft: float = 0.0, rate: float = 1.0,
     turn: float = 0.0, fps: float = 120.0,
 ) -> Motion:
-    """A kick along +X, or turned by `turn` radians, at `rate` times the pace; the contact comes at BEFORE / rate seconds.
+    """A kick along +X, or turned by `turn` radians, at `rate` times the pace; the contact comes at BEFORE / rate
+    seconds.
 
     foot: "left" or "right". lift: metres of an adult by which the foot is led higher at the contact than the style has
     it. loft: degrees by which its toes point less down there. fps: frames per second.
@@ -148,8 +159,8 @@ def kicked(
 def contact(
     style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Places (N, 2, 3) m and velocities (N, 2, 3) m/s of ankle and toe joint at the contact of `kicked` with the same, in
-    N ways of (lift, loft)."""
+    """Places (N, 2, 3) m and velocities (N, 2, 3) m/s of ankle and toe joint at the contact of `kicked` with the same,
+    in N ways of (lift, loft)."""
     count = int(round(2.0 * _NEAR * _PLAN))
     times = np.arange(count + 1) / _PLAN - _NEAR
     before, curve = _upright(style, neutral, times)
@@ -269,7 +280,8 @@ def _step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: fl
         return (begin + share * d, *(off + gone * way), raised, pitch, yaw + gone * (later - yaw))
 
     return (
-        row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), row(0.0, 0.0, 0.0, 38.0), row(0.24, 0.08, high, 48.0), row(0.62, 0.58, 0.6 * high, 4.0),
+        row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), row(0.0, 0.0, 0.0, 38.0), row(0.24, 0.08, high, 48.0),
+        row(0.62, 0.58, 0.6 * high, 4.0),
         row(0.88, 0.92, 0.12 * high, -12.0), row(1.0, 1.0, 0.0, -8.0), row(1.12, 1.0, 0.0, 0.0),
     )  # fmt: skip
 

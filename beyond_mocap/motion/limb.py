@@ -15,7 +15,8 @@ def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.nd
     """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then it only nears
     it.
 
-    distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap straight.
+    distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap
+    straight.
     """
     start = longest - soft
     beyond = np.maximum(distance - start, 0.0)

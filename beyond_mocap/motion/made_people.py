@@ -33,8 +33,8 @@ def person(
     name: str, manner: type, ranges: Mapping[str, tuple[float, float]], fastest: tuple[float, float],
     chance: np.random.Generator,
 ) -> Person:
-    """Somebody of 1.6 to 2.0 m by chance. ranges: lowest and highest of each field of the manner. fastest: the same of the
-    ball, m/s."""
+    """Somebody of 1.6 to 2.0 m by chance. ranges: lowest and highest of each field of the manner. fastest: the same of
+    the ball, m/s."""
     stature = float(chance.uniform(1.60, 2.00))
     own = manner(**{field: float(chance.uniform(low, high)) for field, (low, high) in ranges.items()})
     hardest = float(chance.uniform(*fastest))
@@ -64,7 +64,9 @@ def body_of(stature: float, chance: np.random.Generator) -> Skeleton:
 def scattered(manner, scatter: dict[str, float], chance: np.random.Generator):
     """The same manner a little otherwise, by normal chance of the standard deviations `scatter` up to twice as far."""
     off = np.clip(chance.standard_normal(len(scatter)), -2.0, 2.0)
-    return replace(manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)})
+    return replace(
+        manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)}
+    )
 
 
 def by_factors(rows: tuple, *factors: float) -> tuple:

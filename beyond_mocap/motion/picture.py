@@ -59,7 +59,9 @@ def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     light = normal @ (_SUN / np.linalg.norm(_SUN))
-    colour = np.array([COLOURS[part] for part in MATERIALS])[material] * (0.55 + 0.45 * np.maximum(light, -0.5))[:, None]
+    colour = (
+        np.array([COLOURS[part] for part in MATERIALS])[material] * (0.55 + 0.45 * np.maximum(light, -0.5))[:, None]
+    )
     lit = quads[light > 0.0] + len(skin)
     _fill(canvas, flat[lit], np.tile(_SHADOW, (len(lit), 1)))
     seen = np.flatnonzero(normal @ away > 0.0)

@@ -73,8 +73,8 @@ class Retargeter:
     ):
         """sample: frames of the recordings (their order does not matter); the others as in `retarget`.
 
-        standing, example_standing (T, 2) bool: feet on the ground in `sample` and in `example`. keeps_travel: footprints
-        and the way over the ground stay where they are, whatever the legs' length.
+        standing, example_standing (T, 2) bool: feet on the ground in `sample` and in `example`. keeps_travel:
+        footprints and the way over the ground stay where they are, whatever the legs' length.
         """
         self.keeps_travel = keeps_travel
         self.pairs = pair(sample, skeleton, bone_map, example)

@@ -67,7 +67,9 @@ def styled(base: ThrowStyle, manner: Manner, effort: float = 1.0) -> ThrowStyle:
     way = manner.stride * (0.62 + 0.38 * effort)
     raised = manner.lift * (0.25 + 0.75 * effort)
     lean = manner.lean * (0.55 + 0.45 * effort)
-    spine = [(t, side - manner.slot * _near_release(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine]
+    spine = [
+        (t, side - manner.slot * _near_release(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine
+    ]
     style = ThrowStyle(
         pelvis=by_factors(base.pelvis, 1.0, lean, turn),
         spine=tuple(spine),

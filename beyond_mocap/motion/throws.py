@@ -44,8 +44,8 @@ class ThrowStyle:
 
     pelvis, spine: rows (time, list, tilt, turn), the pelvis against the throwing direction, the chest against the
     pelvis. right_arm, left_arm: rows (time, brought forward across, abduction, inward turn, elbow). forearm: rows
-    (time, turn, flexion of the wrist). hips: rows (time, ahead, lowered). left_foot, right_foot: rows (time, ahead, left,
-    raised, pitch, yaw).
+    (time, turn, flexion of the wrist). hips: rows (time, ahead, lowered). left_foot, right_foot: rows (time, ahead,
+    left, raised, pitch, yaw).
     """
 
     pelvis: tuple
@@ -132,7 +132,8 @@ def throw(
     """A throw out of standing at the origin, such that a ball without air flies through `target` (3,) metres.
 
     speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
-    adult. style: a name, or somebody's own. InputError for a target that cannot be reached at that speed, an unknown arm or style, a body without hands.
+    adult. style: a name, or somebody's own. InputError for a target that cannot be reached at that speed, an unknown
+    arm or style, a body without hands.
     """
     how = style if isinstance(style, ThrowStyle) else STYLES.get(style)
     if arm not in ("left", "right") or how is None:

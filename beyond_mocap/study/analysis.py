@@ -80,7 +80,8 @@ class Analysis:
 
 def analysed(study: Study, answers: Answers, better: Sequence[tuple[str, str]] = ()) -> Analysis:
     """The analysis. better: (new, old) systems of each hypothesis that new looks more natural; without any, the first
-    system of the table against each other one; one that is named twice counts once. InputError for a system that the study has not."""
+    system of the table against each other one; one that is named twice counts once. InputError for a system that the
+    study has not."""
     hypotheses = list(dict.fromkeys(better)) or [(study.systems[0], other) for other in study.systems[1:]]
     for system in [name for pair in hypotheses for name in pair]:
         if system not in study.systems:

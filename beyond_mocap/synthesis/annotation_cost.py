@@ -14,9 +14,9 @@ Words = frozenset[str] | None
 class AnnotationCost:
     """Eq. 18 for every block of the library at once.
 
-    Per frame, with a the asked and m the clip's words: the words both have count +1, those only one has -1, and the sum is
-    divided by the number of words in either; over a block sums and counts are added before dividing. D is that with the
-    sign turned: -1 where all agree, 1 where none does. Frames without asked words (transitions) count neither way.
+    Per frame, with a the asked and m the clip's words: the words both have count +1, those only one has -1, and the sum
+    is divided by the number of words in either; over a block sums and counts are added before dividing. D is that with
+    the sign turned: -1 where all agree, 1 where none does. Frames without asked words (transitions) count neither way.
     """
 
     def __init__(self, frames: Frames):

@@ -1,4 +1,5 @@
-"""The cheapest sequence through slots by dynamic programming (Faustino eq. 14, 15). It takes costs and knows no motion."""
+"""The cheapest sequence through slots by dynamic programming (Faustino eq. 14, 15). It takes costs and knows no
+motion."""
 
 from __future__ import annotations
 
@@ -12,8 +13,9 @@ def cheapest_path(
 ) -> tuple[np.ndarray, float]:
     """One choice per slot so that unary plus transition costs are least.
 
-    unary: S arrays (K_s,), the cost of each choice of a slot; np.inf forbids. transition(s): (K_s, K_{s+1}), the cost of
-    each choice of slot s + 1 after each of slot s. Returns the choices (S,) and the total cost. Ties go to the first.
+    unary: S arrays (K_s,), the cost of each choice of a slot; np.inf forbids. transition(s): (K_s, K_{s+1}), the cost
+    of each choice of slot s + 1 after each of slot s. Returns the choices (S,) and the total cost. Ties go to the
+    first.
 
         cheapest_path([np.array([0, 1.0]), np.array([5.0, 0])], lambda s: np.zeros((2, 2)))   # -> [0, 1], 0.0
     """

@@ -1,9 +1,9 @@
 """Where one block ends and the next begins: the boundary moved by a few frames to where the two clips agree best.
 
-Faustino §3.2.5 shifts the exit and the entry frame separately by gradient descent; the motion then changes its length, key
-moments miss their frame and travelled distance drifts (his own §5.2.1 names this as the main source of his distance
-errors). We shift both by the same number of frames: one clip plays a little longer and the other begins as much later, so
-every other frame stays where it was, and with so few possibilities all of them are tried.
+Faustino §3.2.5 shifts the exit and the entry frame separately by gradient descent; the motion then changes its length,
+key moments miss their frame and travelled distance drifts (his own §5.2.1 names this as the main source of his distance
+errors). We shift both by the same number of frames: one clip plays a little longer and the other begins as much later,
+so every other frame stays where it was, and with so few possibilities all of them are tried.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ def _move(library: Library, clip, frame, seam: int, low: int, high: int) -> None
 
 
 def _gap(library: Library, before, after, shift: int) -> float:
-    """Distance between the frame that would follow before the seam and the one after it: C of §3.2.5; inf outside a clip."""
+    """Distance between the frame that would follow before the seam and the one after it: C of §3.2.5; inf outside a
+    clip."""
     frames = library.frames
     places = []
     for (clip, frame), step in ((before, shift + 1), (after, shift)):

@@ -1,14 +1,15 @@
 """Adding or removing cycles of locomotion until the travelled distance fits (Faustino §3.2.4).
 
-The sequence of 8-frame blocks is split into locomotion and other sections. Each locomotion section keeps its first and last
-block; the blocks between are replaced by as many locomotion blocks as it takes to travel the wanted distance.
+The sequence of 8-frame blocks is split into locomotion and other sections. Each locomotion section keeps its first and
+last block; the blocks between are replaced by as many locomotion blocks as it takes to travel the wanted distance.
 
 Decisions where the paper is vague or misprinted:
 - Step 7 takes the absolute value of the difference, so that distance could never be removed; we keep its sign.
 - Eq. 22 and 23 drop alpha; we weigh D and C as eq. 14 does.
 - The steps that build S' run the same recursion for every end block; we run it once for all and read the candidates off
-  every layer. Of the sequences that come within CLOSE of the wanted distance the one that costs least per block is taken
-  (the paper's arg min of the distance alone takes bad transitions to win a millimetre); if none does, the nearest one.
+  every layer. Of the sequences that come within CLOSE of the wanted distance the one that costs least per block is
+  taken (the paper's arg min of the distance alone takes bad transitions to win a millimetre); if none does, the nearest
+  one.
 """
 
 from __future__ import annotations
@@ -93,8 +94,8 @@ def _refilled(search: BlockSearch, section: Section, goal: float) -> Section:
 
 
 def _locomotion_blocks(search: BlockSearch, section: Section) -> Candidates:
-    """Locomotion blocks that carry a word asked for in the section; starts on a grid of four frames, so that every block's
-    own continuation is there too."""
+    """Locomotion blocks that carry a word asked for in the section; starts on a grid of four frames, so that every
+    block's own continuation is there too."""
     frames = search.frames
     asked = {w for slot in range(section.first, section.end) for w in search.asked_words(slot, FINEST) if w}
     wanted_words = frozenset().union(*asked) & LOCOMOTION_WORDS if asked else frozenset()
@@ -150,8 +151,8 @@ def _cheapest_chain(search: BlockSearch, section: Section, blocks: Candidates, g
 
 
 def _words_by_distance(search: BlockSearch, section: Section, blocks: Candidates):
-    """D of block l when `travelled` metres of the section lie behind: the words asked where the track has come as far (the
-    paper's AA_d over travelled distance)."""
+    """D of block l when `travelled` metres of the section lie behind: the words asked where the track has come as far
+    (the paper's AA_d over travelled distance)."""
     asked = travelled_distance(search.wanted.track)
     low, high = section.first * FINEST, min(section.end * FINEST, len(asked))
     kinds = sorted({w for w in search.wanted.asked[low:high] if w is not None}, key=sorted)
@@ -167,7 +168,8 @@ def _words_by_distance(search: BlockSearch, section: Section, blocks: Candidates
 
 
 def _read_chain(layers, back) -> np.ndarray:
-    """The best chain over all layers: cheapest per block within CLOSE metres, else nearest; as block indices in order."""
+    """The best chain over all layers: cheapest per block within CLOSE metres, else nearest; as block indices in
+    order."""
     error = np.stack([e for e, _ in layers])
     cost = np.stack([c for _, c in layers])
     close = error <= CLOSE

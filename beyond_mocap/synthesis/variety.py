@@ -1,9 +1,9 @@
 """Players kept out of step: each shows a clip rather at a phase of his own than at another's.
 
 Players whose tracks are alike are given the same footage, and where they begin it at the same time they move as one. A
-clip that is played goes along with the clock: whoever shows its second s at time t of the match lags s - t behind it
-for as long as he shows it. Every player likes lags that are PERIOD apart, and players who come near each other are given
-other ones (`match.variety.lags`).
+clip that is played goes along with the clock: whoever shows its second s at time t of the match is s - t ahead of it
+for as long as he shows it, and this is his lag. Every player likes lags that are PERIOD apart, and players who come
+near each other are given other ones (`match.variety.lags`).
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from ..annotation import (
     MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill,
     gait_thresholds, spoken, words_per_frame,
 )
-from ..errors import NotInLibrary, TimedLine
+from ..errors import NotInLibrary, TimedLine, told_time
 from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
@@ -124,7 +124,7 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     offered = nearest_words(usable, moment.words)
     line = f"line {moment.line}, " if moment.line else ""
     lacks = f"the library has no clip for '{' '.join(moment.words)}'"
-    text = f"{line}{moment.time:g} s: {lacks}; nearest: {_listed(offered)}"
+    text = f"{line}{told_time(moment.time)} s: {lacks}; nearest: {_listed(offered)}"
     if not go_on:
         way_out = "add such a clip, or go on with the nearest (--nearest, in Blender Nearest Words)"
         raise NotInLibrary(f"{text}; ask for one of these, {way_out}", offered)
@@ -142,7 +142,8 @@ def _without(moment: KeyMoment, usable: tuple[Key, ...], made: tuple[Key, ...], 
     kept = tuple(tuple(key for key in keys if not key.words.intersection(moment.avoid)) for keys in (usable, made))
     if serving(usable, moment.words) and not serving(kept[0], moment.words):
         avoided = " ".join(MUST_NOT + word for word in moment.avoid)
-        text = f"{moment.time:g} s: no clip for '{' '.join(moment.words)}' is {avoided}: one is shown all the same"
+        lacks = f"no clip for '{' '.join(moment.words)}' is {avoided}"
+        text = f"{told_time(moment.time)} s: {lacks}: one is shown all the same"
         warnings.append(TimedLine(text, (moment.time, moment.time)))
         return usable, made
     return kept

@@ -3,9 +3,9 @@
     order = wanted(library, plan)
     for reason in reasons(library, order, PathSearch(library, order, weights).run(), weights): print(reason.costs)
 
-The costs are the search's own functions, asked again for what it chose: where every seam lies on one of its slots' edges
-(always, unless the edit list was edited) all parts of all pieces add up to what it paid. Of Faustino's block searches the
-two parts of eq. 13 are told, weighed over the blocks of eight frames as they are shown.
+The costs are the search's own functions, asked again for what it chose: where every seam lies on one of its slots'
+edges (always, unless the edit list was edited) all parts of all pieces add up to what it paid. Of Faustino's block
+searches the two parts of eq. 13 are told, weighed over the blocks of eight frames as they are shown.
 """
 
 from __future__ import annotations
@@ -96,7 +96,9 @@ def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, 
         unary, ways = zip(*(slots[slot] for slot in mine))
         seam, *within = ways
         costs = _summed([*unary, *within])
-        near = tuple(_others(search, way, mine[0], sum(unary[0].values()) + sum(seam.values()), others)) if others else ()
+        near = (
+            tuple(_others(search, way, mine[0], sum(unary[0].values()) + sum(seam.values()), others)) if others else ()
+        )
         found.append(_reason(library, edit, first, end, costs, _summed([seam]), near))
     return found
 
@@ -117,7 +119,9 @@ def block_reasons(library: Library, wanted: Wanted, edit: EditList, alpha: float
         seam = {}
         if first:
             after = windows(frames, edit.clip[first - 1 : first], place[first - 1 : first] + 1, size)
-            seam["pose"] = float(weight * distances(after, windows(frames, edit.clip[[first]], place[[first]], size))[0, 0])
+            seam["pose"] = float(
+                weight * distances(after, windows(frames, edit.clip[[first]], place[[first]], size))[0, 0]
+            )
         found.append(_reason(library, edit, first, end, {"words": alpha * float(np.sum(blocks))}, seam))
     return found
 

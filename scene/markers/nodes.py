@@ -13,8 +13,8 @@ from ..material import colour
 
 NAME = "Marker Cloud"
 SEEN, SIDE, MARKER = "seen", "side", "marker"
-"""Attributes: of the trajectories, whether a sample was seen; of a cloud's vertices, a place in COLOURS, and which marker
-it is."""
+"""Attributes: of the trajectories, whether a sample was seen; of a cloud's vertices, a place in COLOURS, and which
+marker it is."""
 COLOURS = (
     ("Marker", (0.80, 0.80, 0.80)), ("Marker left", (0.80, 0.05, 0.03)), ("Marker right", (0.03, 0.50, 0.08)),
     ("Marker without segment", (0.95, 0.55, 0.02)),

@@ -62,7 +62,10 @@ def _static_of(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Obj
     if kept.use_model or not is_cloud(kept.static) or kept.static == cloud:
         return None
     if scene.objects.get(kept.static.name) != kept.static:
-        found, step = f"its static trial {kept.static.name} is gone from the scene", "choose another, or clear the field"
+        found, step = (
+            f"its static trial {kept.static.name} is gone from the scene",
+            "choose another, or clear the field",
+        )
         raise InputError(cloud.name, found, "a cloud that is there", step)
     return kept.static
 

@@ -21,6 +21,7 @@ class Wardrobe:
         self.bones: dict[tuple, bpy.types.Armature] = {}
         self.shapes: dict[tuple, object] = {}
         self.meshes: dict[tuple, bpy.types.Mesh] = {}
+        self.cloths: dict[tuple, bpy.types.Material] = {}
 
     def dress(self, person: Person, collection) -> list[bpy.types.Object]:
         """An armature, and the meshes on it: body, and shirt number where he has one."""
@@ -71,7 +72,7 @@ class Wardrobe:
             mesh.polygons.foreach_set("material_index", np.asarray(body.material, np.int32))
             mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
             for part in MATERIALS:
-                mesh.materials.append(cloth(kit, part))
+                mesh.materials.append(self._cloth(kit, part))
             self.shapes[mesh] = example.skeleton.names, body.joints, body.weights
             self.meshes[key] = mesh
         return self.meshes[key]
@@ -86,10 +87,17 @@ class Wardrobe:
                 self.shapes[drawn] = shapes(number, self._shape(example, fits), example.skeleton, example)
             vertices, faces, joints, weights = self.shapes[drawn]
             mesh = self._mesh(f"Match {kit.name} {number}", fits, vertices, faces)
-            mesh.materials.append(cloth(kit, "number"))
+            mesh.materials.append(self._cloth(kit, "number"))
             self.shapes[mesh] = example.skeleton.names, joints, weights
             self.meshes[key] = mesh
         return self.meshes[key]
+
+    def _cloth(self, kit: Kit, part: str) -> bpy.types.Material:
+        """The one material that all of a kit wear."""
+        key = (kit.name, part)
+        if key not in self.cloths:
+            self.cloths[key] = cloth(kit, part)
+        return self.cloths[key]
 
     def _mesh(self, name: str, fits: tuple, vertices: np.ndarray, faces) -> bpy.types.Mesh:
         """A mesh in the armature's own space from vertices (V, 3) m around the resting root."""

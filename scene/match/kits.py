@@ -3,14 +3,16 @@ read on them."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ..body import LOOKS
-from ..material import colour
-from .people import Person
+from ..material import colour, made
+from . import ours
+from .people import TEAMS, Person
 
 USUAL = {"home": "#C8102E", "away": "#1D4ED8", "referee": "#15171A"}
 """Shirts of teams whose feed tells no colour."""
@@ -80,29 +82,49 @@ def luminance(rgb) -> float:
     return float(np.dot(rgb, (0.2126, 0.7152, 0.0722)))
 
 
-def repaint(colours: dict[str, str]) -> None:
-    """Let whoever is dressed already wear these colours of shirts: team -> "#RRGGBB"."""
+def repaint(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
+    """Let whoever is dressed already in the scene's match wear these colours of shirts: team -> "#RRGGBB"."""
+    worn = {cloth for team in TEAMS for thing in ours.meshes(scene, team) for cloth in thing.data.materials}
     for team in USUAL:
         for keeper in (False, True):
             kit = kit_of(Person("", "", -1, team, keeper, ()), colours)
-            for part in OWN:
-                if bpy.data.materials.get((_name(kit, part), None)) is not None:
-                    cloth(kit, part)
+            for part, rgb in _own(kit).items():
+                for material in worn & set(_all_of(kit, part)):
+                    _paint(material, rgb)
+
+
+def cloth(kit: Kit, part: str) -> bpy.types.Material:
+    """A material for one part of a kit ("shirt", "number", or one of the body's), in the kit's present colour.
+
+    What another match or anybody else wears is not taken: each call for a part of the kit's own gives another material
+    as soon as the one before is worn. Skin, hair and boots are everybody's.
+    """
+    own = _own(kit)
+    if part not in own:
+        return colour(part.capitalize(), LOOKS[part])
+    free = (one for one in _all_of(kit, part) if one.users == one.use_fake_user)
+    material = next(free, None) or made(_name(kit, part), own[part])
+    _paint(material, own[part])
+    return material
+
+
+def _own(kit: Kit) -> dict[str, tuple[float, float, float]]:
+    return dict(zip(OWN, (kit.shirt, kit.shorts, kit.socks, kit.ink)))
 
 
 def _name(kit: Kit, part: str) -> str:
     return f"Match {kit.name} {part}"
 
 
-def cloth(kit: Kit, part: str) -> bpy.types.Material:
-    """The material of one part of a kit ("shirt", "number", or one of the body's), in the kit's present colour."""
-    own = dict(zip(OWN, (kit.shirt, kit.shorts, kit.socks, kit.ink)))
-    if part not in own:
-        return colour(part.capitalize(), LOOKS[part])
-    material = colour(_name(kit, part), own[part])
+def _all_of(kit: Kit, part: str) -> list[bpy.types.Material]:
+    """The file's own materials for a part of a kit, of all matches that are shown in it, by name."""
+    form = re.compile(re.escape(_name(kit, part)) + r"(\.\d{3,})?")
+    return [one for one in bpy.data.materials if one.library is None and form.fullmatch(one.name)]
+
+
+def _paint(material: bpy.types.Material, rgb: tuple[float, float, float]) -> None:
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
     shader = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
     if shader is not None:  # or the user has made another material of it
-        shader.inputs["Base Color"].default_value = (*own[part], 1.0)
-    material.diffuse_color = (*(channel**0.6 for channel in own[part]), 1.0)
-    return material
+        shader.inputs["Base Color"].default_value = (*rgb, 1.0)
+    material.diffuse_color = (*(channel**0.6 for channel in rgb), 1.0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...beyond_mocap.errors import Cancelled, InputError
+from ...beyond_mocap.errors import Cancelled, InputError, told_time
 from .people import TEAMS, Person, Scenery
 
 if TYPE_CHECKING:
@@ -55,7 +55,8 @@ def scenery(
     ball = read_ball(course) if course.is_file() else None
     people, lines = _people(wanted, state, library, ball, (start, end), progress, cancelled)
     if not people:
-        raise InputError(wanted.folder, f"nobody is there from {start:g} to {end:g} s", "a time of play", *lines[:1])
+        found = f"nobody is there from {told_time(start)} to {told_time(end)} s"
+        raise InputError(wanted.folder, found, "a time of play", *lines[:1])
     length, width = map(float, state["pitch_m"])
     seen = Scenery(start, end, length, width, wanted.colours, tuple(people), _between(ball, start, end))
     return library, seen, tuple(lines)
@@ -79,7 +80,8 @@ def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
     first, last = float(state["from_s"]), float(state["to_s"])
     start, end = max(wanted.start, first), min(wanted.end or last, last)
     if end - start < 0.2:
-        found, expected = f"{wanted.start:g} to {wanted.end:g} s", f"a time within {first:g} to {last:g} s"
+        found = f"{told_time(wanted.start)} to {told_time(wanted.end)} s"
+        expected = f"a time within {told_time(first)} to {told_time(last)} s"
         raise InputError(wanted.folder, found, expected, "press Make Match for another")
     return start, end
 

@@ -12,7 +12,7 @@ from ...beyond_mocap.errors import InputError
 from .. import preferences
 from ..settings import absolute
 from .load import Wanted
-from .settings import AUTO, BeyondMocapMatch, colours_of
+from .settings import AUTO, BeyondMocapMatch, colours_of, typed
 
 
 def command(scene: bpy.types.Scene) -> list[str]:
@@ -36,14 +36,18 @@ def _asked(scene: bpy.types.Scene) -> list[str]:
     for option, path in (("--meta", match.metadata_file), ("--events", match.events_file)):
         out += [option, absolute(path)] if path else []
     out += ["--provider", match.provider] if match.provider != AUTO else []
+    if match.events_file:
+        out += ["--events-meta", absolute(match.events_metadata_file)] if match.events_metadata_file else []
+        out += ["--events-provider", match.events_provider] if match.events_provider != AUTO else []
     if 0.0 < match.end <= match.start:
-        raise InputError("match", f"To ({match.end:g} s) is not after From ({match.start:g} s)", "a later time",
+        found = f"To ({typed(match.end)} s) is not after From ({typed(match.start)} s)"
+        raise InputError("match", found, "a later time",
                          "set To, or set it to 0 for the match's end")
-    out += ["--from", f"{match.start:g}"] + (["--to", f"{match.end:g}"] if match.end else [])
+    out += ["--from", typed(match.start)] + (["--to", typed(match.end)] if match.end else [])
     out += _players(match)
     out += [] if match.solve_touches else ["--no-solve-touches"]
-    out += ["--fps", f"{settings.rate:g}", "--seed", str(settings.seed)]
-    return out + (["--unit", f"{settings.library_unit:g}"] if settings.library_unit else [])
+    out += ["--fps", typed(settings.rate), "--seed", str(settings.seed)]
+    return out + (["--unit", typed(settings.library_unit)] if settings.library_unit else [])
 
 
 def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
@@ -52,8 +56,9 @@ def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
     library = _library(settings)
     ticked = tuple(player.feed_id for player in match.players if player.use)
     ticked = ticked if len(ticked) < len(match.players) else ()
+    start, end = float(typed(match.start)), float(typed(match.end))
     unit, build = settings.library_unit or None, preferences.for_build(library)
-    return Wanted(folder, match.start, match.end, ticked, colours_of(match), library, unit, build)
+    return Wanted(folder, start, end, ticked, colours_of(match), library, unit, build)
 
 
 def folder_to_make(scene: bpy.types.Scene) -> str:
@@ -67,7 +72,7 @@ def folder_to_make(scene: bpy.types.Scene) -> str:
     if not os.access(home, os.W_OK):
         home = Path(bpy.app.tempdir)
     asked = hashlib.sha256("\0".join(_asked(scene)).encode()).hexdigest()[:6]
-    return str(home / f"{tracking.stem} {match.start:g}-{match.end:g} s {asked}")
+    return str(home / f"{tracking.stem} {typed(match.start)}-{typed(match.end)} s {asked}")
 
 
 def folder_to_show(scene: bpy.types.Scene) -> str:

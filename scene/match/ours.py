@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...beyond_mocap.errors import InputError
 from .people import TEAMS
 
 MARK = "beyond_mocap_match"
@@ -79,11 +80,17 @@ def meshes(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
 
 def clear(scene: bpy.types.Scene) -> None:
     """Take away all that is ours, with the actions and data that nothing else uses; emptied collections go too.
-    Actions stay that the user has made, or wants to keep (the shield beside their name)."""
+    Actions stay that the user has made, or wants to keep (the shield beside their name). What another scene shows too
+    is taken out of this one only. InputError where that cannot be done: both have it in a collection of the user's."""
     whole = root(scene)
-    if whole is None:
+    if whole is None or _let_go(scene, whole):
         return
+    others = {thing for other in _others(scene) for thing in other.objects}
     gone = [thing for thing in whole.all_objects if thing.get(MARK)]
+    for thing in others.intersection(gone):
+        for one in {whole, *whole.children_recursive}.intersection(thing.users_collection):
+            one.objects.unlink(thing)
+    gone = [thing for thing in gone if thing not in others]
     actions = {_action(owner) for thing in gone for owner in (thing, thing.data)} - {None}
     actions_of_users = [one for one in actions if not one.get(MARK) and one.library is None]
     data = {thing.data for thing in gone} - {None}
@@ -95,6 +102,25 @@ def clear(scene: bpy.types.Scene) -> None:
     for one in [*whole.children, whole]:
         if not one.all_objects and not one.children:
             bpy.data.collections.remove(one)
+
+
+def _others(scene: bpy.types.Scene) -> list[bpy.types.Scene]:
+    return [one for one in bpy.data.scenes if one != scene]
+
+
+def _let_go(scene: bpy.types.Scene, whole: bpy.types.Collection) -> bool:
+    """Take out of the scene what of our tree another scene has too; whether that was all of it."""
+    shared = {one for other in _others(scene) for one in other.collection.children_recursive}
+    tree = (scene.collection, *scene.collection.children_recursive)
+    held = [whole] if whole in shared else [one for one in whole.children if one.get(MARK) and one in shared]
+    ends = [(above, one) for one in held for above in tree if one in above.children[:]]
+    stuck = next((above for above, _ in ends if above in shared), None)
+    if stuck is not None:
+        found = f"holds the match {whole.name!r} in two scenes"
+        raise InputError(f"collection {stuck.name!r}", found, "one for each scene", "move the match out of it")
+    for above, one in ends:
+        above.children.unlink(one)
+    return whole in shared
 
 
 def _action(owner) -> bpy.types.Action | None:

@@ -55,7 +55,7 @@ def fill(match: BeyondMocapMatch, order: Read, read: "Match") -> None:
         match.tracking_file = as_setting(order.tracking)
         match.metadata_file = as_setting(order.metadata) if order.metadata else ""
         if match.read_of:
-            match.events_file = match.folder = match.made = ""
+            match.events_file = match.events_metadata_file = match.folder = match.made = ""
         match.start = math.floor(float(read.times[0]))
         match.end = min(match.start + FIRST, math.floor(10.0 * float(read.times[-1])) / 10.0)
         match.active = 0

@@ -4,16 +4,19 @@ file, known to undo."""
 from __future__ import annotations
 
 import bpy
+import numpy as np
 from bpy.props import (
     BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty,
 )
 
+from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.providers import PROVIDERS
 from .kits import USUAL, linear, repaint, written
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
 GIVEN = [(AUTO, "Guess", "By what the file looks like"), *((name, name.capitalize(), name) for name in PROVIDERS)]
+TOLD = [GIVEN[0], *((name, name.capitalize(), name) for name in EVENT_PROVIDERS)]
 KINDS = (
     ("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"),
 )
@@ -24,7 +27,7 @@ FIRST = 60.0
 def show_colours(match, _context) -> None:
     """New colours are seen at once on those who are shown."""
     if match.shown:
-        repaint(colours_of(match))
+        repaint(match.id_data, colours_of(match))
 
 
 class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
@@ -47,6 +50,11 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     events_file: StringProperty(
         name="Events", description="What happened, from a provider or as CSV; empty: found in the ball's course", **FILE
     )
+    events_metadata_file: StringProperty(
+        name="Events' Metadata", description="Lineups or metadata of the events; empty: a file beside them that fits",
+        **FILE,
+    )
+    events_provider: EnumProperty(name="Events' Provider", items=TOLD, description="Whose form the events have")
     provider: EnumProperty(name="Provider", items=GIVEN, description="Whose form the files have")
     folder: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
@@ -95,6 +103,11 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     shown_first: IntProperty(options={"HIDDEN"}, description="That frame")
     shown_rate: FloatProperty(options={"HIDDEN"}, description="Frames a second of the keys; 0: the scene's")
     shown: StringProperty(options={"HIDDEN"}, description="The folder that is shown; empty where none is")
+
+
+def typed(value: float) -> str:
+    """A float property as somebody has typed it: the shortest decimals that it keeps."""
+    return str(np.float32(value)).removesuffix(".0")
 
 
 CLASSES = (BeyondMocapMatchPlayer, BeyondMocapMatch)

@@ -35,8 +35,8 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Piece:
-    """One uncut piece: start, end s; place (3,) m of its seam on the ground; name: of the clip, short; lines: why it was
-    chosen."""
+    """One uncut piece: start, end s; place (3,) m of its seam on the ground; name: of the clip, short; lines: why it
+    was chosen."""
 
     start: float
     end: float
@@ -224,7 +224,8 @@ def _told(plan: "Plan", take: "Take", library: "Library | None"):
         for low, high in zip(edges, edges[1:]):
             name = short(take.clips[take.clip[low]], bool(take.mirrored[low]))
             shown = take.clip_frame[[low, high - 1]]
-            yield low / take.motion.fps, high / take.motion.fps, name, (name, f"frames {shown[0]:.0f} to {shown[1]:.0f}")
+            yield low / take.motion.fps, high / take.motion.fps, name, (name,
+                                                                        f"frames {shown[0]:.0f} to {shown[1]:.0f}")
         return
     for reason in _reasons(plan, take, library):
         name = short(reason.path, reason.mirrored)
@@ -249,7 +250,9 @@ def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
     from ...beyond_mocap.synthesis.why import PARTS
 
     lines = [name, f"frames {reason.shown[0]:.0f} to {reason.shown[1]:.0f}, played at {reason.rate:.2f} x"]
-    lines.append(f"cost {reason.cost:.2f}" + (f", {sum(reason.seam.values()):.2f} of it for the cut" if reason.seam else ""))
+    lines.append(
+        f"cost {reason.cost:.2f}" + (f", {sum(reason.seam.values()):.2f} of it for the cut" if reason.seam else "")
+    )
     both = {part: reason.costs.get(part, 0.0) + reason.seam.get(part, 0.0) for part in PARTS}
     dear = sorted((p for p in both.items() if abs(p[1]) >= 0.005), key=lambda part: -abs(part[1]))[:MOST_PARTS]
     lines += [f"{value:.2f}  {PARTS[part]}" for part, value in dear]

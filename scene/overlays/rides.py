@@ -1,7 +1,7 @@
 """What is drawn of riders: their own path and the new one, where they are on both, the original motion beside.
 
-Every shape hangs on the very motion or source that it was made of, so that one that is dragged is made anew only when it
-has been laid anew. Knows neither gpu nor how to draw.
+Every shape hangs on the very motion or source that it was made of, so that one that is dragged is made anew only when
+it has been laid anew. Knows neither gpu nor how to draw.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ ORIGINAL, NEW = colours.SKY, colours.ORANGE
 
 
 class Item(NamedTuple):
-    """One thing to draw. key: the same as long as it looks the same; meshes: makes it, in metres; world: where it goes."""
+    """One thing to draw. key: the same as long as it looks the same; meshes: makes it, in metres; world: where it
+    goes."""
 
     key: tuple
     meshes: Callable[[], list[Mesh]]
@@ -62,9 +63,13 @@ def _items(on: list[str], shown: riders.Shown, frame: float, world: Matrix) -> l
     if "path_new" in on:
         found.append(Item((ridden, "path"), lambda: new_path(ridden, shown.line), world))
     if "path_residuals" in on:
-        found.append(Item((source, "residuals"), lambda: residuals(source.motion, source.moving.origin, ORIGINAL), world))
+        found.append(
+            Item((source, "residuals"), lambda: residuals(source.motion, source.moving.origin, ORIGINAL), world)
+        )
         found.append(Item((ridden, "residuals"), lambda: residuals(ridden.motion, ridden.origin, NEW), world))
-        found.append(Item((source, "residual", was), lambda: residual(source.motion, source.moving.origin, was, ORIGINAL), world))
+        found.append(
+            Item((source, "residual", was), lambda: residual(source.motion, source.moving.origin, was, ORIGINAL), world)
+        )
         found.append(Item((ridden, "residual", row), lambda: residual(ridden.motion, ridden.origin, row, NEW), world))
     if "path_ghost" in on:
         found.append(Item((source, "ghost", was), lambda: figure(source, was), world))
@@ -86,7 +91,8 @@ def source_path(source: "RideSource", line: np.ndarray) -> list[Mesh]:
 
 def new_path(ridden: "Ridden", line: np.ndarray) -> list[Mesh]:
     """The new path, line (N, 3) m, thin, the part that is ridden wide, with a tick every second."""
-    return [_line(line, NEW, THIN, 0.6), *_ridden(ridden), _ticks(ridden.origin, ridden.heading, ridden.motion.fps, NEW)]
+    return [_line(line, NEW, THIN, 0.6), *_ridden(ridden),
+            _ticks(ridden.origin, ridden.heading, ridden.motion.fps, NEW)]
 
 
 def residuals(motion, origin: np.ndarray, colour) -> list[Mesh]:
@@ -113,7 +119,8 @@ def figure(source: "RideSource", row: int) -> list[Mesh]:
 def tracker(colour) -> list[Mesh]:
     """A ring with an arrow along X."""
     tip, back = ARROW, ARROW - 0.14
-    arrow = [(RING, 0.0, LIFT), (tip, 0.0, LIFT), (tip, 0.0, LIFT), (back, 0.08, LIFT), (tip, 0.0, LIFT), (back, -0.08, LIFT)]
+    arrow = [(RING, 0.0, LIFT), (tip, 0.0, LIFT), (tip, 0.0, LIFT), (back, 0.08, LIFT), (tip, 0.0, LIFT),
+             (back, -0.08, LIFT)]
     points = np.concatenate([shapes.circle((0.0, 0.0, LIFT), RING), np.array(arrow, np.float32)])
     return [Mesh("LINES", points, colours.repeated(colour, len(points)), WIDE)]
 

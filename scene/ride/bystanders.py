@@ -1,5 +1,5 @@
-"""Bystanders: bodies of a scene that ride no path, such as kept ones and players; where they are when, for riders to keep
-clear of them."""
+"""Bystanders: bodies of a scene that ride no path, such as kept ones and players; where they are when, for riders to
+keep clear of them."""
 
 from __future__ import annotations
 

@@ -70,7 +70,9 @@ class Carrier(ABC):
             raise InputError(f"armature {body.name}", "an override that cannot be edited", "an editable override",
                              "make it editable: Outliner, Library Override, Make")
         if body.mode == "EDIT":
-            raise InputError(f"armature {body.name}", "its bones are being edited", "object or pose mode", "leave edit mode (Tab)")
+            raise InputError(
+                f"armature {body.name}", "its bones are being edited", "object or pose mode", "leave edit mode (Tab)"
+            )
         channels.check_free(body)
 
     @abstractmethod
@@ -110,11 +112,12 @@ class Carrier(ABC):
         return digest.digest()
 
     def ours(self) -> tuple[bpy.types.Action, object]:
-        """Our action and its slot; a copy where another object plays it too: a duplicate of a rider is a rider of its own.
-        InputError where the armature plays another."""
+        """Our action and its slot; a copy where another object plays it too: a duplicate of a rider is a rider of its
+        own. InputError where the armature plays another."""
         found, slot = channels.playing(self.body)
         if found is None or not found.get(MARK):
-            raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride", "that action",
+            raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride",
+                             "that action",
                              "choose it again in the Action Editor, or press Leave")
         linked.refuse(found)
         if found.users - found.use_fake_user < 2:
@@ -135,7 +138,9 @@ class PlainCarrier(Carrier):
     def _original(self) -> tuple[bpy.types.Action, object]:
         found, slot = self.source()
         if found is None:
-            raise InputError(f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action")
+            raise InputError(
+                f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action"
+            )
         return found, slot
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
@@ -189,7 +194,9 @@ class PlainCarrier(Carrier):
         body, motion, names = self.body, ridden.motion, ridden.motion.skeleton.names
         bones = [body.pose.bones[name] for name in names]
         changed = _changed(read.motion, motion)
-        joints = [joint for joint, bone in enumerate(bones) if changed[joint] or sheet.added(_path(bone, bone.rotation_mode))]
+        joints = [
+            joint for joint, bone in enumerate(bones) if changed[joint] or sheet.added(_path(bone, bone.rotation_mode))
+        ]
         lie, rest = armature.placement_now(body, scene), armature.rest_rotations(body, names)
         turns, at_rest = motion.rotations[:, joints], rest[joints]
         if joints and joints[0] == 0:

@@ -35,9 +35,9 @@ _SPARE = 0.002  # metres by which a fitted curve is longer than the path, so tha
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A curve object as it is now. points: (P, 9) m of Bezier points and their left and right handles, or (P, 4) of other
-    control points and their weights, in the world; still: bytes that are others only where it is edited, not where it is
-    animated; notes: lines for the user."""
+    """A curve object as it is now. points: (P, 9) m of Bezier points and their left and right handles, or (P, 4) of
+    other control points and their weights, in the world; still: bytes that are others only where it is edited, not
+    where it is animated; notes: lines for the user."""
 
     name: str
     kind: str
@@ -82,7 +82,9 @@ class Drawn:
 def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
     """A curve object as it is drawn now. InputError where it has no line."""
     if drawn is None or drawn.name not in scene.objects:
-        raise InputError("new path", "its curve is gone from the scene", "a curve object", "choose another, or make a New Curve")
+        raise InputError(
+            "new path", "its curve is gone from the scene", "a curve object", "choose another, or make a New Curve"
+        )
     if drawn.type != "CURVE":
         raise InputError(f"object {drawn.name}", "no curve", "a curve object (Add > Curve)", "choose another")
     lines = [spline for spline in drawn.data.splines if len(points_of(spline)) > 1]
@@ -214,8 +216,8 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
 
 
 def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Bezier points (P, 3) on the path and their left and right handles, closer together where it bends, so that they are
-    within _CLOSE of it. Corners that were cut would make the motion run ahead of itself from there on."""
+    """Bezier points (P, 3) on the path and their left and right handles, closer together where it bends, so that they
+    are within _CLOSE of it. Corners that were cut would make the motion run ahead of itself from there on."""
     from ...beyond_mocap.motion.arc_length import ArcLength
 
     arc = ArcLength(path)

@@ -1,4 +1,5 @@
-"""What the figures of a ride say, as lines for the panel: columns "name: value", what is aimed for, "met" or "missed"."""
+"""What the figures of a ride say, as lines for the panel: columns "name: value", what is aimed for, "met" or
+"missed"."""
 
 from __future__ import annotations
 
@@ -7,8 +8,8 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 
-FIGURES = (  # name, path in the figures, factor, form, unit; what is aimed for: a number, a path of the recording's own, or
-    # that where it is more than a number
+FIGURES = (  # name, path in the figures, factor, form, unit; what is aimed for: a number, a path of the recording's
+    # own, or that where it is more than a number
     ("Way", "metres", 1.0, "{:.1f}", " m", None),
     ("Time", "seconds", 1.0, "{:.1f}", " s", None),
     ("Off the path", "root_error_m.mean", 100.0, "{:.2f}", " cm", ("root_error_own_m.mean", 0.005)),

@@ -1,7 +1,7 @@
 """A rider's keys, in place: only channels that are other than they were are written, all others stay as the original's.
 
-What of an action stands as in the original and what was written is remembered by the action's digest, so that undo, which
-brings back action and digest together, is known without looking at the keys.
+What of an action stands as in the original and what was written is remembered by the action's digest, so that undo,
+which brings back action and digest together, is known without looking at the keys.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ def places(curve: bpy.types.FCurve) -> np.ndarray:
 
 
 def begin(made: bpy.types.Action, identifier: str, mark: str) -> None:
-    """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original come off."""
+    """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original come
+    off."""
     for slot in [slot for slot in made.slots if slot.identifier != identifier]:
         made.slots.remove(slot)
     for name in [name for name in made.keys() if name.startswith("beyond_mocap")]:
@@ -79,7 +80,8 @@ class Sheet:
 
 
 def lay(sheet: Sheet, first: int, wanted: dict[Place, np.ndarray], now: str, digest: str) -> None:
-    """Let the channels hold the wanted values (N,) on whole frames from `first` on, and all others what the original has.
+    """Let the channels hold the wanted values (N,) on whole frames from `first` on, and all others what the original
+    has.
 
     now: the digest that the action carries; digest: the one that it will carry.
     """
@@ -138,7 +140,8 @@ def rotation(mode: str, pose: np.ndarray) -> np.ndarray:
 
 
 def _continuous(turns: np.ndarray) -> np.ndarray:
-    """Euler angles (N, 3) without jumps: each rotation has two sets of angles, (a, b, c) and (a + pi, pi - b, c + pi)."""
+    """Euler angles (N, 3) without jumps: each rotation has two sets of angles, (a, b, c) and (a + pi, pi - b, c +
+    pi)."""
     other = np.stack([turns[:, 0] + np.pi, np.pi - turns[:, 1], turns[:, 2] + np.pi], axis=1)
     stay = np.abs(quaternion.wrapped(turns[1:] - turns[:-1])).sum(axis=1)
     swap = np.abs(quaternion.wrapped(other[1:] - turns[:-1])).sum(axis=1)

@@ -1,8 +1,9 @@
 """Riders follow while curves, settings and grounds are edited, also while a point is being dragged.
 
-Blender says after every change that something has changed; a timer, which runs during modal operators too, then compares
-what each rider's motion was made of with what there is now. Our own writes are such changes too, and find nothing to do.
-An edit from a timer is no undo step: undo brings back the state before, and riders are brought up to date with that.
+Blender says after every change that something has changed; a timer, which runs during modal operators too, then
+compares what each rider's motion was made of with what there is now. Our own writes are such changes too, and find
+nothing to do. An edit from a timer is no undo step: undo brings back the state before, and riders are brought up to
+date with that.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ def mark() -> None:
 
 
 def follow(scene: bpy.types.Scene) -> int:
-    """Bring all live riders of a scene up to date; how many had to be. What cannot be is told at the rider, whose motion
-    stays as it was."""
+    """Bring all live riders of a scene up to date; how many had to be. What cannot be is told at the rider, whose
+    motion stays as it was."""
     count = 0
     for body in riders(scene):
         if not body.beyond_mocap_ride.live or body.mode == "EDIT" or body.library is not None:

@@ -19,15 +19,16 @@ from .settings import choose, riders, wishes
 
 _SAMPLES = 400
 MOST_FRAMES = 40_000
-"""Frames that a cycled motion lasts at most, some: worked out again while a path is dragged, more would take minutes."""
+"""Frames that a cycled motion lasts at most, some: worked out again while a path is dragged, more would take
+minutes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
     """What was worked out for a rider: plain numbers, in metres of the scene's world.
 
-    first: scene frame of the first frame; fps; source, path, ridden: of the core; number: another each time it is worked
-    out; told: lines for the user.
+    first: scene frame of the first frame; fps; source, path, ridden: of the core; number: another each time it is
+    worked out; told: lines for the user.
     """
 
     first: int
@@ -78,8 +79,8 @@ def shown(body: bpy.types.Object) -> Shown | None:
 def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) -> bool:
     """Bring a rider's motion up to date with curve and settings; whether anything had to be worked out.
 
-    anew: look at everything and write it, whether or not it seems to have changed. InputError, and the motion as it was,
-    where that makes no sense just now.
+    anew: look at everything and write it, whether or not it seems to have changed. InputError, and the motion as it
+    was, where that makes no sense just now.
     """
     from ...beyond_mocap.ride import RideSettings, ride
 
@@ -137,7 +138,8 @@ def _check_length(known, path, settings) -> None:
     if frames > MOST_FRAMES:
         minutes = frames / motion.fps / 60.0
         raise InputError("cycle", f"the motion would last {minutes:.0f} minutes on a path of {metres:.0f} m",
-                         f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most", "shorten the path, or switch Cycle off")
+                         f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
+                         "shorten the path, or switch Cycle off")
 
 
 def begin(
@@ -150,7 +152,9 @@ def begin(
 
     scene, ride, carrier = context.scene, body.beyond_mocap_ride, carrier_of(body)
     if ride.on:
-        raise InputError(f"armature {body.name}", "it rides already", "one that does not", "edit its curve, or press Leave")
+        raise InputError(
+            f"armature {body.name}", "it rides already", "one that does not", "edit its curve, or press Leave"
+        )
     carrier.check()
     context.view_layer.update()
     source.unsure()
@@ -196,8 +200,8 @@ def new_curve(
     context: bpy.types.Context, body: bpy.types.Object, shape: str = "FITTED", count: int = 0, kind: str = "BEZIER",
     degree: int = 3,
 ) -> bpy.types.Object:
-    """Another curve for a rider; shape: one of `curve.SHAPES`. The one before is removed where it was made here and nobody
-    else rides it. Returns the new one."""
+    """Another curve for a rider; shape: one of `curve.SHAPES`. The one before is removed where it was made here and
+    nobody else rides it. Returns the new one."""
     from ...beyond_mocap.ride import RideSettings
 
     scene, ride = context.scene, body.beyond_mocap_ride
@@ -213,7 +217,8 @@ def new_curve(
     except BeyondMocapError:
         bpy.data.curves.remove(made.data)
         raise
-    if before is not None and before.get(curve.MARK) and not any(r.beyond_mocap_ride.curve == before for r in riders(scene)):
+    ridden = any(rider.beyond_mocap_ride.curve == before for rider in riders(scene))
+    if before is not None and before.get(curve.MARK) and not ridden:
         name, data = before.name, before.data
         bpy.data.objects.remove(before)
         if not data.users:
@@ -262,7 +267,8 @@ def end(body: bpy.types.Object) -> None:
 
 
 def leave(*bodies: bpy.types.Object | None) -> list[str]:
-    """Riders among these play their originals again, because something else is to be done with them; a line for each."""
+    """Riders among these play their originals again, because something else is to be done with them; a line for
+    each."""
     riding = [body for body in bodies if body is not None and body.beyond_mocap_ride.on]
     for body in riding:
         may_end(body)
@@ -272,7 +278,8 @@ def leave(*bodies: bpy.types.Object | None) -> list[str]:
 
 
 def standing(body: bpy.types.Object | None):
-    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where that is not known."""
+    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where that is not
+    known."""
     now = shown(body) if body is not None else None
     if now is None:
         return None

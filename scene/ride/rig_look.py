@@ -21,8 +21,8 @@ _WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotati
 @dataclass(frozen=True, eq=False)
 class Look:
     """F frames of an armature. frames (F,) of the scene; lies (F, 4, 4): the object in the world, units; basis
-    (F, 4, 4): its own share of that; bones: their names; poses (F, B, 4, 4) in the armature's space; modes: rotation mode
-    of each bone; channels: channel -> (F, B, n); others: data path -> (F, n) of what else was asked for."""
+    (F, 4, 4): its own share of that; bones: their names; poses (F, B, 4, 4) in the armature's space; modes: rotation
+    mode of each bone; channels: channel -> (F, B, n); others: data path -> (F, n) of what else was asked for."""
 
     frames: np.ndarray
     lies: np.ndarray

@@ -32,10 +32,10 @@ _CARRIERS = {
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What is known of a rig's body. controls: part -> the bone that moves it; shown: part -> the bone that shows it, in
-    the order of joints; follows: bones that a part follows or that go with it -> the part; trunk: likewise controls that
-    bend the spine beside its own ones (Rigify's chest), where they are animated; root: the bone that carries all, "" where
-    there is none. A rig that is no standing body has one part, "body", and no controls."""
+    """What is known of a rig's body. controls: part -> the bone that moves it; shown: part -> the bone that shows it,
+    in the order of joints; follows: bones that a part follows or that go with it -> the part; trunk: likewise controls
+    that bend the spine beside its own ones (Rigify's chest), where they are animated; root: the bone that carries all,
+    "" where there is none. A rig that is no standing body has one part, "body", and no controls."""
 
     controls: dict[str, str]
     shown: dict[str, str]

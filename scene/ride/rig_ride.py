@@ -28,8 +28,8 @@ _STAYS, _LEAST_WAY = 0.5, 1.0  # of the body's way, metres: what falls behind by
 
 @dataclass(frozen=True)
 class Control:
-    """One control. own, turn, place, axes: the groups with which it goes, on which its turn and its place ride, and along
-    which its location is counted; slides: whether its location is written."""
+    """One control. own, turn, place, axes: the groups with which it goes, on which its turn and its place ride, and
+    along which its location is counted; slides: whether its location is written."""
 
     name: str
     own: str
@@ -41,8 +41,8 @@ class Control:
 
 @dataclass(frozen=True, eq=False)
 class Moves:
-    """For each group of a rig what carries it from the source to where it is now: x -> turn (x - before) + after, arrays
-    (N, 4), (N, 3), (N, 3) metres."""
+    """For each group of a rig what carries it from the source to where it is now: x -> turn (x - before) + after,
+    arrays (N, 4), (N, 3), (N, 3) metres."""
 
     turn: dict[str, np.ndarray]
     before: dict[str, np.ndarray]
@@ -125,7 +125,8 @@ class Rows:
 class Carried:
     """A rig that has been looked at: what its controls are, and what they have to be."""
 
-    def __init__(self, rig: bpy.types.Object, parts: Parts, seen: Look, rides: Rides, object_keyed: bool, motion: Motion,
+    def __init__(self, rig: bpy.types.Object, parts: Parts, seen: Look, rides: Rides, object_keyed: bool,
+                 motion: Motion,
                  units: float):
         """motion: what the parts show. object_keyed: whether the object itself is animated."""
         self.seen, self.parts, self.motion, self.units = seen, parts, motion, units
@@ -133,7 +134,9 @@ class Carried:
         self.places, self.world = forward_kinematics(motion)
         self.lie = rotations(seen.lies), seen.lies[:, :3, 3] / units
         self.object_goes = object_keyed and self._travels(self.lie[1])
-        self.group: dict[str, str] = {bone: part for table in (parts.shown, parts.controls) for part, bone in table.items()}
+        self.group: dict[str, str] = {
+            bone: part for table in (parts.shown, parts.controls) for part, bone in table.items()
+        }
         self.controls = self._sorted(rig, rides)
         self.tables = {control.name: self._table(rig, control) for control in self.controls}
 
@@ -177,8 +180,8 @@ class Carried:
         return [*found, *self._bent(rig)]
 
     def _bent(self, rig: bpy.types.Object) -> list[Control]:
-        """Bones of legs and arms that inverse kinematics without a pole bends: the solver starts from the bones' own turns,
-        so that the pose that is wanted is set as where it starts."""
+        """Bones of legs and arms that inverse kinematics without a pole bends: the solver starts from the bones' own
+        turns, so that the pose that is wanted is set as where it starts."""
         found = []
         for bone in rig.pose.bones:
             for one in bone.constraints:
@@ -192,8 +195,8 @@ class Carried:
         return found
 
     def _table(self, rig: bpy.types.Object, control: Control) -> dict[str, np.ndarray]:
-        """Over the source's frames: turn of the control's base and its own (F, 4), its place and its base's (F, 3) m, the
-        what turns metres into its location's units (F, 3, 3), its location (F, 3)."""
+        """Over the source's frames: turn of the control's base and its own (F, 4), its place and its base's (F, 3) m,
+        the what turns metres into its location's units (F, 3, 3), its location (F, 3)."""
         number = self.seen.number(control.name)
         places, turn = in_world(self.seen, [number], self.units)
         own, location = self.seen.own(number), self.seen.channels["location"][:, number]
@@ -251,10 +254,11 @@ class Carried:
         return forward_kinematics(Motion(self.motion.skeleton, root, local, self.motion.fps))
 
     def changed(self, moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
-        """Of each control what has to be other than in the source: (bone, "turn") -> sign-continuous rotations (N, 4) of
-        its own channels, (bone, "location") -> (N, 3)."""
+        """Of each control what has to be other than in the source: (bone, "turn") -> sign-continuous rotations (N, 4)
+        of its own channels, (bone, "location") -> (N, 3)."""
         some = [one for one in self.controls if not all(moves.alike(one.own, other) for other in (one.turn, one.place))]
-        return (self._turned(some, moves, rows) | self._slid([one for one in some if one.slides], moves, rows)) if some else {}
+        return (self._turned(some, moves, rows)
+                | self._slid([one for one in some if one.slides], moves, rows)) if some else {}
 
     def _turned(self, some: list[Control], moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
         back, own, pose = rows.remembered(("turns", *some), lambda: self._turns_at(some, rows))
@@ -276,7 +280,8 @@ class Carried:
 
         def all_of(what: str) -> np.ndarray:
             """A table of all of them: (N, C, ...)."""
-            made = lambda: np.stack([rows.numbers((one, what), self.tables[one.name][what]) for one in some], axis=1)  # noqa: E731
+            made = lambda: np.stack([rows.numbers((one, what), self.tables[one.name][what]) for one in some],
+                                    axis=1)  # noqa: E731
             return rows.remembered((what, *some), made)
 
         rests = moves.points([one.place for one in some], all_of("rests"))

@@ -24,7 +24,8 @@ _MOST = 20000  # frames
 class RigSource:
     """A rig as it moves.
 
-    motion: what it shows, metres, at the scene's rate; start: the scene frame of its first frame; told: lines for the user.
+    motion: what it shows, metres, at the scene's rate; start: the scene frame of its first frame; told: lines for the
+    user.
     """
 
     def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
@@ -44,8 +45,8 @@ class RigSource:
         self.seen, self.carried = seen, Carried(rig, parts, seen, rides, played.object_keyed, self.motion, self.units)
 
     def values(self, ridden, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
-        """(Data path, index) -> values (N,) on the frames from `start` on: what has to be other than in the source, and,
-        where the frames shown are not the source's own, all that is animated."""
+        """(Data path, index) -> values (N,) on the frames from `start` on: what has to be other than in the source,
+        and, where the frames shown are not the source's own, all that is animated."""
         rows, above = self.rows(ridden), self._above(len(ridden.motion), rig)
         moves = self.carried.moves(ridden.motion, ridden.rigid, rows, above @ rows.numbers("basis", self.seen.basis))
         found = {} if rows.same and not self.played.layered else {p: self.own(*p, rows) for p in self.played.places}
@@ -68,13 +69,16 @@ class RigSource:
         return self._rows
 
     def own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
-        """A channel's values (N,) in the source on the source's frames that are shown; None where it was not looked at."""
+        """A channel's values (N,) in the source on the source's frames that are shown; None where it was not looked
+        at."""
         return rows.remembered((path, index), lambda: self._own(path, index, rows))
 
     def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
         if (table := self.seen.others.get(path)) is not None:
             table = table[:, min(index, table.shape[1] - 1)]
-            return table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers((path, index, "is"), table)
+            return (
+                table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers((path, index, "is"), table)
+            )
         match = BONE.match(path)
         if match is None or match[2] not in POSED or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
             return None
@@ -101,7 +105,8 @@ class RigSource:
         basis = np.linalg.inv(above) @ now
         mode = rig.rotation_mode
         delta = quaternion.from_matrix(np.array(
-            rig.delta_rotation_quaternion.to_matrix() if mode == "QUATERNION" else rig.delta_rotation_euler.to_matrix()))
+            rig.delta_rotation_quaternion.to_matrix() if mode == "QUATERNION"
+            else rig.delta_rotation_euler.to_matrix()))
         turned = quaternion.continuous(quaternion.multiply(quaternion.inverse(delta), rig_parts.rotations(basis)))
         table = self.seen.others.get(channel_of(mode), np.array([list(getattr(rig, channel_of(mode)))]))
         location = basis[:, :3, 3] - np.array(rig.delta_location)
@@ -114,9 +119,9 @@ def columns(path: str, values: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
 
 
 class Played:
-    """What an armature plays: frames (F,) of the scene; places: (data path, index) of what is animated, of the object and
-    its bones; others: data paths that are not a bone's place or turn; bones: those that are animated; switches: whether
-    other settings are; layered: see `layered`; told."""
+    """What an armature plays: frames (F,) of the scene; places: (data path, index) of what is animated, of the object
+    and its bones; others: data paths that are not a bone's place or turn; bones: those that are animated; switches:
+    whether other settings are; layered: see `layered`; told."""
 
     def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
         """InputError where it plays nothing."""
@@ -131,14 +136,17 @@ class Played:
             found |= own
             ends.append(extent or channels.keyed_range(own))
         if not found:
-            raise InputError(f"armature {rig.name}", "it plays no action", "a motion", "import one, or choose an action")
+            raise InputError(
+                f"armature {rig.name}", "it plays no action", "a motion", "import one, or choose an action"
+            )
         first = int(np.ceil(min(a for a, _ in ends) - 1e-4))
         last = int(np.floor(max(b for _, b in ends) + 1e-4))
         if any(_cycles(curve) for curve in found.values()):
             first, last = min(first, scene.frame_start), max(last, scene.frame_end)
             self.told.append(f"its curves repeat: the motion is what they show from frame {first} to {last}")
         if not 1 <= last - first < _MOST:
-            raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frame{'s' * (last > first)}", f"2 to {_MOST} frames",
+            raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frame{'s' * (last > first)}",
+                             f"2 to {_MOST} frames",
                              "key more than one frame")
         self.frames = np.arange(first, last + 1)
         self.layered = layered(rig)
@@ -146,7 +154,9 @@ class Played:
         self.others = {path for path in paths if not _is_posed(path) and _resolves(rig, path)}
         self.places = {place for place in found if _is_posed(place[0]) or place[0] in self.others}
         self.switches = any(path not in _OBJECT for path in self.others)
-        self.bones = {bpy.utils.unescape_identifier(m[1]) for path in paths if (m := BONE.match(path)) and m[2] in POSED}
+        self.bones = {
+            bpy.utils.unescape_identifier(m[1]) for path in paths if (m := BONE.match(path)) and m[2] in POSED
+        }
         self.object_keyed = bool(_OBJECT & paths)
 
 

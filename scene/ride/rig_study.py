@@ -23,9 +23,9 @@ STATIC = -1
 
 @dataclass(frozen=True, eq=False)
 class Rides:
-    """Of n controls: turn_of, place_of (n,): the number of the bone among `carriers` on which turn and place ride, STATIC
-    where nothing carries them; firm (n,): whether their channels move them at all and one bone carries them; parent_of
-    (n,): the same as turn_of of the bone above."""
+    """Of n controls: turn_of, place_of (n,): the number of the bone among `carriers` on which turn and place ride,
+    STATIC where nothing carries them; firm (n,): whether their channels move them at all and one bone carries them;
+    parent_of (n,): the same as turn_of of the bone above."""
 
     controls: list[str]
     carriers: list[str]
@@ -36,7 +36,8 @@ class Rides:
 
 
 def study(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> Rides:
-    """On which of the controls and `shown` bones each of the controls rides, as the rig stands at the side scene's frame.
+    """On which of the controls and `shown` bones each of the controls rides, as the rig stands at the side scene's
+    frame.
 
     The rig is as it was when this returns. side: the scene in which it is alone.
     """
@@ -58,7 +59,8 @@ def study(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], sho
     count, still = len(controls), np.broadcast_to(np.eye(3), turn[:, 0].shape)
     base = turn[:, :count] @ np.swapaxes(own, -1, -2)
     parents = np.stack([turn[:, watched.index(name)] if name else still for name in above], axis=1)
-    rests = np.stack([_rests(rig, name, poses[:, watched.index(up)] if up else None) for name, up in zip(controls, above)],
+    rests = np.stack([_rests(rig, name, poses[:, watched.index(up)] if up else None)
+                      for name, up in zip(controls, above)],
                      axis=1)
     for number, name in enumerate(controls):
         if len(rig.pose.bones[name].constraints):  # such as Child Of, which come before the bone's own channels
@@ -133,9 +135,11 @@ def moves(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], sho
 
 @contextmanager
 def _still(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str]):
-    """The rig without its animation but otherwise as it stands, limits off; gives a function (own rotations (n, 4), bones,
-    locations (n, 3)) -> their poses (W, 4, 4). All is as it was afterwards."""
-    limits = [c for name in controls for c in rig.pose.bones[name].constraints if c.type.startswith("LIMIT") and not c.mute]
+    """The rig without its animation but otherwise as it stands, limits off; gives a function (own rotations (n, 4),
+    bones, locations (n, 3)) -> their poses (W, 4, 4). All is as it was afterwards."""
+    limits = [
+        c for name in controls for c in rig.pose.bones[name].constraints if c.type.startswith("LIMIT") and not c.mute
+    ]
     kept = Kept(rig, controls, [])
     try:
         kept.silence()

@@ -1,5 +1,5 @@
-"""Carriers of armatures whose bones do not simply play what they show: control rigs, inverse kinematics, objects that move,
-several bones that travel, NLA strips, modifiers; and which armatures are plain.
+"""Carriers of armatures whose bones do not simply play what they show: control rigs, inverse kinematics, objects that
+move, several bones that travel, NLA strips, modifiers; and which armatures are plain.
 
 A rig is looked at once, frame by frame (`rig_source`); while a path is dragged all is arithmetic.
 """
@@ -44,7 +44,9 @@ class RigCarrier(Carrier):
         if self.body.type != "ARMATURE" or not len(self.body.data.bones):
             raise InputError(f"armature {self.body.name}", "no bones", "an armature with bones")
         if not self.ride.on and self.source()[0] is None and not playing_strips(self.body):
-            raise InputError(f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action")
+            raise InputError(
+                f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action"
+            )
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
         body = self.body

@@ -22,7 +22,8 @@ FRAMES = (
     ("tangent", "Tangent", "Offsets turn with the full tangent: on a slope the whole body is tilted"),
     ("absolute", "Absolute", "Offsets keep their direction in the world: in a bend the body goes sideways"),
 )
-WISHES = ("fit", "degree", "by_arc_length", "speed", "end", "cycle", "frame", "plant", "lean", "bends", "slopes", "climbs",
+WISHES = ("fit", "degree", "by_arc_length", "speed", "end", "cycle", "frame", "plant", "lean", "bends", "slopes",
+          "climbs",
           "delay")
 
 
@@ -67,19 +68,22 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
     before: PointerProperty(type=BeyondMocapBefore, description="The original motion, put aside")
     fit: EnumProperty(name="Original Path", items=FITS, default="spline", description="How the original path is found")
     degree: IntProperty(
-        name="Degree", default=13, min=1, max=200, soft_max=60, description="Of the polynomial that is the original path"
+        name="Degree", default=13, min=1, max=200, soft_max=60,
+        description="Of the polynomial that is the original path"
     )
     by_arc_length: BoolProperty(
-        name="Keep Speed", default=True,
-        description="As many metres of path in each frame as the original goes; off: the whole motion is spread over the "
-        "whole path",
+        name="Keep Speed",
+        default=True,
+        description="As many metres of path in each frame as the original goes; off: the whole motion is spread over "
+        "the whole path",
     )
     speed: FloatProperty(
         name="Speed", default=1.0, min=0.05, max=20.0, soft_min=0.25, soft_max=4.0, precision=2,
         description="How many times as fast the motion plays, steps and all",
     )
     end: EnumProperty(
-        name="Path Too Short", items=ENDS, default="stop", description="What happens where the path ends before the motion"
+        name="Path Too Short", items=ENDS, default="stop",
+        description="What happens where the path ends before the motion"
     )
     cycle: BoolProperty(
         name="Cycle", description="Repeat the motion's best loop of steps until the path ends, its seams blended"
@@ -93,22 +97,30 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
         name="Slow in Bends", description="Tight bends slow the motion as they slow people (two-thirds power law)"
     )
     slopes: BoolProperty(name="Follow Slopes", default=True, description="Feet follow the slope of the path or ground")
-    climbs: BoolProperty(name="Slow on Slopes", description="Slopes slow the motion as they slow walkers (Tobler's function)")
+    climbs: BoolProperty(
+        name="Slow on Slopes", description="Slopes slow the motion as they slow walkers (Tobler's function)"
+    )
     delay: FloatProperty(
         name="Delay", default=0.0, min=0.0, max=86399.0, soft_max=10.0, precision=2, unit="TIME_ABSOLUTE",
         description="Seconds that the motion begins later",
     )
-    added: FloatProperty(name="Added", options={"HIDDEN"}, description="Seconds of the delay that keep it apart from others")
+    added: FloatProperty(
+        name="Added", options={"HIDDEN"}, description="Seconds of the delay that keep it apart from others"
+    )
     detours: StringProperty(
         name="Detours", default="[]",
         description="Lateral detours as JSON: [arc in metres, width in metres, offset in metres to the left] each",
     )
-    agreed: StringProperty(name="Agreed", options={"HIDDEN"}, description="Digest of what it was when riders were asked to keep apart")
+    agreed: StringProperty(
+        name="Agreed", options={"HIDDEN"}, description="Digest of what it was when riders were asked to keep apart"
+    )
     ground: PointerProperty(
         name="Ground", type=bpy.types.Object, poll=is_mesh,
         description="A mesh whose surface the feet follow; none: the height of the path itself",
     )
-    live: BoolProperty(name="Live", default=True, description="Follow the curve and these settings while they are edited")
+    live: BoolProperty(
+        name="Live", default=True, description="Follow the curve and these settings while they are edited"
+    )
     told: StringProperty(name="Told", options={"HIDDEN"}, description="Lines about what to look at")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the result as JSON")
 

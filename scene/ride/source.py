@@ -1,5 +1,5 @@
-"""A rider's original motion relative to its own path, worked out once and kept as long as nothing of it changes; and the
-ground that its feet follow."""
+"""A rider's original motion relative to its own path, worked out once and kept as long as nothing of it changes; and
+the ground that its feet follow."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ class Source:
 
 
 _sources: dict[int, Source] = {}  # by session_uid of the armature
-_keys: dict[int, tuple[int, bytes]] = {}  # likewise: the original action and its keys' digest, until they may have changed
+# likewise: the original action and its keys' digest, until they may have changed
+_keys: dict[int, tuple[int, bytes]] = {}
 _refused: dict[int, tuple[bytes, str]] = {}  # likewise: digest of what could not be read, and why
 _grounds: dict[int, tuple[bytes, object]] = {}  # by session_uid of the mesh object
 
@@ -73,8 +74,8 @@ def of(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
 
 
 def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> bytes:
-    """Another where the ground's mesh, as it is shown, is another; not where its object is animated: it counts where it lay
-    when something was edited. InputError where it was deleted."""
+    """Another where the ground's mesh, as it is shown, is another; not where its object is animated: it counts where it
+    lay when something was edited. InputError where it was deleted."""
     if ground is None:
         return b""
     if ground.name not in scene.objects:
@@ -95,7 +96,8 @@ def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> by
 def ground_notes(ground: bpy.types.Object | None) -> tuple[str, ...]:
     """Lines for the user."""
     moves = ground is not None and curve.is_animated(ground)
-    return (f"ground {ground.name}: it moves; feet follow it as it lay when it was chosen or edited last",) if moves else ()
+    return (f"ground {ground.name}: it moves; feet follow it as it lay when it was chosen or edited last",
+            ) if moves else ()
 
 
 def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: bytes):

@@ -1,8 +1,8 @@
 """The ball of a throw or kick: in the hand or lying, then its flight; and its trajectory as a curve.
 
 Up to the last frame before the release a thrown ball is carried by the hand's bone (`passes.possession`), so that it
-stays in the hand when somebody works on the pose. What it did before goes on until then (`earlier`), and comes back with
-`give_back`.
+stays in the hand when somebody works on the pose. What it did before goes on until then (`earlier`), and comes back
+with `give_back`.
 """
 
 from __future__ import annotations

@@ -23,8 +23,8 @@ _GUESS, _ROUNDS = 1.0, 5  # s of flight to a target that moves, to begin with; h
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an order: the throw, the whole motion that shows it, the ball's way from the release on (seconds 0), seconds
-    until it passes the target, and m/s^3 of the seams and what is usual there."""
+    """What came of an order: the throw, the whole motion that shows it, the ball's way from the release on (seconds 0),
+    seconds until it passes the target, and m/s^3 of the seams and what is usual there."""
 
     order: Order
     thrown: "Thrown"
@@ -75,8 +75,8 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
 
 
 def _met(order: Order, own: "Motion", start: float, joined: bool, progress, cancelled):
-    """The order as it can be kept, its throw, and the seconds that the ball flies: it leaves later where the throw would
-    begin before the scene and may wait, and a target that moves is met where it is by then."""
+    """The order as it can be kept, its throw, and the seconds that the ball flies: it leaves later where the throw
+    would begin before the scene and may wait, and a target that moves is met where it is by then."""
     seconds = _GUESS
     for _ in range(_ROUNDS):
         target = order.targets[min(round(seconds * order.fps), len(order.targets) - 1)]
@@ -96,13 +96,13 @@ def _when(asked: Order, order: Order, joined: "Joined") -> list[str]:
     first = round(order.begins * order.fps)
     begins = round(joined.start * order.fps) + joined.first
     if order.at != asked.at:
-        return [f"the ball leaves on frame {round(order.at * order.fps)}: sooner the {order.act} would begin before the "
-                f"scene's first frame"]
+        return [f"the ball leaves on frame {round(order.at * order.fps)}: sooner the {order.act} would begin before "
+                f"the scene's first frame"]
     if begins >= first:
         return []
     frame = round(order.at * order.fps) + first - begins
-    return [f"the {order.act} begins on frame {begins}, before the scene's first frame {first}: set On Frame to {frame} "
-            "or more to see all of it"]
+    return [f"the {order.act} begins on frame {begins}, before the scene's first frame {first}: set On Frame to "
+            f"{frame} or more to see all of it"]
 
 
 def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", float]:

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 class Order:
     """One throw or kick.
 
-    body: the armature's name. act: "throw" or "kick". skeleton: the armature's; of a control rig, that of the bones that
-    `table` (part -> bone) names, and lift: m that its soles are thicker than that skeleton's. own: what it plays, in the scene's
-    metres, None where it only stands; first: the scene frame with which that begins. place (2,) m and facing rad: where
-    an armature without a motion stands. targets (F, 3) m: where the target is on each frame from the release on, (1, 3)
-    of one that stands. at: s of the release; begins: s of the scene's first frame; waits: whether the release may come
-    later so that the throw does not begin before that. speed: m/s, 0 as usual. ball_place: (3,) m where a ball that is
-    kicked lies, None where it suits. model: a file, "" for what comes with the extension. folder:
+    body: the armature's name. act: "throw" or "kick". skeleton: the armature's; of a control rig, that of the bones
+    that `table` (part -> bone) names, and lift: m that its soles are thicker than that skeleton's. own: what it plays,
+    in the scene's metres, None where it only stands; first: the scene frame with which that begins. place (2,) m and
+    facing rad: where an armature without a motion stands. targets (F, 3) m: where the target is on each frame from the
+    release on, (1, 3) of one that stands. at: s of the release; begins: s of the scene's first frame; waits: whether
+    the release may come later so that the throw does not begin before that. speed: m/s, 0 as usual. ball_place: (3,) m
+    where a ball that is kicked lies, None where it suits. model: a file, "" for what comes with the extension. folder:
     the library's, "" for none; build: how it is built. digest: of the settings.
     """
 
@@ -94,12 +94,15 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
     unit = common.library_unit or None
     return Order(
         body=body.name, act=act, limb=limb, skeleton=skeleton, table=rig.table if rig is not None else {},
-        lift=rigged.lift(rig) if rig is not None and act == "throw" else 0.0, fps=fps, own=own, first=first, place=place,
+        lift=rigged.lift(rig) if rig is not None and act == "throw" else 0.0, fps=fps, own=own, first=first,
+        place=place,
         facing=facing, targets=targets.places(scene, wish, frame), at=frame / fps, begins=scene.frame_start / fps,
         waits=waits, speed=wish.speed,
-        kind=USUAL[act] if wish.kind == "usual" else wish.kind, ball_place=_lies(scene, wish, frame) if act == "kick" else None,
+        kind=USUAL[act] if wish.kind == "usual" else wish.kind,
+        ball_place=_lies(scene, wish, frame) if act == "kick" else None,
         model=absolute(model) if model else "", seed=wish.seed, folder=folder, unit=unit,
-        library=session.library(folder, unit) if folder else None, build=preferences.for_build(folder) if folder else {},
+        library=session.library(folder, unit) if folder else None,
+        build=preferences.for_build(folder) if folder else {},
         digest=digest(scene, body, act),
     )
 

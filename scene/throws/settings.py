@@ -1,4 +1,5 @@
-"""What the panel "Throws & Kicks" shows, and what an armature keeps of its throw. Saved with the file, known to undo."""
+"""What the panel "Throws & Kicks" shows, and what an armature keeps of its throw. Saved with the file, known to
+undo."""
 
 from __future__ import annotations
 
@@ -58,8 +59,10 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
     )
     seed: IntProperty(name="Seed", default=0, min=0, description="Another number, another throw at the same target")
     live: BoolProperty(
-        name="Follow", default=True,
-        description="Make what is shown again when the target is dragged or these settings are edited, until it is kept",
+        name="Follow",
+        default=True,
+        description="Make what is shown again when the target is dragged or these settings are edited, "
+        "until it is kept",
     )
     made_of: StringProperty(name="Made of", options={"HIDDEN"}, description="The settings that it was made of")
     asked: IntProperty(name="Asked", options={"HIDDEN"}, description="The frame on which it was made to leave")

@@ -32,7 +32,9 @@ def places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.nda
         found = np.array([_stands(target).translation]) * metres
     below = found[:, 2].min()
     if below < 0.0:
-        raise InputError("target", f"{-below:.2f} m below the ground", "one on or above it, where balls get", "raise it")
+        raise InputError(
+            "target", f"{-below:.2f} m below the ground", "one on or above it, where balls get", "raise it"
+        )
     return found
 
 

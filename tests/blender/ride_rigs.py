@@ -1,4 +1,5 @@
-"""Armatures of many kinds that walk the same walk, for path editing: each returns an armature object with its motion."""
+"""Armatures of many kinds that walk the same walk, for path editing: each returns an armature object with its
+motion."""
 
 import bpy
 import numpy as np
@@ -39,8 +40,9 @@ def travel(rig, bone, frames, places, interpolation="LINEAR"):
 
 
 def walk_ik(pole=True, root=True, cog=True, every=1, frames=FRAMES, interpolation="LINEAR"):
-    """A control rig made by hand: deform legs with inverse kinematics on foot controls with poles, a COG above the hips, a
-    root above all, the feet and poles hanging on the root. Feet stand still in turn; keys on every `every`th frame."""
+    """A control rig made by hand: deform legs with inverse kinematics on foot controls with poles, a COG above the
+    hips, a root above all, the feet and poles hanging on the root. Feet stand still in turn; keys on every `every`th
+    frame."""
     above = "root" if root else None
     extra = [("foot_ctrl.L", above, "left foot"), ("foot_ctrl.R", above, "right foot")]
     names = {part: name for part, name in rigs.UNREAL.items()}
@@ -157,7 +159,8 @@ def quadruped():
 
 
 def with_props(rig, hips):
-    """A sword that hangs on nothing and goes with the body, keyed; a bag on the hips; a stone that stays where it lies."""
+    """A sword that hangs on nothing and goes with the body, keyed; a bag on the hips; a stone that stays where it
+    lies."""
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
     bones = rig.data.edit_bones

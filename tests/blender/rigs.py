@@ -28,9 +28,11 @@ MIXAMO = {
 }
 MIXAMO = {part: f"mixamorig:{name}" for part, name in MIXAMO.items()}
 UNREAL = {
-    "hips": "pelvis", "spine1": "spine_01", "spine2": "spine_02", "spine3": "spine_03", "neck": "neck_01", "head": "head",
+    "hips": "pelvis", "spine1": "spine_01", "spine2": "spine_02", "spine3": "spine_03", "neck": "neck_01",
+    "head": "head",
     **{f"{s} {part}": f"{name}_{s[0]}" for s in ("left", "right") for part, name in {
-        "shoulder": "clavicle", "upper_arm": "upperarm", "lower_arm": "lowerarm", "hand": "hand", "fingers": "middle_01",
+        "shoulder": "clavicle", "upper_arm": "upperarm", "lower_arm": "lowerarm", "hand": "hand",
+        "fingers": "middle_01",
         "upper_leg": "thigh", "lower_leg": "calf", "foot": "foot", "toe": "ball"}.items()},
 }
 NAMELESS = {part: f"Bone.{number:03d}" for number, part in enumerate(UNREAL)}
@@ -53,7 +55,9 @@ def places(arms=0.0, legs=0.0):
             point = _about(Vector(ENDS[part]), Vector(SIDE[pivot][1]), angle)
             ends[f"{side} {part}"] = Vector((sign * point.x, point.y, point.z))
     drop = Vector((0, 0, found["left toe"][1].z - SIDE["toe"][1][2]))  # it stands on the ground, legs spread or not
-    return {part: (parent, head - drop) for part, (parent, head) in found.items()}, {p: e - drop for p, e in ends.items()}
+    return {part: (parent, head - drop) for part, (parent, head) in found.items()}, {
+        p: e - drop for p, e in ends.items()
+    }
 
 
 def _about(point, pivot, angle):
@@ -83,7 +87,8 @@ def build(names, name="Rig", arms=0.0, legs=0.0, tails="along", rolls=0.0, units
         if part not in names:
             continue
         bone = data.edit_bones.new(names[part])
-        child = next((h for p, (above, h) in found.items() if above == part and p.rpartition(" ")[0] == part.rpartition(" ")[0]), None)
+        child = next((h for p, (above, h) in found.items() if above == part
+                      and p.rpartition(" ")[0] == part.rpartition(" ")[0]), None)
         tail = child if child is not None else ends.get(part, head + Vector((0, 0, 0.1)))
         if tails == "stray":
             tail = head + Vector((0.03, 0.05, 0.02))
@@ -113,7 +118,8 @@ def mixamo(**options):
 def unreal(**options):
     """The mannequin: A pose, root bone, twist bones and IK bones, stray tails as the FBX importer leaves them."""
     extra = [(f"{limb}_twist_01_{s}", f"{limb}_{s}", f"{side} {part}") for side, s in (("left", "l"), ("right", "r"))
-             for limb, part in (("upperarm", "lower_arm"), ("lowerarm", "hand"), ("thigh", "lower_leg"), ("calf", "foot"))]
+             for limb, part in (("upperarm", "lower_arm"), ("lowerarm", "hand"), ("thigh", "lower_leg"),
+                                ("calf", "foot"))]
     extra += [("ik_foot_root", "root", None), ("ik_foot_l", "ik_foot_root", "left foot"),
               ("ik_foot_r", "ik_foot_root", "right foot"), ("ik_hand_root", "root", None),
               ("ik_hand_gun", "ik_hand_root", "right hand"), ("ik_hand_l", "ik_hand_gun", "left hand"),
@@ -142,7 +148,11 @@ def metahuman(**options):
         for limb in ("upperarm", "thigh", "calf", "lowerarm"):
             for what in (f"{limb}_correctiveRoot_{side}", f"{limb}_twist_02_{side}"):
                 bone = bones.new(what)
-                bone.head, bone.tail, bone.parent = bones[f"{limb}_{side}"].head, bones[f"{limb}_{side}"].tail, bones[f"{limb}_{side}"]
+                bone.head, bone.tail, bone.parent = (
+                    bones[f"{limb}_{side}"].head,
+                    bones[f"{limb}_{side}"].tail,
+                    bones[f"{limb}_{side}"],
+                )
     bpy.ops.object.mode_set(mode="OBJECT")
     return rig
 

@@ -31,7 +31,9 @@ def players(scene, tmp_path):
         path = tmp_path / f"player{number}.csv"
         np.savetxt(path, rows, fmt="%.3f", delimiter=",", header="time_s,x_m,y_m", comments="")
     (tmp_path / "player1.txt").write_text("1 3 dribble\n5 kick right\n8 kick\n")
-    bpy.ops.beyond_mocap.import_tracking(directory=str(tmp_path), files=[{"name": "player1.csv"}, {"name": "player2.csv"}])
+    bpy.ops.beyond_mocap.import_tracking(
+        directory=str(tmp_path), files=[{"name": "player1.csv"}, {"name": "player2.csv"}]
+    )
     scene.beyond_mocap.active_player = 0
     return scene.beyond_mocap.players
 
@@ -212,9 +214,11 @@ class Library(SimpleNamespace):
 def test_what_the_library_holds_is_known_with_and_without_mirrored_clips(room, scene, tmp_path):
     words = np.array([[1, 0], [1, 0], [0, 1], [1, 1]], bool)
     library = Library(
-        folder=str(tmp_path), clips=[SimpleNamespace(mirrored=False, made=False), SimpleNamespace(mirrored=True, made=False),
+        folder=str(tmp_path), clips=[SimpleNamespace(mirrored=False, made=False),
+                                     SimpleNamespace(mirrored=True, made=False),
                                      SimpleNamespace(mirrored=False, made=True)],
-        keys=[SimpleNamespace(clip=0, words=frozenset({"kick", "right"})), SimpleNamespace(clip=1, words=frozenset({"kick", "left"})),
+        keys=[SimpleNamespace(clip=0, words=frozenset({"kick", "right"})),
+              SimpleNamespace(clip=1, words=frozenset({"kick", "left"})),
               SimpleNamespace(clip=2, words=frozenset({"header"}))],
         frames=SimpleNamespace(words=words, vocabulary=("walking", "dribble"), clip=np.array([0, 0, 1, 2])),
     )
@@ -274,8 +278,10 @@ def test_the_part_of_an_editor_that_nothing_lies_over(room):
     area = SimpleNamespace(regions=[main, *others])
     assert room("areas").free_part(area, main) == (64, 4, 576, 570)
     assert room("areas").free_part(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
-    assert room("areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 120)]), main) == (4, 134, 796, 596)
-    assert room("areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 400)]), main) == (314, 4, 796, 596)
+    assert room("areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 120)]),
+                                   main) == (4, 134, 796, 596)
+    assert room("areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 400)]),
+                                   main) == (314, 4, 796, 596)
 
 
 def test_the_list_in_the_corner_can_be_folded(room):

@@ -54,7 +54,9 @@ def test_unit_scale(core, armature, scale_length):
     knee = body.data.bones["LeftLeg"].head_local - body.data.bones["LeftUpLeg"].head_local
     assert knee.length * scale_length == pytest.approx(np.linalg.norm([0.01, 0, 0.41]), rel=1e-5)
     assert_same(armature.skeleton_of(body, bpy.context.scene), skeleton, 0.0)
-    assert min(min(b.head_local.z, b.tail_local.z) for b in body.data.bones) == pytest.approx(0, abs=1e-5 / scale_length)
+    assert min(min(b.head_local.z, b.tail_local.z) for b in body.data.bones) == pytest.approx(
+        0, abs=1e-5 / scale_length
+    )
 
 
 def test_scaled_object(core, armature):

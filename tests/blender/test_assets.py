@@ -109,7 +109,8 @@ def test_catalogs_are_added_to_those_above(assets, tmp_path):
 
 
 @pytest.mark.parametrize("words, catalog", [
-    (("kick", "right", "running"), "Kick"), (("walking", "front"), "Walking"), (("getting_up", "back"), "Getting up"), ((), "Other"),
+    (("kick", "right", "running"), "Kick"), (("walking", "front"), "Walking"), (("getting_up", "back"), "Getting up"),
+    ((), "Other"),
 ])
 def test_catalog_by_words(assets, words, catalog):
     assert assets.catalog_of(words) == f"Beyond Mocap/{catalog}"

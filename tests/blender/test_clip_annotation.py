@@ -123,7 +123,8 @@ def test_proposals_beside_what_is_there(rooms, library):
 
 def test_nothing_chosen_or_something_else():
     bpy.ops.object.armature_add()
-    for operator in (bpy.ops.beyond_mocap.propose_words, bpy.ops.beyond_mocap.save_words, bpy.ops.beyond_mocap.remove_clip):
+    for operator in (bpy.ops.beyond_mocap.propose_words, bpy.ops.beyond_mocap.save_words,
+                     bpy.ops.beyond_mocap.remove_clip):
         with pytest.raises(RuntimeError, match="clip"):
             operator()
     with pytest.raises(RuntimeError, match="No clip is listed"):
@@ -138,7 +139,8 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     words = tmp_path / "words.txt"
     words.write_text("0 1 walking front\n0.5 kick left\n")
     assert_one_step(bpy.ops.beyond_mocap.import_words, directory=str(tmp_path), files=[{"name": "words.txt"}])
-    assert [row.words for row in rooms["clip_annotation"].said(bpy.context.object)] == [("walking", "front"), ("kick", "left")]
+    assert [row.words for row in rooms["clip_annotation"].said(bpy.context.object)] == [("walking", "front"),
+                                                                                        ("kick", "left")]
     bpy.ops.beyond_mocap.remove_clip()
     track = tmp_path / "player.csv"
     track.write_text("time_s,x_m,y_m\n" + "".join(f"{i / 10},{i / 10},0\n" for i in range(40)))

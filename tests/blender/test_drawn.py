@@ -135,7 +135,9 @@ def test_what_moves_is_a_track_in_its_own_frames(scene, drawn, kind):
     track = drawn.read(scene, chosen)
     assert scene.frame_current == 20
     assert track.times[0] == pytest.approx(5.0) and track.times[-1] == pytest.approx(7.0)
-    np.testing.assert_allclose(track.positions, np.column_stack([1 + 3 * (track.times - 5), 0 * track.times + 2]), atol=1e-4)
+    np.testing.assert_allclose(
+        track.positions, np.column_stack([1 + 3 * (track.times - 5), 0 * track.times + 2]), atol=1e-4
+    )
 
 
 def test_what_has_to_be_played_is_left_alone_where_the_scene_must_stand_still(scene, drawn, core):
@@ -173,7 +175,8 @@ def test_live_begins_the_same_wish_once(extension, scene):
     now = live._seen["changed"]
     try:
         assert live.due(scene, now + 0.2) == ("Drawn", "quick")
-        assert [live.due(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4  # it failed, or was cancelled
+        # it failed, or was cancelled
+        assert [live.due(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4
         player.height = 1.8
         live.mark()
         assert live.due(scene, live._seen["changed"] + 0.2) == ("Drawn", "quick")

@@ -406,7 +406,8 @@ ROWS = {
     "map_bones": Row("rig", prepare=unmapped),
     "match_camera": Row("imported", lambda places: {"which": "EYES", "player": "home_7"}, a_shown_match),
     "match_export": Row(
-        "imported", lambda places: {"filepath": f"{places.out}/match.fbx", "format": "FBX"}, a_shown_match, changes=False
+        "imported", lambda places: {"filepath": f"{places.out}/match.fbx", "format": "FBX"}, a_shown_match,
+        changes=False
     ),
     "match_second": Row("imported", lambda places: {"seconds": 3.0, "player": "home_7"}, a_shown_match),
     "mirror": Row("accepted"),

@@ -16,7 +16,8 @@ READERS = {
     ".fbx": lambda path: bpy.ops.import_scene.fbx(filepath=path, automatic_bone_orientation=False, anim_offset=0.0),
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".usdc": lambda path: bpy.ops.wm.usd_import(filepath=path),
-    ".bvh": lambda path: bpy.ops.import_anim.bvh(filepath=path, global_scale=0.01, update_scene_fps=False, use_fps_scale=False),
+    ".bvh": lambda path: bpy.ops.import_anim.bvh(filepath=path, global_scale=0.01, update_scene_fps=False,
+                                                 use_fps_scale=False),
 }
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 
@@ -217,7 +218,8 @@ def test_several_at_once(rooms, body, tmp_path):
 
 def test_the_file_browser_shows_the_name_that_is_written(rooms, extension):
     operator = importlib.import_module(f"{extension.__name__}.operators.export_motion").BEYOND_MOCAP_OT_export_motion
-    for name, format, written in (("walk", "FBX", "walk.fbx"), ("walk.glb", "FBX", "walk.fbx"), ("a.v2", "GLB", "a.v2.glb")):
+    for name, format, written in (("walk", "FBX", "walk.fbx"), ("walk.glb", "FBX", "walk.fbx"),
+                                  ("a.v2", "GLB", "a.v2.glb")):
         asked = SimpleNamespace(filepath=f"/here/{name}", format=format)
         assert operator.check(asked, None) and asked.filepath == f"/here/{written}"
         assert not operator.check(asked, None)

@@ -58,10 +58,14 @@ def test_a_known_motion_comes_back_within_a_millimetre(core, rooms, tmp_path, en
     assert back.fps == pytest.approx(fps) and len(takes) == 1
     assert set(back.skeleton.names) == set(motion.skeleton.names)
     assert len(back) == len(motion)
-    apart = np.linalg.norm(places_of(core, back, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1)
+    apart = np.linalg.norm(
+        places_of(core, back, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
+    )
     assert apart.max() < 1e-3, apart.max()
     clip = rooms["foreign"].as_clip(back)
-    apart = np.linalg.norm(places_of(core, clip.motion, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1)
+    apart = np.linalg.norm(
+        places_of(core, clip.motion, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
+    )
     assert apart.max() < 1e-3, apart.max()
 
 
@@ -76,7 +80,9 @@ def test_an_armature_that_is_turned_moved_and_scaled(core, rooms, tmp_path, endi
     apart = np.linalg.norm(places_of(core, back, motion.skeleton.names)[:, 0] - motion.root_positions, axis=-1)
     assert apart.max() < 1e-3
     grown = np.linalg.norm(back.skeleton.offsets[back.skeleton.index("LeftLeg")])
-    assert grown == pytest.approx(2.0 * np.linalg.norm(motion.skeleton.offsets[motion.skeleton.index("LeftLeg")]), rel=1e-3)
+    assert grown == pytest.approx(
+        2.0 * np.linalg.norm(motion.skeleton.offsets[motion.skeleton.index("LeftLeg")]), rel=1e-3
+    )
 
 
 def test_several_animations_of_one_file(core, rooms, tmp_path):
@@ -117,7 +123,9 @@ def test_the_operator_gives_what_the_functions_give(core, rooms, tmp_path):
     rig = bpy.context.object
     assert rig.name == "clip" and [o.type for o in bpy.data.objects] == ["ARMATURE"]
     read = rooms["action"].read(rig, bpy.context.scene)
-    apart = np.linalg.norm(places_of(core, read, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1)
+    apart = np.linalg.norm(
+        places_of(core, read, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
+    )
     assert apart.max() < 1e-3
 
 

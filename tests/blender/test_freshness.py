@@ -32,7 +32,8 @@ def test_nothing_is_out_of_date_at_first(renew, made, ready):  # noqa: F811
 
 @pytest.mark.parametrize("change, line", [
     (lambda settings, match: setattr(settings, "alpha", 0.5), "choices in step 3"),
-    (lambda settings, match: (match / "player1.csv").write_text((match / "player1.csv").read_text().replace(",0.0", ",0.1")),
+    (lambda settings, match: (match / "player1.csv").write_text((match / "player1.csv").read_text().replace(",0.0",
+                                                                                                            ",0.1")),
      "track"),
     (lambda settings, match: setattr(settings, "track_window", 2.0), "choices"),
     (lambda settings, match: bpy.data.objects.remove(settings.players[0].body), "body has been deleted"),
@@ -124,9 +125,13 @@ def test_a_stretch_by_what_is_selected(made, session):  # noqa: F811
     track = made.body.animation_data.nla_tracks["Beyond Mocap"]
     for number, strip in enumerate(track.strips):
         strip.select = number == 2
-    before, seconds = session.made(made.take).take, [(f - 1) / 30 for f in (track.strips[2].frame_start, track.strips[2].frame_end)]
+    before, seconds = session.made(made.take).take, [
+        (f - 1) / 30 for f in (track.strips[2].frame_start, track.strips[2].frame_end)
+    ]
     assert bpy.ops.beyond_mocap.resynthesize_stretch() == {"FINISHED"}
-    off = np.any(before.motion.rotations != session.made(made.take).take.motion.rotations, axis=(1, 2)).nonzero()[0] / 30
+    off = (
+        np.any(before.motion.rotations != session.made(made.take).take.motion.rotations, axis=(1, 2)).nonzero()[0] / 30
+    )
     assert len(off) and off.min() > seconds[0] - 2.0 and off.max() < seconds[1] + 2.0
     assert made.result.state == "PREVIEW"
 

@@ -49,7 +49,8 @@ def test_a_folder_is_listed_without_being_built(listed):
 
 @pytest.mark.parametrize("asked, found", [
     ("", ["kicks/low.bvh", "other.bvh", "walk.bvh"]),
-    ("kick", ["kicks/low.bvh"]), ("low right", ["kicks/low.bvh"]), ("WALK", ["walk.bvh"]), ("low left", []), ("oth", ["other.bvh"]),
+    ("kick", ["kicks/low.bvh"]), ("low right", ["kicks/low.bvh"]), ("WALK", ["walk.bvh"]), ("low left", []),
+    ("oth", ["other.bvh"]),
 ])
 def test_what_is_looked_for(listed, asked, found):
     listed.find = asked

@@ -104,6 +104,30 @@ def test_the_command_that_makes_it(place):
     assert "--workers" not in room("order").command(bpy.context.scene)
 
 
+def test_what_goes_with_the_events_is_asked_for_where_there_are_events(place):
+    match = a_match(place, "")
+    match.events_metadata_file, match.events_provider = str(place / "f7.xml"), "opta"
+    assert "--events-meta" not in room("order").command(bpy.context.scene)
+    match.events_file = str(place / "f24.xml")
+    text = " ".join(room("order").command(bpy.context.scene))
+    assert f"--events-meta {place / 'f7.xml'} --events-provider opta" in text
+
+
+def test_no_digit_of_a_late_time_is_lost(place, core):
+    match = a_match(place, "")
+    match.start, match.end = 1234.567, 2700.04
+    bpy.context.scene.beyond_mocap.rate = 30000 / 1001
+    order = room("order")
+    text = " ".join(order.command(bpy.context.scene))
+    assert "--from 1234.567 --to 2700.04" in text and "--fps 29.97003" in text
+    assert " 1234.567-2700.04 s " in order.folder_to_make(bpy.context.scene)
+    wanted = order.wanted(bpy.context.scene, "folder")
+    assert (wanted.start, wanted.end) == (1234.567, 2700.04)
+    match.start, match.end = 2700.04, 1234.567
+    with pytest.raises(core("errors").InputError, match=r"To \(1234.567 s\) is not after From \(2700.04 s\)"):
+        order.command(bpy.context.scene)
+
+
 def test_what_is_made_is_shown_where_the_ball_is(place, made):
     """Ball and players of the made match are where the planted truth has them: at every touch of the two players."""
     match = shown_again(place, made)

@@ -206,6 +206,73 @@ def test_actions_that_somebody_keeps_stay(room, scenery):
     assert kept == {"Mine", "Kept"}
 
 
+def second_scene(name="Second"):
+    """Another scene, which is the context's from now on."""
+    scene = bpy.data.scenes.new(name)
+    bpy.context.window.scene = scene
+    return scene
+
+
+def shirt_colours(room, scene):
+    """Team -> rounded colour of what its first player wears, number and shirt."""
+    out = {}
+    for body in room("ours").bodies(scene):
+        for mesh in (thing.data for thing in body.children):
+            for material in mesh.materials:
+                if "shirt" in material.name or "number" in material.name:
+                    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+                    rgb = tuple(round(share, 2) for share in shader.inputs["Base Color"].default_value[:3])
+                    out[body[room("ours").PLAYER], material.name.split(".")[0].split()[-1]] = rgb
+    return out
+
+
+def test_two_matches_in_one_file_wear_their_own_colours(room, scenery):
+    from dataclasses import replace
+
+    first = shown(room, scenery)
+    before = shirt_colours(room, first)
+    second = second_scene()
+    shown(room, replace(scenery, colours={"home": "#101010", "away": "#FFFFFF"}))
+    assert shirt_colours(room, first) == before
+    after = shirt_colours(room, second)
+    assert after["h10", "shirt"] != before["h10", "shirt"] and after["h10", "number"] != before["h10", "number"]
+    room("kits").repaint(second, {"home": "#00FF00", "away": "#FFFFFF"})
+    assert shirt_colours(room, first) == before and shirt_colours(room, second)["h10", "shirt"] == (0.0, 1.0, 0.0)
+    count = len(bpy.data.materials)
+    shown(room, scenery)
+    assert len(bpy.data.materials) == count  # its own are worn again
+
+
+@pytest.mark.parametrize("linked", ["whole", "part", "player"])
+def test_what_another_scene_shows_too_stays_there(room, scenery, linked):
+    first = shown(room, scenery)
+    ours, second = room("ours"), bpy.data.scenes.new("Second")
+    home = next(one for one in ours.root(first).children if one[ours.MARK] == "home")
+    if linked == "player":
+        second.collection.objects.link(ours.bodies(first)[0])
+    else:
+        second.collection.children.link(ours.root(first) if linked == "whole" else home)
+    there = {thing.name for thing in second.objects}
+    shown(room, scenery)
+    assert {thing.name for thing in second.objects} == there
+    assert len(ours.bodies(first)) == 4 and not there & {thing.name for thing in first.objects}
+    ours.clear(first)
+    assert {thing.name for thing in second.objects} == there and not ours.bodies(first)
+
+
+def test_a_collection_of_the_users_that_two_scenes_have_is_told(room, core, scenery):
+    first = shown(room, scenery)
+    ours, second = room("ours"), bpy.data.scenes.new("Second")
+    above, whole = bpy.data.collections.new("Above"), ours.root(first)
+    first.collection.children.unlink(whole)
+    above.children.link(whole)
+    for scene in (first, second):
+        scene.collection.children.link(above)
+    with pytest.raises(core("errors").InputError, match="'Above': holds the match 'Match' in two scenes"):
+        ours.clear(first)
+    assert len(ours.bodies(first)) == 4
+
+
 def test_a_match_linked_from_another_file_is_left_alone(room, scenery, tmp_path):
     shown(room, scenery)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))

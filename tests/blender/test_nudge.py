@@ -49,7 +49,8 @@ def select(drawn, *which):
             point.select = True
 
 
-STEPS = {"LEFT": (-1, 0, 0), "RIGHT": (1, 0, 0), "FORTH": (0, 1, 0), "BACK": (0, -1, 0), "UP": (0, 0, 1), "DOWN": (0, 0, -1)}
+STEPS = {"LEFT": (-1, 0, 0), "RIGHT": (1, 0, 0), "FORTH": (0, 1, 0), "BACK": (0, -1, 0), "UP": (0, 0, 1),
+         "DOWN": (0, 0, -1)}
 
 
 @pytest.mark.parametrize("kind", ["BEZIER", "NURBS", "POLY"])
@@ -61,7 +62,9 @@ def test_the_selected_points_go_one_step_and_no_other(kind):
         select(drawn, 1, 2)
         assert bpy.ops.beyond_mocap.nudge_points(direction=direction, step=0.25) == {"FINISHED"}
         moved = places(drawn) - before
-        assert np.allclose(moved[[1, 2]], 0.25 * np.array(way), atol=1e-5) and np.allclose(moved[[0, 3]], 0.0, atol=1e-6)
+        assert np.allclose(moved[[1, 2]], 0.25 * np.array(way), atol=1e-5) and np.allclose(
+            moved[[0, 3]], 0.0, atol=1e-6
+        )
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.01])
@@ -137,7 +140,8 @@ def test_our_keys_are_free_in_blender_s_own_configurations():
     ours = {(entry.key, frozenset(entry.modifiers)) for entry in keymap.ENTRIES
             if entry.operator in ("beyond_mocap.nudge_points", "beyond_mocap.path_camera")}
     assert len(ours) == 8
-    everywhere = {"Window", "Screen", "Frames", "3D View", "3D View Generic", "Object Mode", "Object Non-modal", "Pose", "Curve"}
+    everywhere = {"Window", "Screen", "Frames", "3D View", "3D View Generic", "Object Mode", "Object Non-modal", "Pose",
+                  "Curve"}
     for table in tables:
         taken = {(item[1]["type"], frozenset(held for held in ("ctrl", "shift", "alt", "oskey") if item[1].get(held)))
                  for name, _, content in table.generate_keymaps(table.Params()) if name in everywhere

@@ -34,7 +34,8 @@ def hill(count=240):
 
 
 def seen(camera, places):
-    """Where points (N, 3) in Blender's units are in a camera's picture, 0 to 1 from its lower left corner, and how far."""
+    """Where points (N, 3) in Blender's units are in a camera's picture, 0 to 1 from its lower left corner, and how
+    far."""
     bpy.context.view_layer.update()
     return np.array([world_to_camera_view(bpy.context.scene, camera, Vector(place)) for place in places.tolist()])
 
@@ -71,7 +72,9 @@ def test_the_last_one_follows_and_looks_along_the_way(cameras):
         scene.frame_set(frame)
         place = places[frame - 1]
         picture = seen(camera, np.array([place, place + [0.0, 0.0, 1.8]]))
-        assert (np.abs(picture[:, 0] - 0.5) < 0.2).all() and (picture[:, 1] > 0.02).all() and (picture[:, 1] < 0.98).all()
+        assert (
+            (np.abs(picture[:, 0] - 0.5) < 0.2).all() and (picture[:, 1] > 0.02).all() and (picture[:, 1] < 0.98).all()
+        )
         ahead = np.array(places[frame] - place) / np.linalg.norm(places[frame] - place)
         assert np.dot(place - np.array(camera.matrix_world.translation), ahead) > 3.0
 
@@ -100,7 +103,9 @@ def test_again_only_those_are_laid_that_nobody_has_touched(cameras):
     assert cameras.found(scene, "QUARTER") is not None
     scene.frame_set(30)
     bpy.context.view_layer.update()
-    assert cameras.found(scene, "BEHIND").matrix_world.translation.x < -10.0, "the focus runs along the new path all the same"
+    assert (
+        cameras.found(scene, "BEHIND").matrix_world.translation.x < -10.0
+    ), "the focus runs along the new path all the same"
     assert len([c for c in bpy.data.collections if c.get(cameras.MARK)]) == 1 and len(scene.objects) == 5
 
 
@@ -123,7 +128,9 @@ def test_laid_twice_leaves_one_action(cameras):
 
 def test_a_way_that_is_one_point_and_one_that_is_vertical_have_their_cameras(cameras):
     for places in (np.zeros((3, 3)), np.stack([np.zeros(9), np.zeros(9), np.linspace(0.0, 3.0, 9)], axis=1)):
-        cameras.set_up(bpy.context.scene, cameras.Route(places, np.arange(len(places)) + 1.0, places, np.zeros(len(places))))
+        cameras.set_up(
+            bpy.context.scene, cameras.Route(places, np.arange(len(places)) + 1.0, places, np.zeros(len(places)))
+        )
         for kind in cameras.KINDS:
             assert np.isfinite(cameras.found(bpy.context.scene, kind).matrix_world).all()
 

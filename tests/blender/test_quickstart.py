@@ -1,4 +1,5 @@
-"""The file that an animator opens first: small, free of anybody's paths, and three buttons lead to two moving players."""
+"""The file that an animator opens first: small, free of anybody's paths, and three buttons lead to two moving
+players."""
 
 import importlib
 import pathlib
@@ -20,7 +21,9 @@ def test_three_buttons(extension, tmp_path):
     paths += [path for player in settings.players for path in (player.tracking_file, player.annotation_file)]
     paths += [player.dot.beyond_mocap_dot.tracking_file for player in settings.players]
     assert len(paths) == 7 and all(path.startswith("//") for path in paths)
-    rooms = {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("plans", "strips", "tracks")}
+    rooms = {
+        name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("plans", "strips", "tracks")
+    }
     for player in settings.players:
         track = rooms["tracks"].read_track(settings, player)
         on_disk = rooms["plans"].written_words(player, settings.rate, track)

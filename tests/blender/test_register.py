@@ -8,7 +8,8 @@ import pytest
 
 TAB = "Beyond Mocap"
 HEAVY = {"scipy", "sklearn", "kloppy", "c3d", "lxml", "joblib", "matplotlib"}
-# A fresh process with this session's profile: enable, tell what is loaded, end without Blender's own ending (which may hang).
+# A fresh process with this session's profile: enable, tell what is loaded, end without Blender's own ending (which may
+# hang).
 ENABLE = """
 import os, sys
 import bpy, addon_utils

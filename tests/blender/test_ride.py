@@ -1,4 +1,5 @@
-"""Riders: a motion on a curve in Blender, the original given back to the bit, live as by hand, and told what is wrong."""
+"""Riders: a motion on a curve in Blender, the original given back to the bit, live as by hand, and told what is
+wrong."""
 
 import importlib
 import pathlib
@@ -40,7 +41,8 @@ def bits(part, body):
     action, slot = channels.playing(body)
     keys = {place: [values.tobytes() for values in channels.keys_of(curve).values()]
             for place, curve in channels.curves(action, slot).items()}
-    stands = [(bone.rotation_mode, *bone.location, *bone.rotation_quaternion, *bone.rotation_euler) for bone in body.pose.bones]
+    stands = [(bone.rotation_mode, *bone.location, *bone.rotation_quaternion, *bone.rotation_euler)
+              for bone in body.pose.bones]
     return action.name, slot.identifier, keys, stands, tuple(body.location), tuple(body.rotation_euler)
 
 
@@ -81,7 +83,9 @@ def test_on_its_own_curve_the_motion_is_nearly_its_own_and_leave_gives_back_ever
     before, was = bits(part, body), [pelvis(body, frame) for frame in (1, 20, 40)]
     assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
     drawn = bpy.context.object
-    assert drawn.type == "CURVE" and drawn == body.beyond_mocap_ride.curve and len(drawn.data.splines[0].bezier_points) > 3
+    assert (
+        drawn.type == "CURVE" and drawn == body.beyond_mocap_ride.curve and len(drawn.data.splines[0].bezier_points) > 3
+    )
     assert body.animation_data.action.name != before[0] and body.beyond_mocap_ride.told == ""
     np.testing.assert_allclose([pelvis(body, frame) for frame in (1, 20, 40)], was, atol=0.06)
     scene.frame_set(1)
@@ -351,7 +355,8 @@ def test_a_rider_appended_to_another_file_rides_there(scene, part, tmp_path):
 
 
 def test_undo_brings_curve_and_motion_back_together(scene, part):
-    """A point pulled, followed by hand as the timer does, then a step: undo, redo, and the rider is up to date each time."""
+    """A point pulled, followed by hand as the timer does, then a step: undo, redo, and the rider is up to date each
+    time."""
     live = part("ride.live")
     body = walker()
     bpy.ops.beyond_mocap.edit_path()
@@ -439,7 +444,8 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
     body = walker()
     bpy.ops.beyond_mocap.edit_path()
     name = bpy.context.object.name
-    for arguments, points in (({"shape": "STRAIGHT", "count": 2}, 2), ({"shape": "PRESENT", "kind": "NURBS", "count": 9}, 9),
+    for arguments, points in (({"shape": "STRAIGHT", "count": 2}, 2),
+                              ({"shape": "PRESENT", "kind": "NURBS", "count": 9}, 9),
                               ({"shape": "FITTED", "count": 1}, 2), ({"kind": "NURBS", "degree": 5}, 6)):
         assert bpy.ops.beyond_mocap.path_curve(**arguments) == {"FINISHED"}
         spline = bpy.context.object.data.splines[0]
@@ -617,7 +623,8 @@ def test_nobody_cycles_for_hours(scene, part):
 
 
 def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
-    """A short closed ring is gone round; an open line of 2 m ends, or is begun again; a long one is filled by cycling."""
+    """A short closed ring is gone round; an open line of 2 m ends, or is begun again; a long one is filled by
+    cycling."""
     live, channels = part("ride.live"), part("channels")
     body = walker()
     line = drawn([(0, 0, 0), (2.5, 0, 0)])
@@ -632,7 +639,9 @@ def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
             line.scale = (8.0, 1.0, 1.0)
         bpy.context.view_layer.update()
         live.follow(scene)
-        curves = {place: curve for place, curve in channels.curves(*channels.playing(body)).items() if "location" in place[0]}
+        curves = {
+            place: curve for place, curve in channels.curves(*channels.playing(body)).items() if "location" in place[0]
+        }
         frames[name] = channels.keyed_range(curves)[1]
         assert all(np.isfinite(channels.keys_of(curve)["co"]).all() for curve in curves.values())
     assert frames["stop"] < frames["repeat"] < frames["cycle"]
@@ -679,7 +688,9 @@ def test_what_was_wrong_is_told_no_more_once_all_is_as_before(scene, part):
     for ground, told in ((empty, "without faces"), (None, "")):
         body.beyond_mocap_ride.ground = ground
         bpy.context.view_layer.update()
-        assert live.follow(scene) == 0 and (told in body.beyond_mocap_ride.told if told else not body.beyond_mocap_ride.told)
+        assert live.follow(scene) == 0 and (
+            told in body.beyond_mocap_ride.told if told else not body.beyond_mocap_ride.told
+        )
 
 
 def test_a_ground_that_moves_with_time_does_not_change_the_motion_with_the_frame(scene, part):

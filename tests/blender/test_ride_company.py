@@ -1,4 +1,5 @@
-"""Riders among the rest: players' bodies in every state, other verbs about a body that rides, duplicates, other files."""
+"""Riders among the rest: players' bodies in every state, other verbs about a body that rides, duplicates, other
+files."""
 
 import importlib
 

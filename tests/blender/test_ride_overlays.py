@@ -72,7 +72,9 @@ def test_each_switch_draws_its_own_and_nothing_is_drawn_without(rides, shown):
         items = rides.items(bpy.context.scene)
         assert items and np.isfinite(points(items)).all(), name
         for mesh in (mesh for item in items for mesh in item.meshes()):
-            assert len(mesh.points) == len(mesh.colours) and len(mesh.points) % 2 == 0 and mesh.points.dtype == np.float32
+            assert (
+                len(mesh.points) == len(mesh.colours) and len(mesh.points) % 2 == 0 and mesh.points.dtype == np.float32
+            )
     switch(*SWITCHES)
     bpy.context.scene.beyond_mocap.view.show = False
     assert rides.items(bpy.context.scene) == []

@@ -45,7 +45,8 @@ def recorded(part, core):
 
 @pytest.fixture
 def ride(part, core):
-    """Put an armature on its own path, or on a bent one, as Edit Path does. Gives the carrier's reading and the ridden."""
+    """Put an armature on its own path, or on a bent one, as Edit Path does. Gives the carrier's reading and the
+    ridden."""
 
     def go(rig, bent, **settings):
         scene, recipe = bpy.context.scene, core("ride")
@@ -170,7 +171,9 @@ def half_an_action_over_strips(recorded, part, _):
     action, slot = data.action, data.action_slot
     ride_rigs.onto_strip(rig)
     other = action.copy()
-    rest = ride_rigs.bone_path("Spine1" if "Spine1" in rig.pose.bones else rig.pose.bones[1].name, "rotation_quaternion")
+    rest = ride_rigs.bone_path(
+        "Spine1" if "Spine1" in rig.pose.bones else rig.pose.bones[1].name, "rotation_quaternion"
+    )
     for curve in part("channels").curves(other, other.slots[0]).values():
         if curve.data_path == rest:
             for point in curve.keyframe_points:
@@ -187,12 +190,15 @@ def cyclic(recorded, part, _):
     return rig
 
 
-KINDS = [rigify_fk, rigify_ik, hand_rig, hand_rig_of_few_keys, without_root, unreal_root_travels, unreal_root_stays, odd_modes,
+KINDS = [rigify_fk, rigify_ik, hand_rig, hand_rig_of_few_keys, without_root, unreal_root_travels, unreal_root_stays,
+         odd_modes,
          moved_object, moved_object_under_moved_empty, under_scaled_empty, strips, half_an_action_over_strips, cyclic]
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(core, part, recorded, ride, rigify, kind):  # noqa: F811
+def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(
+    core, part, recorded, ride, rigify, kind
+):  # noqa: F811
     rig = kind(recorded, part, rigify)
     bpy.context.view_layer.update()
     before = whole(part, rig)
@@ -256,7 +262,8 @@ def whole(part, rig):
     bpy.context.scene.frame_set(1)
     data = rig.animation_data
     tracks = [(track.name, track.mute, [strip.name for strip in track.strips]) for track in data.nla_tracks]
-    stands = [(tuple(b.location), tuple(b.rotation_quaternion), tuple(b.rotation_euler), b.rotation_mode) for b in rig.pose.bones]
+    stands = [(tuple(b.location), tuple(b.rotation_quaternion), tuple(b.rotation_euler), b.rotation_mode)
+              for b in rig.pose.bones]
     keys = bits(part, rig)[:3] if data.action is not None else None
     return keys, tracks, data.use_nla, stands, [tuple(row) for row in rig.matrix_world], len(bpy.data.scenes)
 

@@ -26,7 +26,8 @@ FAMILIES = {"mixamo": rigs.mixamo, "unreal": rigs.unreal, "metahuman": rigs.meta
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rig_controls", "key_reduction", "rig",
+            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rig_controls", "key_reduction",
+                         "rig",
                          "rig_copy")}
 
 
@@ -226,7 +227,8 @@ def test_helper_bones_are_left_alone_or_follow(rooms, body):
 
 @pytest.mark.parametrize("bakes_ik", (False, True))
 def test_inverse_kinematics_on_the_rig(rooms, body, bakes_ik):
-    plain, rig = (rigs.build(rigs.MIXAMO, name, root="root", extra=[("target.L", "root", "left foot")] if name == "IK" else ())
+    plain, rig = (rigs.build(rigs.MIXAMO, name, root="root",
+                             extra=[("target.L", "root", "left foot")] if name == "IK" else ())
                   for name in ("Plain", "IK"))
     constraint = rig.pose.bones["mixamorig:LeftLeg"].constraints.new("IK")
     constraint.target, constraint.subtarget, constraint.chain_count = rig, "target.L", 2
@@ -236,7 +238,8 @@ def test_inverse_kinematics_on_the_rig(rooms, body, bakes_ik):
     assert constraint.influence == (1.0 if bakes_ik else 0.0)
     bones = [table["left foot"], table["left lower_leg"]]
     a, b = (rigs.heads(one, bones, range(START, START + 60, 6)) for one in (rig, plain))
-    assert np.linalg.norm(a - b, axis=-1).max() < 2e-3 if not bakes_ik else np.linalg.norm(a - b, axis=-1)[:, 0].max() < 5e-3
+    assert np.linalg.norm(a - b, axis=-1).max() < 2e-3 if not bakes_ik else np.linalg.norm(a - b,
+                                                                                           axis=-1)[:, 0].max() < 5e-3
     assert any(("target.L" if bakes_ik else "switched off") in line for line in baked.told), baked.told
 
 
@@ -244,7 +247,9 @@ def test_fewer_keys_stay_within_the_tolerance(rooms, body):
     rig, scene = rigs.mixamo(), bpy.context.scene
     rig.pose.bones["mixamorig:LeftArm"].rotation_mode = "XZY"
     table, _ = bake(rooms, rig, body)
-    ends = [table[part] for part in ("head", "left hand", "right hand", "left foot", "right foot", "left toe", "right toe")]
+    ends = [
+        table[part] for part in ("head", "left hand", "right hand", "left foot", "right foot", "left toe", "right toe")
+    ]
     frames = range(START, START + 60)
     before, limbs = rigs.heads(rig, ends, frames), directions(rig, table, frames)[0]
     for tolerance, turn, most in ((0.002, 1.0, 0.5), (0.01, 3.0, 0.3)):
@@ -254,7 +259,9 @@ def test_fewer_keys_stay_within_the_tolerance(rooms, body):
         assert np.linalg.norm(rigs.heads(rig, ends, frames) - before, axis=-1).max() < 1.02 * tolerance + 1e-4
         assert degrees(directions(rig, table, frames)[0], limbs).max() < 6.0
     for bone in rig.pose.bones:
-        assert bone.rotation_mode != "QUATERNION" or np.linalg.norm(bone.matrix.to_quaternion()) == pytest.approx(1, abs=1e-5)
+        assert bone.rotation_mode != "QUATERNION" or np.linalg.norm(bone.matrix.to_quaternion()) == pytest.approx(
+            1, abs=1e-5
+        )
 
 
 def test_what_is_carried_over_is_the_takes_own_contact(rooms, body):
@@ -292,7 +299,9 @@ def test_the_button_does_what_the_function_does(rooms, body):
     assert rooms["rig"].table_of(settings) == table
     assert press(bpy.ops.beyond_mocap.bake_to_rig) == {"FINISHED"}
     frames = range(START, START + 60, 9)
-    np.testing.assert_array_equal(rigs.heads(rig, list(table.values()), frames), rigs.heads(plain, list(table.values()), frames))
+    np.testing.assert_array_equal(
+        rigs.heads(rig, list(table.values()), frames), rigs.heads(plain, list(table.values()), frames)
+    )
     assert "slide" in settings.told
 
 
@@ -477,7 +486,8 @@ def test_wrong_choices_are_told_in_one_line(rooms, body, tmp_path):
 
 
 def test_a_rig_without_legs_is_told(body):
-    arms = {part: name for part, name in rigs.MIXAMO.items() if "leg" not in part and "foot" not in part and "toe" not in part}
+    arms = {part: name for part, name in rigs.MIXAMO.items() if "leg" not in part and "foot" not in part
+            and "toe" not in part}
     rig = rigs.build(arms, "Torso")
     settings = choose(rig, body)
     assert "no legs" in settings.told and "bone map" in settings.told
@@ -514,7 +524,9 @@ def test_a_rig_in_an_overridden_collection_is_copied_beside_it(rooms, tmp_path):
     with bpy.data.libraries.load(file, link=True) as (theirs, mine):
         mine.collections = list(theirs.collections)
     bpy.context.scene.collection.children.link(mine.collections[0])
-    over = mine.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
+    over = mine.collections[0].override_hierarchy_create(
+        bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
+    )
     rig = next(one for one in over.all_objects if one.type == "ARMATURE")
     twin = rooms["rig_copy"].copied(rig, "twin")
     bpy.context.view_layer.update()

@@ -40,7 +40,9 @@ def tidied(room, core, dot):
         assert not room("strip_events").tidy(dot)
         assert room("lanes").read(dot) == before
         for track in dot.animation_data.nla_tracks:
-            ends = [(strip.frame_start, strip.frame_end) for strip in sorted(track.strips, key=lambda one: one.frame_start)]
+            ends = [
+                (strip.frame_start, strip.frame_end) for strip in sorted(track.strips, key=lambda one: one.frame_start)
+            ]
             assert all(first[1] <= second[0] for first, second in zip(ends, ends[1:]))
             for strip in track.strips:
                 assert (strip.scale, strip.frame_start % 1, strip.frame_end % 1) == (1.0, 0.0, 0.0)

@@ -38,7 +38,8 @@ def clock(room):
 def player(tmp_path):
     """Twelve seconds at 3 m/s, with words."""
     time = np.arange(0.0, 12.01, 0.1)
-    lines = ["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m", *(f"{t:.1f},{3 * t:.3f},1,{3 * t + 0.6:.3f},1,0.11" for t in time)]
+    lines = ["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m",
+             *(f"{t:.1f},{3 * t:.3f},1,{3 * t + 0.6:.3f},1,0.11" for t in time)]
     (tmp_path / "player1.csv").write_text("\n".join(lines) + "\n")
     (tmp_path / "player1.txt").write_text("2.413 4 running\n6.02 kick right low\n")
     bpy.ops.beyond_mocap.import_tracking(filepath=str(tmp_path / "player1.csv"))
@@ -62,7 +63,9 @@ def random_timeline(core, dice, count=12):
 @pytest.mark.parametrize("seed", range(6))
 def test_there_and_back_to_the_bit(room, core, text, dot, seed):
     dice = np.random.default_rng(seed)
-    clock = room("clock").Clock(float(dice.integers(-100, 100)), dice.uniform(-50, 50), dice.choice([23.976, 24.0, 25.0, 60.0]))
+    clock = room("clock").Clock(
+        float(dice.integers(-100, 100)), dice.uniform(-50, 50), dice.choice([23.976, 24.0, 25.0, 60.0])
+    )
     timeline = random_timeline(core, dice)
     room("lay_strips").write(dot, timeline, clock)
     assert room("lanes").read(dot) == timeline
@@ -143,13 +146,17 @@ def test_automatic_strips_are_asked_for_once_touched(room, text, dot, clock):
     lay_strips.write(dot, parse("2 4 running\n"), clock)
     lay_strips.set_automatic(dot, parse("0 2 walking\n2 4 running\n4 6 walking\n6 9 jogging\n"), clock)
     strips = [strip for strip in dot.animation_data.nla_tracks["Automatic"].strips]
-    assert [strip.name for strip in strips] == ["walking", "walking ", "jogging"] and all(strip.mute for strip in strips)
+    assert [strip.name for strip in strips] == ["walking", "walking ", "jogging"] and all(
+        strip.mute for strip in strips
+    )
     assert text.format_timeline(lanes.read(dot)) == "2 4 running\n"
     strip_of(dot, "walking").name = "sprinting"
     strip_of(dot, "walking ").frame_end_raw = 145
     strip_of(dot, "jogging").mute = False
     assert text.format_timeline(lanes.read(dot)) == "0 2 sprinting\n2 4 running\n4 5.76 walking\n6 9 jogging\n"
-    lay_strips.set_automatic(dot, parse("0 2 sprinting\n2 4 running\n4 5.76 walking\n5.76 6 standing\n6 9 jogging\n"), clock)
+    lay_strips.set_automatic(
+        dot, parse("0 2 sprinting\n2 4 running\n4 5.76 walking\n5.76 6 standing\n6 9 jogging\n"), clock
+    )
     assert text.format_timeline(lanes.read(dot)) == "0 2 sprinting\n2 4 running\n4 5.76 walking\n6 9 jogging\n"
     assert [placed.span.words for placed in lanes.spans(dot) if placed.automatic] == [("standing",)]
 
@@ -181,7 +188,9 @@ def test_import_tracking_makes_dot_ball_and_strips(room, player):
     for frame in (1, 1 + 5 * fps):
         scene.frame_set(frame)
         np.testing.assert_allclose(dot.matrix_world.translation, [3 * (frame - 1) / fps, 1, 0], atol=1e-4)
-        np.testing.assert_allclose(bpy.data.objects["Ball dot"].matrix_world.translation[0], dot.location[0] + 0.6, atol=1e-4)
+        np.testing.assert_allclose(
+            bpy.data.objects["Ball dot"].matrix_world.translation[0], dot.location[0] + 0.6, atol=1e-4
+        )
     asked = strips.read(player, scene)
     assert asked.spans[0].start == 2.413 and asked.keys[0].words == ("kick", "right", "low")
     plans = room("plans")

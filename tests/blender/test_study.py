@@ -117,6 +117,21 @@ def test_every_engine_of_this_blender_takes_the_settings(extension, engine):
     assert engine != "AUTO" or name == "CYCLES"  # there is no window here
 
 
+@pytest.mark.parametrize("engine", ["AUTO", "CYCLES"])
+def test_without_the_cycles_add_on_another_engine_renders(extension, engine):
+    import addon_utils
+
+    study = importlib.import_module(f"{extension.__name__}.scene.study")
+    addon_utils.disable("cycles")
+    try:
+        name = study.engine_here(engine)
+        study._settings(bpy.context.scene, study.Look(name, (64, 36), 25, 3))
+    finally:
+        addon_utils.enable("cycles")
+    assert name.startswith("BLENDER_EEVEE") and bpy.context.scene.render.engine == name
+    assert study.engine_here(engine) == "CYCLES"
+
+
 def test_the_camera_glides_without_lag(extension):
     followed = importlib.import_module(f"{extension.__name__}.scene.study").followed
     time = np.arange(90) / 30.0

@@ -260,7 +260,8 @@ def test_what_is_refused(tmp_path):
 def test_a_body_without_hands_is_refused(core):
     skeleton = core("motion.adult").adult_skeleton()
     legs = [j for j, name in enumerate(skeleton.names) if "Arm" not in name and "Hand" not in name]
-    table = {"names": [skeleton.names[j] for j in legs], "parents": [legs.index(skeleton.parents[j]) if j else -1 for j in legs]}
+    table = {"names": [skeleton.names[j] for j in legs],
+             "parents": [legs.index(skeleton.parents[j]) if j else -1 for j in legs]}
     assert json.dumps(table)
     small = core("motion.skeleton").Skeleton(
         tuple(table["names"]), tuple(table["parents"]), skeleton.offsets[legs], (), np.zeros((0, 3))
@@ -474,7 +475,8 @@ def test_a_target_that_moves_is_met_where_it_is_by_then():
     first, away = int(np.floor(wish.release)), []
     for frame in np.arange(first + 1, first + 60, 0.1):
         place = ball_at(wish.flown, frame)
-        away.append(np.linalg.norm(place - np.array(wish.target.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation)))
+        target = wish.target.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        away.append(np.linalg.norm(place - np.array(target.matrix_world.translation)))
     assert min(away) < 0.15
     assert len(bpy.data.scenes) == 1
 

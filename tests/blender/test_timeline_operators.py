@@ -1,4 +1,5 @@
-"""The timeline's operators: what they do to strips, one step of undo each, and what they say when something is missing."""
+"""The timeline's operators: what they do to strips, one step of undo each, and what they say when something is
+missing."""
 
 import importlib
 import pathlib
@@ -194,7 +195,8 @@ def test_what_is_wrong_is_told(player, room):
 
 
 def test_nobody_there():
-    for operator in (ops.add_span, ops.add_moment, ops.split_span, ops.words_to_text, ops.choose_player, ops.read_words):
+    for operator in (ops.add_span, ops.add_moment, ops.split_span, ops.words_to_text, ops.choose_player,
+                     ops.read_words):
         refused("Import tracking", operator)
 
 

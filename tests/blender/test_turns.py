@@ -54,7 +54,9 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
              for name in ("operators.turns", "scene.orders", "scene.queue", "scene.background")}
     turns, orders, queue, background = rooms.values()
     bpy.ops.beyond_mocap.build_library()
-    real, hand = orders.work, SimpleNamespace(pause=0.0, made=[], told=[], context=Context(), queue=queue, orders=orders)
+    real, hand = orders.work, SimpleNamespace(
+        pause=0.0, made=[], told=[], context=Context(), queue=queue, orders=orders
+    )
 
     def work(order, library, progress, cancelled, hurry):
         progress(0.5, "half")

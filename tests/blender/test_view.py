@@ -10,7 +10,8 @@ from mathutils import Vector
 from undo import assert_one_step, state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend"
-CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside")
+CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
+         "kick_low_inside")
 WORDS = "5.0 kick right low inside\n"
 
 
@@ -37,7 +38,9 @@ def shown(tmp_path, library_folder, room):
     """A player with a ball whose take is shown; the settings."""
     time = np.arange(0.0, 10.01, 0.1)
     lines = ["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m"]
-    lines += [f"{t:.1f},{2.9 * t:.3f},{np.sin(0.3 * t):.3f},{2.9 * t + 0.5:.3f},{np.sin(0.3 * t):.3f},0.11" for t in time]
+    lines += [
+        f"{t:.1f},{2.9 * t:.3f},{np.sin(0.3 * t):.3f},{2.9 * t + 0.5:.3f},{np.sin(0.3 * t):.3f},0.11" for t in time
+    ]
     (tmp_path / "runner.csv").write_text("\n".join(lines) + "\n")
     (tmp_path / "runner.txt").write_text(WORDS)
     bpy.context.scene.beyond_mocap.library_folder = str(library_folder)
@@ -141,7 +144,9 @@ def test_what_is_drawn_follows_the_body(shown, room, scale):
     world = room("overlays.place").take_to_world(scene, body)
     at = room("overlays.place").seconds_at(scene) - take.start_time
     bone = body.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[take.motion.skeleton.names[0]]
-    root = [np.interp(at * take.motion.fps, np.arange(len(take.motion)), take.motion.root_positions[:, i]) for i in range(3)]
+    root = [
+        np.interp(at * take.motion.fps, np.arange(len(take.motion)), take.motion.root_positions[:, i]) for i in range(3)
+    ]
     assert np.allclose(world @ Vector(root), body.matrix_world @ bone.head, atol=2e-3 / scale)
 
 
@@ -171,7 +176,8 @@ def test_lines_of_the_report_keep_their_seconds(shown):
 def test_words_met_is_at_least_what_is_wanted(room):
     report = {"fps": 30.0, "annotation_similarity": {"all": -0.95}, "warp_rate": {"min": 0.8, "max": 1.0}}
     lines = room("quality").quality(report).splitlines()
-    assert lines == ["Words met: 97.5 %\t≥ 95.0\tmet", "Slowest clip: 0.80 x\t≥ 0.85\tmissed", "Fastest clip: 1.00 x\t≤ 1.15\tmet"]
+    assert lines == ["Words met: 97.5 %\t≥ 95.0\tmet", "Slowest clip: 0.80 x\t≥ 0.85\tmissed",
+                     "Fastest clip: 1.00 x\t≤ 1.15\tmet"]
 
 
 def test_jump_goes_to_the_second_and_selects_the_body(shown):

@@ -12,7 +12,8 @@ import rigs
 from conftest import EXTENSION
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
-CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2", "kick_low_inside",
+CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
+         "kick_low_inside",
          "receive_foot", "dribble_jogging")
 _markers = tempfile.TemporaryDirectory(prefix="beyond-mocap-markers-")
 MARKERS = pathlib.Path(_markers.name)
@@ -111,7 +112,8 @@ def clip(places):
     bpy.ops.beyond_mocap.annotate_clip()
 
 
-STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "rig": rig, "video": video, "clip": clip}
+STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "rig": rig, "video": video,
+          "clip": clip}
 
 
 def choose(*things):

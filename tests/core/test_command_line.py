@@ -483,7 +483,8 @@ def test_the_second_ctrl_c_breaks_off_what_does_not_listen():
 
 
 def test_signals_that_python_did_not_set_are_left_as_the_system_has_them(monkeypatch):
-    """Blender sets handlers of its own before Python: `signal.signal` then returns None, which it does not take back."""
+    """Blender sets handlers of its own before Python: `signal.signal` then returns None, which it does not take
+    back."""
     before = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
     put = signal.signal
     with monkeypatch.context() as patched:

@@ -40,7 +40,9 @@ def test_roots_stand_in_the_trees_order_on_pages_of_nine():
     assert list(digits(Walk("span"), page=1)) == ["turning", "dribble", "transition"]
 
 
-@pytest.mark.parametrize("way", [("kick",), ("kick", "right"), ("kick", "low"), ("kick", "0", "top"), ("catchb", "dive")])
+@pytest.mark.parametrize(
+    "way", [("kick",), ("kick", "right"), ("kick", "low"), ("kick", "0", "top"), ("catchb", "dive")]
+)
 def test_sides_and_paces_keep_their_digits_wherever_one_is(way):
     found = digits(down("moment", *way))
     assert (found["left"], found["right"], found["standing"], found["running"]) == (1, 2, 8, 9)

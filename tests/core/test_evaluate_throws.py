@@ -39,7 +39,9 @@ def examples():
         bones = replace(bones, offsets=bones.offsets * size, end_offsets=bones.end_offsets * size)
         for number, far in enumerate((8.0, 14.0)):
             made = throw((far, 1.0, 1.0), 20.0, skeleton=bones, fps=120.0)
-            out.append(example_of(f"{subject}{number}", subject, made.motion, "right_hand", made.release, (far, 1.0, 1.0)))
+            out.append(
+                example_of(f"{subject}{number}", subject, made.motion, "right_hand", made.release, (far, 1.0, 1.0))
+            )
     return out
 
 
@@ -74,7 +76,9 @@ def test_what_is_planted_comes_out(examples, monkeypatch):
     moved = replace(motion, root_positions=motion.root_positions + [0.0, 0.03, 0.04])
     head = identify(motion.skeleton).head
     rotations = motion.rotations.copy()
-    rotations[:, head] = quaternion.multiply(rotations[:, head], quaternion.about_axis([0.0, 0.0, 1.0], np.radians(20.0)))
+    rotations[:, head] = quaternion.multiply(
+        rotations[:, head], quaternion.about_axis([0.0, 0.0, 1.0], np.radians(20.0))
+    )
     stiff = motion.rotations.copy()
     stiff[:, head] = stiff[0, head]
     generating(monkeypatch, [(moved, 0.02), (replace(motion, rotations=rotations), 0.0),

@@ -215,7 +215,9 @@ def test_who_stands_steps_into_a_throw_without_a_library():
         joined = joined_throw.laid_into(own, 0.0, one.motion, one.release, AT, goes_on=goes_on, fade=fade)
         assert same_where_kept(joined, one.motion)
         body = joined_throw.identify(own.skeleton)
-        toes = forward_kinematics(joined.motion)[0][joined.first - 3 : joined.kept[0] + 3, [body.left.toe_or_foot, body.right.toe_or_foot]]
+        toes = forward_kinematics(joined.motion)[0][
+            joined.first - 3 : joined.kept[0] + 3, [body.left.toe_or_foot, body.right.toe_or_foot]
+        ]
         speed = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1) * FPS
         low = toes[1:, :, 2] < toes[..., 2].min() + 0.01
         slides.append(float((speed * low).sum() / FPS))

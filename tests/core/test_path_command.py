@@ -84,7 +84,8 @@ def test_rate_names_channels_and_form_stay(run, place, tmp_path):
 
 def test_the_result_can_be_evaluated(run, tmp_path, capfd):
     assert run("--provenance", tmp_path / "p.csv", "--report", tmp_path / "r.json")[0] == 0
-    arguments = [tmp_path / "out.bvh", "--provenance", tmp_path / "p.csv", "--unit", 0.01, "--report", tmp_path / "e.json"]
+    arguments = [tmp_path / "out.bvh", "--provenance", tmp_path / "p.csv", "--unit", 0.01, "--report",
+                 tmp_path / "e.json"]
     assert main(["evaluate", *map(str, arguments)]) == 0
     mine, again = (json.loads((tmp_path / name).read_text()) for name in ("r.json", "e.json"))
     assert again["skate"]["contact_cm_s"] == pytest.approx(mine["skate"]["contact_cm_s"], abs=0.05)
@@ -101,7 +102,8 @@ def test_a_skeleton_without_legs_rides_and_is_told(run, place, tmp_path):
 
 def test_a_path_far_longer_than_the_motion_is_told(run):
     assert any("of 9.4 m; --cycle goes on" in line for line in run()[2])
-    for more, curve in ((["--cycle"], "bend"), ([], "short"), (["--no-arc-length"], "bend"), (["--end", "repeat"], "bend")):
+    for more, curve in ((["--cycle"], "bend"), ([], "short"), (["--no-arc-length"], "bend"),
+                        (["--end", "repeat"], "bend")):
         assert not any("goes on" in line for line in run(*more, curve=curve)[2]), more
 
 

@@ -47,17 +47,22 @@ def test_pins_come_and_go_and_are_the_same_by_every_way(library, track, take, ti
     assert same(resynthesize(library, plan, pinned), plain)
     later = replace(pinned.plan, timeline=timeline_of((4.6, "kick right")))
     edited = resynthesize(library, later, pinned)
-    assert same(resynthesize(library, replace(later, pins=()), edited), resynthesize(library, replace(later, pins=()), plain))
+    assert same(
+        resynthesize(library, replace(later, pins=()), edited), resynthesize(library, replace(later, pins=()), plain)
+    )
     assert np.array_equal(edited.motion.rotations[-60:], pinned.motion.rotations[-60:])
     assert np.array_equal(edited.motion.root_positions[-60:], pinned.motion.root_positions[-60:])
 
 
 def test_a_pin_out_of_reach_is_told_and_reported(library, track, take):
-    found = resynthesize(library, replace(take.plan, pins=(pin_near(take, 9.0, (0.0, 0.0, 2.0)), Pin(99, "gaze", (0, 0, 1)))), take)
+    found = resynthesize(
+        library, replace(take.plan, pins=(pin_near(take, 9.0, (0.0, 0.0, 2.0)), Pin(99, "gaze", (0, 0, 1)))), take
+    )
     assert any("9 s: the pin of left_hand is out of reach by" in line for line in found.warnings)
     assert any("99 s: the pin of gaze lies outside the track" in line for line in found.warnings)
     report = evaluate(found, track, library)
-    assert report["pins"][0]["miss"] > 0.5 and report["pins"][1]["miss"] is None and "pins" not in evaluate(take, track, library)
+    assert report["pins"][0]["miss"] > 0.5 and report["pins"][1]["miss"] is None and "pins" not in evaluate(take, track,
+                                                                                                            library)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -107,7 +112,9 @@ def test_clips_of_a_style_are_taken_rather_than_others(clip_file, track_of, tmp_
 
 def test_folders_clips_and_patterns_name_clips():
     path = "lmd/Player1/P1_kick.bvh"
-    assert all(named_by(path, name) for name in ("lmd", "LMD/player1", "Player1/", "lmd/*", "P1_kick", "*kick.bvh", "p1_*"))
+    assert all(
+        named_by(path, name) for name in ("lmd", "LMD/player1", "Player1/", "lmd/*", "P1_kick", "*kick.bvh", "p1_*")
+    )
     assert not any(named_by(path, name) for name in ("kick", "player", "1", "."))
 
 

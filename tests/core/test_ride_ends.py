@@ -39,7 +39,9 @@ def test_a_longer_path_is_filled_by_cycling(source):
 
 @pytest.mark.parametrize("speed, delay", [(0.5, 0.0), (2.0, 1.0)])
 def test_seams_are_told_in_the_frames_that_are_shown(source, speed, delay):
-    plain, other = (ride(source, line(14.0), asked(cycle=True, **more)) for more in ({}, {"speed": speed, "delay": delay}))
+    plain, other = (
+        ride(source, line(14.0), asked(cycle=True, **more)) for more in ({}, {"speed": speed, "delay": delay})
+    )
     seconds = delay + plain.seams / plain.motion.fps / speed
     assert np.allclose(other.seams / other.motion.fps, seconds, atol=1.01 / other.motion.fps)
 

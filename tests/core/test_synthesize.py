@@ -287,7 +287,9 @@ def test_where_nothing_is_near_locomotion_goes_on_and_is_told(take_of, method):
 
 
 @pytest.mark.parametrize("up, reached", [(0.45, True), (1.2, False)])
-def test_who_goes_on_walking_for_want_of_a_header_still_puts_his_head_to_a_ball_that_is_near(take_of, track_of, up, reached):
+def test_who_goes_on_walking_for_want_of_a_header_still_puts_his_head_to_a_ball_that_is_near(
+    take_of, track_of, up, reached
+):
     track = track_of()
     plain = take_of((4.0, "header"), nearest=True, track=track)
     head = head_at(plain, 120)

@@ -51,7 +51,9 @@ def test_planted_throws_come_back(folder):
         places, _ = forward_kinematics(example.motion)
         body = identify(example.motion.skeleton)
         assert np.abs(places[0, body.hips, :2]).max() < 1e-6
-        hand = np.array([np.interp(example.release, np.arange(len(places)), way) for way in places[:, body.right.hand].T])
+        hand = np.array(
+            [np.interp(example.release, np.arange(len(places)), way) for way in places[:, body.right.hand].T]
+        )
         away = np.hypot(*(example.impact - hand)[:2])
         assert abs(away - np.hypot(*(truth.impact - truth.position)[:2])) < 0.25  # the ball is in the fingers
 
@@ -143,7 +145,8 @@ def test_odd_recordings_are_told_and_left_out(own):
 
 @pytest.mark.parametrize(
     "change", [("limb", "nose"), ("release_s", "soon"), ("target_x_m", ""), ("file", "subject03/none.bvh"),
-     ("file", "subject03/../subject03/subject03_throw001.bvh"), ("speed_m_s", "0"), ("speed_m_s", "-5"), ("speed_m_s", "nan"),
+     ("file", "subject03/../subject03/subject03_throw001.bvh"), ("speed_m_s", "0"), ("speed_m_s", "-5"),
+     ("speed_m_s", "nan"),
      ("speed_m_s", "1e9"), ("launch_x_m_s", "1e12"), ("launch_x_m_s", "inf"), ("launch_y_m_s", "1e308")],
 )
 def test_a_wrong_table_is_told_with_its_line(own, change):
@@ -173,7 +176,9 @@ def test_a_target_that_no_ball_flies_through_leaves_its_throw_out(own, target, s
 
 
 def test_annotations_of_what_is_not_there_are_told(own):
-    (own / "annotations.csv").write_text("file,start_frame,end_frame,key_frame,labels\nnobody.bvh,0,300,100,throwb right\n")
+    (own / "annotations.csv").write_text(
+        "file,start_frame,end_frame,key_frame,labels\nnobody.bvh,0,300,100,throwb right\n"
+    )
     told = []
     assert len(examples_in(own, told=told.append)) == 2
     assert len(told) == 1 and "annotations.csv: names 1" in told[0] and "nobody.bvh" in told[0]
@@ -206,7 +211,8 @@ CELLS = st.one_of(st.floats().map(str), st.integers().map(str), st.text(max_size
 
 @settings(max_examples=60, deadline=None)
 @given(st.one_of(
-    st.lists(st.lists(CELLS, min_size=11, max_size=11), max_size=3).map(lambda rows: "\n".join([HEAD, *map(",".join, rows)])),
+    st.lists(st.lists(CELLS, min_size=11, max_size=11),
+             max_size=3).map(lambda rows: "\n".join([HEAD, *map(",".join, rows)])),
     st.lists(st.tuples(*[st.floats(allow_nan=False).map(str) for _ in range(8)]), min_size=1, max_size=2).map(
         lambda rows: "\n".join([HEAD, *("throw.bvh,me,right_hand," + ",".join(row) for row in rows)])),
     st.text(max_size=60),

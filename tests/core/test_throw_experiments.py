@@ -17,7 +17,9 @@ def silent(line):
 
 
 def test_a_queue_that_is_killed_goes_on_where_it_was(tmp_path):
-    todo = list(runs([("planted", ("a", "b")), ("lmd", ("c",))], [BY_NAME[name] for name in ("hierarchy", "feed-forward")]))
+    todo = list(
+        runs([("planted", ("a", "b")), ("lmd", ("c",))], [BY_NAME[name] for name in ("hierarchy", "feed-forward")])
+    )
     assert [run.key for run in todo[:4]] == [
         ("planted", "hierarchy", "a"), ("planted", "hierarchy", "b"), ("lmd", "hierarchy", "c"),
         ("planted", "feed-forward", "a"),
@@ -32,10 +34,13 @@ def test_a_queue_that_is_killed_goes_on_where_it_was(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         work_off(todo, QUICK, tmp_path, killed, told=silent)
-    half = (tmp_path / "quick_lmd.jsonl").read_text()[:-40]  # half a line, as of a process that was killed while writing
+    # half a line, as of a process that was killed while writing
+    half = (tmp_path / "quick_lmd.jsonl").read_text()[:-40]
     (tmp_path / "quick_lmd.jsonl").write_text(half)
     again = []
-    assert work_off(todo, QUICK, tmp_path, lambda run: again.append(run) or planted_run([0.9] * 4, 1.0), told=silent) == 0
+    assert (
+        work_off(todo, QUICK, tmp_path, lambda run: again.append(run) or planted_run([0.9] * 4, 1.0), told=silent) == 0
+    )
     assert again == [todo[2], *todo[3:]]
     found = read(tmp_path, "quick")
     assert set(found) == {run.key for run in todo}
@@ -70,7 +75,8 @@ def test_his_models_are_his():
     assert (his["hierarchy"]["layers"], his["hierarchy"]["units"], his["hierarchy"]["epochs"]) == (3, 256, 400)
     assert (his["feed-forward"]["layers"], his["feed-forward"]["points"]) == (8, 1)
     assert {v.name for v in variants(PAPER) if not (v.corrected or v.linear)} == {
-        "single-raw", "hierarchy-raw", "single-fed-raw", "hierarchy-fed-raw", "single-effectors", "single-effectors-fed",
+        "single-raw", "hierarchy-raw", "single-fed-raw", "hierarchy-fed-raw", "single-effectors",
+        "single-effectors-fed",
         "start-raw"}
     assert all(his[name]["wrist"] == "inferred" for name in ("single-raw", "hierarchy-raw"))
     assert his["hierarchy"]["wrist"] == "given" and not his["hierarchy"]["conditioned"]
@@ -101,7 +107,9 @@ def test_his_figures_put_in_come_out_with_his_p_values(tmp_path):
     assert "| 2 of 12 |" in text and "8 of 48" in text  # bodies that are lost are counted, and in no mean
     assert "### Tables 8.5 to 8.8" in text and "Tables 8.1" not in text
     assert "| would be seen | 0.0269 |" in text  # of differences as his, by Student's t
-    assert "better at 0.025 in left arm (p 0.0065), left leg (p 0.0063), right leg (p 0.0038), impact (p 0.0136)" in text
+    assert (
+        "better at 0.025 in left arm (p 0.0065), left leg (p 0.0063), right leg (p 0.0038), impact (p 0.0136)" in text
+    )
 
 
 def test_kicks_without_a_ball_have_no_impact(tmp_path):

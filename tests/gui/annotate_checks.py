@@ -1,4 +1,5 @@
-"""Annotating by keys and the reference video in a real window: words by simulated presses, pictures read off the screen."""
+"""Annotating by keys and the reference video in a real window: words by simulated presses, pictures read off the
+screen."""
 
 import importlib
 import math
@@ -160,7 +161,8 @@ def check_the_menu_stays_within_every_editor():
             yield from type_keys("2")
             yield 0.2
             if "box" in annotate._menu and running():
-                drawn = next(r for a in window.window.screen.areas for r in a.regions if r.as_pointer() == annotate._menu["region"])
+                drawn = next(r for a in window.window.screen.areas
+                             for r in a.regions if r.as_pointer() == annotate._menu["region"])
                 left, bottom, right, top = annotate._menu["box"].box
                 assert 0 <= left and right <= drawn.width and 0 <= bottom and top <= drawn.height, (area.type, x, y)
             yield from window.press("ESC")

@@ -10,7 +10,8 @@ import tomllib
 import addon_utils
 import bpy
 from tab import (
-    EXTENSION, PICTURES, TAB, assert_no_trouble_since, moves, output, press_all, press_button, printed_since, sample, settings,
+    EXTENSION, PICTURES, TAB, assert_no_trouble_since, moves, output, press_all, press_button, printed_since, sample,
+    settings,
     trouble, until, wait_for_work, window, within,
 )
 from window import unfold
@@ -52,12 +53,14 @@ def check_packages_come_from_our_wheels():
         distribution = importlib.metadata.distribution(name)
         assert below(distribution.locate_file(""), unpacked), f"{name} is found in {distribution.locate_file('')}"
         modules |= {file.parts[0].removesuffix(".py") for file in distribution.files
-                    if file.name == "__init__.py" and len(file.parts) == 2 or file.suffix == ".py" and len(file.parts) == 1}
+                    if file.name == "__init__.py" and len(file.parts) == 2 or file.suffix == ".py"
+                    and len(file.parts) == 1}
     for module in sorted(modules):
         importlib.import_module(module)
     use_compiled_code()
     strangers = {name: module.__file__ for name, module in list(sys.modules.items())
-                 if name.split(".")[0] in modules and getattr(module, "__file__", None) and not below(module.__file__, unpacked)}
+                 if name.split(".")[0] in modules and getattr(module, "__file__", None)
+                 and not below(module.__file__, unpacked)}
     assert not strangers, strangers
     output.say(f"     from the wheels: {', '.join(sorted(modules))}")
     yield 0
@@ -149,7 +152,8 @@ def check_the_quickstart():
     bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
     yield 0.5
     for step, reached in (("build_library", lambda: "43 clips" in settings().library_holds),
-                          ("synthesize", lambda: states() == {"PREVIEW"}), ("accept", lambda: states() == {"ACCEPTED"})):
+                          ("synthesize", lambda: states() == {"PREVIEW"}),
+                          ("accept", lambda: states() == {"ACCEPTED"})):
         yield from press_button(step)
         told = yield from wait_for_work()
         yield from until(reached, what=states)

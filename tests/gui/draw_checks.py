@@ -72,7 +72,9 @@ def check_the_preview_follows_a_dragged_point():
     yield from until(lambda: made() is not first)
     output.say(f"     the preview followed {time.monotonic() - start:.2f} s after the hand had let go")
     yield from settled()  # on a slow machine there may be several quick ones before the whole one
-    assert not any("cut short" in line for line in made().take.warnings), "the whole take did not take the quick one's place"
+    assert not any(
+        "cut short" in line for line in made().take.warnings
+    ), "the whole take did not take the quick one's place"
     assert (hips(60) - before).length > 0.1, "the body is where it was"
     window.picture(PICTURES / "draw_live.png")
     last = made()

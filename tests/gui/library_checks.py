@@ -28,7 +28,9 @@ def opened(name="library"):
 
 def unfolded():
     """Step 1 with all that it can unfold; returns what folds it again."""
-    fold = unfold(next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_library"))
+    fold = unfold(
+        next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_library")
+    )
     window.area("VIEW_3D").tag_redraw()
     return fold
 
@@ -45,7 +47,9 @@ def check_the_list_and_its_buttons():
     yield from drawn()
     window.picture(PICTURES / "library-found.png")
     yield from press("import_clip")
-    yield from until(lambda: bpy.context.object and bpy.context.object.name.startswith("kick"), what=lambda: bpy.context.object)
+    yield from until(
+        lambda: bpy.context.object and bpy.context.object.name.startswith("kick"), what=lambda: bpy.context.object
+    )
     assert moves(bpy.context.object), bpy.context.object
     window.picture(PICTURES / "library-imported.png")
     shutil.move(folder, folder.with_name("library-moved"))
@@ -109,7 +113,8 @@ def check_ten_thousand_files_do_not_freeze_the_window():
     panel.draw = drawn
     fold()
     spent.sort()
-    output.say(f"     drawn {len(spent)} times, {1000 * spent[len(spent) // 2]:.1f} ms in the median; longest wait {longest:.2f} s")
+    output.say(f"     drawn {len(spent)} times, {1000 * spent[len(spent) // 2]:.1f} ms in the median; longest wait "
+               f"{longest:.2f} s")
     assert listing().total == 10043
     within("the panel, s", spent[len(spent) // 2], 0.005)
     within("longest wait, s", longest, 3.0)

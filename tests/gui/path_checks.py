@@ -135,7 +135,9 @@ def check_edit_path_is_a_button_and_tab_edits_the_curve():
     area = window.area("VIEW_3D")
     back = yield from own_tab(area)
     yield from press("edit_path")
-    yield from until(lambda: body().beyond_mocap_ride.on and bpy.context.object == drawn(), 60.0, "Edit Path does something")
+    yield from until(
+        lambda: body().beyond_mocap_ride.on and bpy.context.object == drawn(), 60.0, "Edit Path does something"
+    )
     yield from settled()
     back()
     look_down(np.array(drawn().matrix_world @ points()[len(points()) // 2].co)[:2])
@@ -145,7 +147,8 @@ def check_edit_path_is_a_button_and_tab_edits_the_curve():
 
 
 def own_tab(area):
-    """The panel Path Editing alone in a tab of its own, so that its button is found quickly; returns what puts it back."""
+    """The panel Path Editing alone in a tab of its own, so that its button is found quickly; returns what puts it
+    back."""
     kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_path")
     was = kind.bl_category, kind.bl_options
 
@@ -160,7 +163,8 @@ def own_tab(area):
 
 
 def grab(number, start=0.0):
-    """One control point selected, the playhead where the body is near it, and G pressed with the pointer over the view."""
+    """One control point selected, the playhead where the body is near it, and G pressed with the pointer over the
+    view."""
     for other, point in enumerate(points()):
         point.select_control_point = point.select_left_handle = point.select_right_handle = other == number
     place = np.array(drawn().matrix_world @ points()[number].co)
@@ -174,7 +178,8 @@ def grab(number, start=0.0):
 
 
 def drag(seconds=6.0):
-    """Move the hand for so long; how many moves there were, and how many seconds of wall clock and of work they took."""
+    """Move the hand for so long; how many moves there were, and how many seconds of wall clock and of work they
+    took."""
     moves, begun, worked = 0, time.perf_counter(), time.thread_time()
     while time.perf_counter() - begun < seconds or moves < 5:
         x, y = window.pointer
@@ -224,9 +229,12 @@ def check_the_body_follows_a_dragged_point():
     window.picture(PICTURES / "path_drag.png")
     output.say(f"     {FRAMES} frames: one update takes {statistics.median(spent):.0f} ms of work (95 % within "
                f"{spent[int(0.95 * (count - 1))]:.0f}), {statistics.median(updates.spent):.0f} ms of wall clock")
-    output.say(f"     {count} updates in {moves} moves, {count / wall:.1f} a second of wall clock, {count / worked:.1f} a second "
+    output.say(f"     {count} updates in {moves} moves, {count / wall:.1f} a second of wall clock, "
+               f"{count / worked:.1f} a second "
                f"of the main thread's work; without following this machine draws {free:.1f} moves a second")
-    output.say(f"     the body is {max(off):.3f} m off the curve at most; it went {np.linalg.norm(pelvis() - before):.2f} m")
+    output.say(
+        f"     the body is {max(off):.3f} m off the curve at most; it went {np.linalg.norm(pelvis() - before):.2f} m"
+    )
     assert np.linalg.norm(pelvis() - before) > 0.2, "the body stayed where it was"
     assert max(off) < 0.15, off
     assert count > 0
@@ -368,7 +376,9 @@ def check_bake_and_leave():
             thing.select_set(thing == body(name))
         bpy.context.view_layer.objects.active = body(name)
         played = keys(name)
-        assert run("beyond_mocap.bake_path" if name == "second" else "beyond_mocap.leave_path", "EXEC_DEFAULT") == {"FINISHED"}
+        assert run("beyond_mocap.bake_path" if name == "second" else "beyond_mocap.leave_path", "EXEC_DEFAULT") == {
+            "FINISHED"
+        }
         yield 0.5
         assert not body(name).beyond_mocap_ride.on
         assert (keys(name) == played) == (name == "second")

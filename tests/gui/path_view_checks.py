@@ -1,4 +1,5 @@
-"""What is drawn of riders costs next to nothing and is made anew only when a motion was; so does the panel about them."""
+"""What is drawn of riders costs next to nothing and is made anew only when a motion was; so does the panel about
+them."""
 
 import time
 
@@ -31,7 +32,8 @@ class Counted:
     """While a `with` lasts: what each call of the drawing of riders takes, and which shapes are made."""
 
     def __enter__(self):
-        self.draw, self.rides, self.seconds, self.made = room("scene.overlays.draw"), room("scene.overlays.rides"), [], []
+        self.draw, self.rides = room("scene.overlays.draw"), room("scene.overlays.rides")
+        self.seconds, self.made = [], []
         self.items, self.making = self.rides.items, self.draw._made
         self.draw.rides = Stand(self.rides, items=self.timed)
         self.draw._made = self.watched
@@ -168,7 +170,9 @@ def check_keys_flick_through_the_cameras_and_back():
             return max(abs(a - b) for row, old in zip(view.view_matrix, before) for a, b in zip(row, old))
 
         yield from until(lambda: scene.camera == own and view.view_perspective == perspective, 60.0)
-        yield from until(lambda: apart() < 1e-4, 60.0, lambda: f"{perspective}: the view came back elsewhere, by {apart()}")
+        yield from until(
+            lambda: apart() < 1e-4, 60.0, lambda: f"{perspective}: the view came back elsewhere, by {apart()}"
+        )
 
 
 def check_keys_nudge_and_the_rider_follows():

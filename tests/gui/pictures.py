@@ -1,5 +1,5 @@
-"""The pictures of docs/, taken in a real window from our own sample. Played by `make pictures`; a check like all others, so
-that an error in drawing is told. Look at them before they are kept."""
+"""The pictures of docs/, taken in a real window from our own sample. Played by `make pictures`; a check like all
+others, so that an error in drawing is told. Look at them before they are kept."""
 
 import pathlib
 
@@ -16,7 +16,8 @@ FRAME = 190
 
 def panels(kind, parent=""):
     """Our panels in this kind of editor, in their order; parent: those within that one."""
-    found = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION) and cls.is_registered
+    found = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION)
+             and cls.is_registered
              and cls.bl_space_type == kind and getattr(cls, "bl_category", "") == TAB
              and getattr(cls, "bl_parent_id", "") == parent]
     return sorted(found, key=lambda cls: getattr(cls, "bl_order", 0))

@@ -36,7 +36,8 @@ def play_all(module):
     checks = [value for name, value in vars(module).items() if name.startswith("check_")]
     failed, begun = 0, time.monotonic()
     for check in checks:
-        name, start, mark = check.__name__.removeprefix("check_").replace("_", " "), time.monotonic(), len(tab.output.text())
+        name, start, mark = check.__name__.removeprefix("check_").replace("_",
+                                                                          " "), time.monotonic(), len(tab.output.text())
         try:
             yield from check()
             yield 0.2  # what the last step changed is drawn

@@ -78,7 +78,8 @@ class Stopwatch:
 def redraw(kind, rounds=25):
     """Draw the tab of this kind of editor anew again and again; return the milliseconds of each draw function."""
     areas = [area for area in window.window.screen.areas if area.type == kind]
-    area = max(areas, key=lambda area: area.width * area.height)  # the timeline is a dope sheet too, with no room for tabs
+    # the timeline is a dope sheet too, with no room for tabs
+    area = max(areas, key=lambda area: area.width * area.height)
     yield from window.open_tab(area, TAB)
     watch = Stopwatch()
     for _ in range(rounds):
@@ -92,7 +93,8 @@ def redraw(kind, rounds=25):
 def told(heading, medians):
     """Say the sum and the slowest; return the sum."""
     output.say(f"     {heading}: {sum(medians.values()):.2f} ms; " + ", ".join(
-        f"{name.partition('_PT_')[2] or name} {value:.2f}" for name, value in sorted(medians.items(), key=lambda i: -i[1])[:5]))
+        f"{name.partition('_PT_')[2] or name} {value:.2f}"
+        for name, value in sorted(medians.items(), key=lambda i: -i[1])[:5]))
     return sum(medians.values())
 
 

@@ -146,7 +146,8 @@ def check_escape_cancels_and_finish_early_keeps():
 
 
 def check_undo_in_the_middle():
-    """The words are changed, a take is begun, the change is undone: what is written was made of the words that are there."""
+    """The words are changed, a take is begun, the change is undone: what is written was made of the words that are
+    there."""
     yield from opened()
     settings().players[1].use = False
     settings().alpha = 0.6

@@ -1,4 +1,5 @@
-"""A motion baked to a control rig that Rigify generates in this Blender, by the panel's own buttons, and undone again."""
+"""A motion baked to a control rig that Rigify generates in this Blender, by the panel's own buttons, and undone
+again."""
 
 import importlib
 

@@ -1,7 +1,7 @@
 """What all window tests share: the tab's buttons, found and pressed, and what was printed meanwhile.
 
-`output` and `window` are the one eye and the one hand of a run. tests/gui/play.py puts every name of this file into each
-file of checks, so that these need not import anything from here.
+`output` and `window` are the one eye and the one hand of a run. tests/gui/play.py puts every name of this file into
+each file of checks, so that these need not import anything from here.
 """
 
 import importlib
@@ -59,7 +59,9 @@ def sample():
 
 def trouble(text):
     """The lines of printed text that only an error prints."""
-    return re.findall(r"^(?:Traceback \(most recent call last\):.*|/.*\.py:\d+|.*rna_uiItem\w*:.*|UILayout\..*)$", text, re.M)
+    return re.findall(
+        r"^(?:Traceback \(most recent call last\):.*|/.*\.py:\d+|.*rna_uiItem\w*:.*|UILayout\..*)$", text, re.M
+    )
 
 
 def printed_since(mark):
@@ -75,7 +77,8 @@ def assert_no_trouble_since(mark):
 
 def until(true, limit=300.0, what=""):
     """Wait until something is true, and return the seconds that it took. `what` is told where it never is: a text, or a
-    function that says what there is instead. The limit is for what hangs; the slowest machine gets there long before."""
+    function that says what there is instead. The limit is for what hangs; the slowest machine gets there long
+    before."""
     start = time.monotonic()
     while not true():
         told = (what() if callable(what) else what) if time.monotonic() - start > limit else ""
@@ -85,7 +88,8 @@ def until(true, limit=300.0, what=""):
 
 
 def unrest():
-    """What is still at work, or begins by itself in a moment, and so may still change the file; empty where nothing is."""
+    """What is still at work, or begins by itself in a moment, and so may still change the file; empty where nothing
+is."""
     manager = bpy.context.window_manager
     busy = [operator.bl_idname for operator in window.window.modal_operators]
     busy += [work for work in (manager.beyond_mocap_work.kind, manager.beyond_mocap_work.waiting) if work]
@@ -99,7 +103,8 @@ def unrest():
 
 
 def settled(limit=300.0):
-    """Wait until nothing is at work any more, nor about to begin: what was done just now has had all its consequences."""
+    """Wait until nothing is at work any more, nor about to begin: what was done just now has had all its
+    consequences."""
     quiet = 0
 
     def still():
@@ -135,8 +140,8 @@ def press_all(wanted=None):
 
 
 def press(operator, *words, editor="VIEW_3D", limit=120.0):
-    """Click the operator's button in the tab that is in front, once it is there and may be pressed. `operator` may go on
-    with its first arguments; `words` are others of its call."""
+    """Click the operator's button in the tab that is in front, once it is there and may be pressed. `operator` may go
+    on with its first arguments; `words` are others of its call."""
     area = window.area(editor)
     begins = f"bpy.ops.beyond_mocap.{operator}" + "(" * ("(" not in operator)
 
@@ -157,7 +162,9 @@ def fill_in(path, text, editor="VIEW_3D"):
     """Find the field of a property in our tab by the end of its data path, and type into it."""
     area = window.area(editor)
     yield from window.open_tab(area, TAB)
-    yield from window.click_first(area, window.sidebar(area), lambda found: found.endswith(path), window.field_under_pointer)
+    yield from window.click_first(
+        area, window.sidebar(area), lambda found: found.endswith(path), window.field_under_pointer
+    )
     yield 0.3
     yield from window.press("LEFTMOUSE")
     yield 0.3

@@ -283,7 +283,8 @@ def check_the_tab_in_the_nla_editor():
     region = window.sidebar(area)
     found, _ = yield from window.scan(area, region, window.command_under_pointer)
     operators = {operator_of(call) for call in found}
-    wanted = {"go_to_moment", "add_moment", "move_moment", "delete_moment", "edit_words", "mirror_side", "add_span", "split_span"}
+    wanted = {"go_to_moment", "add_moment", "move_moment", "delete_moment", "edit_words", "mirror_side", "add_span",
+              "split_span"}
     assert wanted <= operators, wanted - operators
     yield from press("go_to_moment", "index=2", editor="NLA_EDITOR")
     yield from until(lambda: picked() == "kick right running low top", what=picked)
@@ -293,7 +294,9 @@ def check_the_tab_in_the_nla_editor():
 def check_many_names_do_not_overlap():
     yield from begin()
     parse, strips = room("beyond_mocap.annotation").parse_timeline, room("scene.strips")
-    words = "".join(f"{1 + n / 3:.3f} kick right running low inside {'front' if n % 2 else 'back'}\n" for n in range(80))
+    words = "".join(
+        f"{1 + n / 3:.3f} kick right running low inside {'front' if n % 2 else 'back'}\n" for n in range(80)
+    )
     strips.write(bpy.context, bpy.context.scene.beyond_mocap.players[0], parse(words))
     bpy.context.preferences.view.ui_scale = 1.3
     yield from settled()

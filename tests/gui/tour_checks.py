@@ -1,5 +1,5 @@
-"""The whole tour by pointer and keys, from an empty file: import, annotate, synthesize, cancel, synthesize, accept, bake to a
-rig, undo all the way back to the empty file, and redo all the way."""
+"""The whole tour by pointer and keys, from an empty file: import, annotate, synthesize, cancel, synthesize, accept,
+bake to a rig, undo all the way back to the empty file, and redo all the way."""
 
 import pathlib
 import sys
@@ -46,7 +46,9 @@ def importing():
 def building():
     """The folder is typed, the library built."""
     yield from fill_in("library_folder", str(sample() / "library"))
-    yield from until(lambda: settings().library_folder == str(sample() / "library"), what=lambda: settings().library_folder)
+    yield from until(
+        lambda: settings().library_folder == str(sample() / "library"), what=lambda: settings().library_folder
+    )
     yield from press_button("build_library")
     yield from settled()
     yield from until(lambda: "clips" in settings().library_holds)

@@ -1,4 +1,5 @@
-"""What is drawn over the 3D view: every overlay, cheap to draw, and nothing left behind or broken by undo, delete, load."""
+"""What is drawn over the 3D view: every overlay, cheap to draw, and nothing left behind or broken by undo, delete,
+load."""
 
 import time
 
@@ -19,7 +20,9 @@ def switch(*names):
 def prepared():
     """Wait until every player that is shown is prepared."""
     store = room("scene.overlays.store")
-    yield from until(lambda: all(store.prepared(player.take) for player in store.shown_players(settings())), what="prepared")
+    yield from until(
+        lambda: all(store.prepared(player.take) for player in store.shown_players(settings())), what="prepared"
+    )
 
 
 def made(seconds=8.0):
@@ -190,10 +193,14 @@ def check_a_warning_goes_to_its_frame():
     area = window.area("VIEW_3D")
     body = player.body
     before = area.spaces.active.region_3d.view_location.copy()
-    with bpy.context.temp_override(window=window.window, area=area, region=next(r for r in area.regions if r.type == "WINDOW")):
+    with bpy.context.temp_override(
+        window=window.window, area=area, region=next(r for r in area.regions if r.type == "WINDOW")
+    ):
         bpy.context.scene.frame_set(1)
         bpy.ops.beyond_mocap.jump_to("INVOKE_DEFAULT", stops="5.000 7.000", player=player.name, frame_view=True)
-    yield from until(lambda: (area.spaces.active.region_3d.view_location - before).length > 0.1, what="the view has moved")
+    yield from until(
+        lambda: (area.spaces.active.region_3d.view_location - before).length > 0.1, what="the view has moved"
+    )
     assert bpy.context.scene.frame_current == 1 + 5 * bpy.context.scene.render.fps
     assert bpy.context.view_layer.objects.active == body
     assert bpy.context.window_manager.beyond_mocap_playhead.why or not room("scene.overlays.store")._prepared

@@ -43,17 +43,17 @@ class Output:
 
 
 class Sent:
-    """What a scout has to do and what it reports. look(): the text of what is under the pointer; wanted(text): whether to
-    click it. `found`: text -> place, of all that was seen on the way; `clicked`: the text of what was; `back`: whether it
-    has come to the end."""
+    """What a scout has to do and what it reports. look(): the text of what is under the pointer; wanted(text): whether
+    to click it. `found`: text -> place, of all that was seen on the way; `clicked`: the text of what was; `back`:
+    whether it has come to the end."""
 
     def __init__(self, window, look, wanted):
         self.window, self.look, self.wanted = window, look, wanted
         self.found, self.text, self.place, self.clicked, self.back = {}, None, None, "", False
 
     def at(self, place):
-        """The pointer is moved here. Of two texts that differ the second was met right here; one that stays, as the first
-        does, may be that of a button that the pointer has left: Blender goes on to name it."""
+        """The pointer is moved here. Of two texts that differ the second was met right here; one that stays, as the
+        first does, may be that of a button that the pointer has left: Blender goes on to name it."""
         if place == self.place and (text := self.look()) != self.text:
             if text and self.text is not None:
                 self.found.setdefault(text, place)
@@ -72,7 +72,8 @@ class Sent:
 
 class Scout(bpy.types.Operator):
     """Reads what is under the pointer while many moves are handled at once. Looking after each of them, as the next one
-    comes, takes a hundredth of the time that it takes to wait until each has been drawn, and nothing moves meanwhile."""
+    comes, takes a hundredth of the time that it takes to wait until each has been drawn, and nothing moves
+    meanwhile."""
 
     bl_idname, bl_label = "window_test.scout", "Scout"
     sent = None
@@ -205,8 +206,9 @@ class Window:
         return manager.clipboard
 
     def click_first(self, area, region, wanted, what, limit=60.0):
-        """Click the first thing that `wanted(text)` is true of, looked for from the top of the region, page by page, again
-        and again: what shows it may not be drawn yet. what(area, region): the text of what is under the pointer."""
+        """Click the first thing that `wanted(text)` is true of, looked for from the top of the region, page by page,
+        again and again: what shows it may not be drawn yet. what(area, region): the text of what is under the
+        pointer."""
         start = time.monotonic()
         while time.monotonic() - start < limit:
             area.tag_redraw()
@@ -220,8 +222,8 @@ class Window:
         raise AssertionError("not found in the sidebar")
 
     def scan(self, area, region, what, wanted=lambda text: False):
-        """Move over all that the region shows, and click the first thing there that `wanted(text)` is true of. Return what
-        is there, its text -> where it is, and what was clicked: its text, or ""."""
+        """Move over all that the region shows, and click the first thing there that `wanted(text)` is true of. Return
+        what is there, its text -> where it is, and what was clicked: its text, or ""."""
         rows = range(region.y + region.height - 8, region.y + 4, -9)
         columns = [region.x + int(region.width * share) for share in (0.2, 0.3, 0.5, 0.6, 0.83)]
         yield 0.05

@@ -71,11 +71,13 @@ def test_the_lint_sees(tmp_path, change, complaint):
 def test_the_lint_sees_what_does_not_belong_in_a_zip(tmp_path):
     path = tmp_path / "x.zip"
     with zipfile.ZipFile(path, "w") as archive:
-        for name in ("__init__.py", "blender_manifest.toml", "tests/core/test_x.py", "wheels/x-1-py3-none-win_amd64.whl"):
+        for name in ("__init__.py", "blender_manifest.toml", "tests/core/test_x.py",
+                     "wheels/x-1-py3-none-win_amd64.whl"):
             archive.writestr(name, "")
     lines = lint.lint_zip(path, LINUX)
     assert [line.split(": ")[1] for line in lines] == [
-        "tests/core/test_x.py does not belong in it", "x-1-py3-none-win_amd64.whl is for another platform", "lacks LICENSE"]
+        "tests/core/test_x.py does not belong in it", "x-1-py3-none-win_amd64.whl is for another platform",
+        "lacks LICENSE"]
 
 
 def test_slimming_keeps_licence_and_metadata_and_rebuilds_the_record(tmp_path):
@@ -85,7 +87,8 @@ def test_slimming_keeps_licence_and_metadata_and_rebuilds_the_record(tmp_path):
         archive.writestr("kloppy/__init__.py", "x = 1\n")
         archive.writestr("kloppy/tests/files/large.dat", "0" * 1000)
         archive.writestr("kloppy-3.19.1.dist-info/METADATA",
-                         "Name: kloppy\nVersion: 3.19.1\nRequires-Dist: fsspec[http]>=2024.12.0\nRequires-Dist: lxml>=4.4.0\n\nfsspec[http]\n")
+                         "Name: kloppy\nVersion: 3.19.1\nRequires-Dist: fsspec[http]>=2024.12.0\nRequires-Dist: "
+                         "lxml>=4.4.0\n\nfsspec[http]\n")
         archive.writestr("kloppy-3.19.1.dist-info/licenses/LICENSE", "BSD")
         archive.writestr("kloppy-3.19.1.dist-info/RECORD", "stale,,\n")
     (tmp_path / "out").mkdir()
@@ -96,7 +99,9 @@ def test_slimming_keeps_licence_and_metadata_and_rebuilds_the_record(tmp_path):
     info = "kloppy-3.19.1+slim.dist-info"
     assert set(files) == {"kloppy/__init__.py", f"{info}/METADATA", f"{info}/licenses/LICENSE", f"{info}/RECORD"}
     metadata = files[f"{info}/METADATA"].decode()
-    assert metadata.startswith("Name: kloppy\nVersion: 3.19.1+slim\nRequires-Dist: fsspec>=2024.12.0\nRequires-Dist: lxml>=4.4.0\n\n")
+    assert metadata.startswith(
+        "Name: kloppy\nVersion: 3.19.1+slim\nRequires-Dist: fsspec>=2024.12.0\nRequires-Dist: lxml>=4.4.0\n\n"
+    )
     rows = {row[0]: row[1:] for row in csv.reader(io.StringIO(files[f"{info}/RECORD"].decode()))}
     assert set(rows) == set(files) and rows[f"{info}/RECORD"] == ["", ""]
     digest = base64.urlsafe_b64encode(hashlib.sha256(b"x = 1\n").digest()).rstrip(b"=").decode()

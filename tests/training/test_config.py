@@ -22,7 +22,8 @@ def test_defaults_and_what_a_file_says(tmp_path):
 
 
 @pytest.mark.parametrize("text, said", [
-    ('{"epoch": 3}', "epoch"), ('{"epochs": 2.5}', "epochs"), ('{"epochs": -1}', "epochs"), ('{"kind": "tree"}', "kind"),
+    ('{"epoch": 3}', "epoch"), ('{"epochs": 2.5}', "epochs"), ('{"epochs": -1}', "epochs"),
+    ('{"kind": "tree"}', "kind"),
     ('{"conditioned": 1}', "conditioned"), ('{"keep": NaN}', "NaN"), ('{"units": "many"}', "units"), ("[1]", "object"),
     ('{"seed": 1, "seed": 2}', "twice"), ("{", "JSON"), ('{"learning_rate": -1}', "learning_rate"),
 ])
@@ -36,7 +37,8 @@ def test_what_is_refused(tmp_path, text, said):
 
 def test_what_is_no_file_of_text_is_refused(tmp_path):
     (tmp_path / "c.json").write_bytes(b"\xff\xfe\x00")
-    for path, said in ((tmp_path / "c.json", "no text"), (tmp_path / "no.json", "no such file"), (tmp_path, "a folder")):
+    for path, said in ((tmp_path / "c.json", "no text"), (tmp_path / "no.json", "no such file"),
+                       (tmp_path, "a folder")):
         with pytest.raises(InputError, match=said) as error:
             read_config(path)
         assert str(error.value).startswith(str(path)) and "config" in str(error.value)
@@ -49,7 +51,9 @@ def test_a_mark_at_the_start_is_no_fault(tmp_path):
 
 # Numbers and texts of every kind under names that exist, and any JSON at all.
 VALUES = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=9))
-ANY = st.recursive(VALUES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=9), inner, max_size=3))
+ANY = st.recursive(
+    VALUES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=9), inner, max_size=3)
+)
 
 
 @settings(max_examples=300, deadline=None)

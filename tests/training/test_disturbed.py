@@ -52,11 +52,13 @@ def test_what_is_drawn_is_as_large_as_asked_and_the_same_again(examples):
     assert np.all(vectors[:, riding] == 0.0) and np.array_equal(vectors, drawn(chains, 4000, 0.05, 1)[0])
     for found, expected in ((vectors[:, list(chains.joints)], 1.0), (facing, FACING), (shift, PLACE)):
         assert np.std(found) == pytest.approx(0.05 * expected, rel=0.05)
-    assert np.allclose(np.linalg.norm(vectors, axis=-1), np.arccos((np.trace(small_turns(vectors), axis1=-2, axis2=-1) - 1) / 2), atol=1e-4)
+    assert np.allclose(np.linalg.norm(vectors, axis=-1),
+                       np.arccos((np.trace(small_turns(vectors), axis1=-2, axis2=-1) - 1) / 2), atol=1e-4)
 
 
 def test_regression_that_saw_poses_beside_the_truth_comes_back_to_it(examples):
-    """Of a body that is turned away by 15 degrees, one predicted frame leaves less than with regression on the truth."""
+    """Of a body that is turned away by 15 degrees, one predicted frame leaves less than with regression on the
+    truth."""
     chains, reach = chains_of(examples[0].motion.skeleton), leg_reach(examples)
     limits = JointLimits(chains.skeleton, learn(np.concatenate([one.motion.rotations for one in examples])))
     pose, truth, window = steps(examples[0])
@@ -67,7 +69,10 @@ def test_regression_that_saw_poses_beside_the_truth_comes_back_to_it(examples):
         params = trained.first(jax.random.key(0))
         networks = {name: to_use(params[name], trained.scales[name]) for name in params}
         says = OneFrame(ThrowModel(trained.settings, chains.skeleton, networks, reach, tuple(examples)), chains)
-        found = [says(*(type(part)(*(one[frame] for one in part)) for part in (turned, window))).positions for frame in (8, 12, 20, 25)]
-        facing = [heading_from_positions(chains.skeleton, one) for one in (np.array(found), truth.positions[[8, 12, 20, 25]])]
+        found = [says(*(type(part)(*(one[frame] for one in part)) for part in (turned, window))).positions
+                 for frame in (8, 12, 20, 25)]
+        facing = [
+            heading_from_positions(chains.skeleton, one) for one in (np.array(found), truth.positions[[8, 12, 20, 25]])
+        ]
         left.append(np.degrees(np.abs(facing[0] - facing[1]).mean()))
     assert left[1] < 0.6 * left[0] and left[1] < 9.0

@@ -24,8 +24,8 @@ def example():
 
 
 def told(settings, chains, reach, pose, truth, window, xp):
-    """Everything that is computed of a step: inputs, phases, truths, ends, and the pose that the truth leads to; of arms
-    and legs one each, because jax compiles for seconds."""
+    """Everything that is computed of a step: inputs, phases, truths, ends, and the pose that the truth leads to; of
+    arms and legs one each, because jax compiles for seconds."""
     found, after = {}, pose
     for name in [name for name in settings.networks if name not in ("left_arm", "right_leg")]:
         y = network_output(name, chains, settings, pose, truth, xp)

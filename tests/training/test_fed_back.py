@@ -27,7 +27,9 @@ def example():
 
 def problem(example, **told):
     limits = JointLimits(example.motion.skeleton, learn(example.motion.rotations))
-    return Networks(recordings([example]), shared_chains([example]), config_of({**SMALL, **told}), leg_reach([example]), limits)
+    return Networks(
+        recordings([example]), shared_chains([example]), config_of({**SMALL, **told}), leg_reach([example]), limits
+    )
 
 
 def one_frame(trained, params):
@@ -64,7 +66,9 @@ def test_children_see_what_their_parents_predict(example):
     with jax.disable_jit():
         (_, parts), (_, other) = one_frame(trained, params), one_frame(trained, worse)
     assert set(parts) == {*HIERARCHY, *(f"{name} ends" for name in HIERARCHY)}
-    assert all(float(other[f"{name} ends"]) != pytest.approx(float(parts[f"{name} ends"]), rel=1e-3) for name in LIMB_OF)
+    assert all(
+        float(other[f"{name} ends"]) != pytest.approx(float(parts[f"{name} ends"]), rel=1e-3) for name in LIMB_OF
+    )
 
 
 def test_inverse_kinematics_as_a_layer_brings_limbs_its_share_of_the_way(example):

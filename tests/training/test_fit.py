@@ -119,7 +119,9 @@ def test_the_rate_falls():
 
 def test_stretches_take_every_frame_once_and_the_seed_decides():
     rows = stretches((10, 4, 2), 3, 0, 0)
-    assert set(map(tuple, stretches((10, 4, 2), 1, 0, 5))) == {(0, i) for i in range(9)} | {(1, i) for i in range(3)} | {(2, 0)}
+    assert set(map(tuple, stretches((10, 4, 2), 1, 0, 5))) == {(0, i) for i in range(9)} | {
+        (1, i) for i in range(3)
+    } | {(2, 0)}
     assert all(start + 3 <= (10, 4, 2)[who] - 1 for who, start in rows)
     assert np.array_equal(rows, stretches((10, 4, 2), 3, 0, 0))
     assert batches(np.arange(5), 2).tolist() == [[0, 1], [2, 3], [4, 0]]

@@ -22,7 +22,8 @@ from training.networks import to_use
 from training.recordings import recordings
 from training.train import train
 
-SMALL = {"units": 12, "layers": 1, "points": 2, "epochs": 8, "batch": 32, "mirrored": False, "noise": 0.0, "fps": 15.0, "macro": 50,
+SMALL = {"units": 12, "layers": 1, "points": 2, "epochs": 8, "batch": 32, "mirrored": False, "noise": 0.0, "fps": 15.0,
+         "macro": 50,
          "linear_start": False}
 
 
@@ -31,7 +32,9 @@ def examples():
     made = []
     for number, target in enumerate([(12.0, 2.0, 1.0), (9.0, -3.0, 0.4)]):
         thrown = throw(target, 22.0, fps=60.0)
-        made.append(example_of(f"throw {number}", "someone", thrown.motion, "right_hand", thrown.release, target, fps=15.0))
+        made.append(
+            example_of(f"throw {number}", "someone", thrown.motion, "right_hand", thrown.release, target, fps=15.0)
+        )
     return made
 
 

@@ -24,5 +24,7 @@ def test_a_linear_map_is_a_network(points):
     map_ = linear_start(told, RIDGE["plain" if points == 1 else "phased"])
     every = np.einsum("koi,ni->nko", map_.weights, (inputs - mean_x) / scale_x) + map_.biases
     wanted = np.einsum("nk,nko->no", theta, every) * scale_y + mean_y
-    assert linear_model([example], settings).networks["left_leg"].predict(inputs, phases) == pytest.approx(wanted, abs=1e-4)
+    assert linear_model([example], settings).networks["left_leg"].predict(inputs, phases) == pytest.approx(
+        wanted, abs=1e-4
+    )
     assert np.abs(wanted - answers).mean() < 0.05

@@ -35,7 +35,8 @@ _TURN, _PACE, _LATER, _SPEED, _OWN_SPEED, _REST = 8.0, 1.5, 1.5, 30.0, 300.0, 10
 _ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41
 _LOOKS, _TRIED = 4, 2
 _LEAST_STEP = 0.05  # of what the slopes say, below which nothing more comes of it
-_FAR, _FAR_ROUNDS = 1.0, 4  # m of miss after which, and the rounds after which, little more than contortions comes of it
+# m of miss after which, and the rounds after which, little more than contortions comes of it
+_FAR, _FAR_ROUNDS = 1.0, 4
 _STEP = 1e-3  # of frames, metres, m/s and radians, in differences
 _LEAST = 3  # frames that a motion needs before and after the release
 

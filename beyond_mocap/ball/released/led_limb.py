@@ -13,7 +13,8 @@ from .letting_go import AtFoot, InHand, carried
 from .shift import Shifts
 
 Hold = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""From local rotations (W, C, 4) of a limb's joints, and from those before they were changed, to those that it can have."""
+"""From local rotations (W, C, 4) of a limb's joints, and from those before they were changed, to those that it can
+have."""
 _NUDGE = np.array([0.005, 0.005, 0.005, 0.2, 0.2, 0.2])  # m, m/s, by which a limb is tried
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...errors import told_time
 from .results import LONGEST, MatchResults, PlayerResult, read_match_results
 from .strips import heat_strip, png
 from .tables import own_warnings, shared_warnings, team_table
@@ -210,9 +211,9 @@ def _frame(match: MatchResults, time: float) -> str:
 
 
 def _go_to(one: WorstSecond) -> str:
-    return escape(f"bpy.ops.beyond_mocap.match_second(seconds={one.time:g}, player={one.player.id!r})")
+    return escape(f"bpy.ops.beyond_mocap.match_second(seconds={told_time(one.time)}, player={one.player.id!r})")
 
 
 def _clock(seconds: float) -> str:
     """Seconds as the page says them: 754 s (12:34)."""
-    return f"{seconds:g} s ({int(seconds // 60)}:{int(seconds % 60):02d})"
+    return f"{told_time(seconds)} s ({int(seconds // 60)}:{int(seconds % 60):02d})"

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from ..report import check_depth
 
 MADE = "done"
 FIGURES = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
@@ -190,4 +191,5 @@ def _object(path: Path) -> Mapping:
         trouble = "holds no object"
     if not isinstance(found, Mapping):
         raise InputError(path, f"cannot be read: {trouble}", "what 'beyond-mocap match' writes", "make the match again")
+    check_depth(found, path)
     return found

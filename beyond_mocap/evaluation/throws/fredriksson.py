@@ -1,4 +1,5 @@
-"""What the tables of Fredriksson §8.3 print, to stand beside ours: four subjects, each row one trained model, in metres.
+"""What the tables of Fredriksson §8.3 print, to stand beside ours: four subjects, each row one trained model, in
+metres.
 
 Where his own tables do not agree (8.3, 8.4 and 8.7 against the differences of 8.1, 8.2, 8.5, 8.6) they are kept as
 printed; `disagreements` finds the places.
@@ -17,7 +18,8 @@ PLACES = (*EFFECTOR_NAMES, "impact")
 
 @dataclass(frozen=True, eq=False)
 class Printed:
-    """differences (4, 5): limbs and impact, new - old; mean, spread, p (5,): his last rows, NaN where he prints none."""
+    """differences (4, 5): limbs and impact, new - old; mean, spread, p (5,): his last rows, NaN where he prints
+    none."""
 
     differences: np.ndarray
     mean: np.ndarray

@@ -18,7 +18,8 @@ body { font: 15px/1.45 system-ui, sans-serif; color: #222; background: #fff; max
 h1 { font-size: 1.5em; margin-bottom: 0; overflow-wrap: anywhere } h2 { font-size: 1.15em; margin: 1.6em 0 .4em }
 p { margin: .3em 0; overflow-wrap: anywhere } .quiet { color: #666; font-weight: normal }
 table { border-collapse: collapse; font-size: 14px } tr { border-bottom: 1px solid #eee }
-th, td { padding: .18em 0 .18em .9em; text-align: left; vertical-align: top } th:first-child, td:first-child { padding-left: 0 }
+th, td { padding: .18em 0 .18em .9em; text-align: left; vertical-align: top }
+th:first-child, td:first-child { padding-left: 0 }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap }
 td.name { overflow-wrap: anywhere; min-width: 9em; max-width: 22em }
 .scroll { overflow-x: auto } .met { color: #23703a } .missed { color: #b3261e; font-weight: 600 }
@@ -27,7 +28,8 @@ svg { max-width: 100%; height: auto; display: block; font: 12px system-ui, sans-
 _FIGURES = (
     ("impact_m", 1.0, 2, "m", "from the ball's impact on a wall 4 m away to where it was to be"),
     ("far_impact", 1.0, 2, "m", "the same where the target is"),
-    ("own_impact", 1.0, 2, "m", "from the wanted ball's own impact to its target (what scaling by height does to a flight)"),
+    ("own_impact", 1.0, 2, "m", "from the wanted ball's own impact to its target (what scaling by height does to a "
+                                "flight)"),
     ("impacts_culled", 1.0, 0, "", "impacts left out of these, beyond three standard deviations"),
     ("head", 1.0, 1, "°", "between the head and the recorded one"),
     ("head_share", 1.0, 2, "×", "what the head turns against the chest, over the recording"),
@@ -100,7 +102,9 @@ def _picture(report: Mapping) -> str:
     rows = []
     for order, effector in enumerate(EFFECTOR_NAMES):
         for title, key in _rows(report):
-            dots = [(100.0 * one[key][order], str(one["name"])) for one in report["each"] if one[key][order] is not None]
+            dots = [
+                (100.0 * one[key][order], str(one["name"])) for one in report["each"] if one[key][order] is not None
+            ]
             rows.append((f"{effector}, {title}", key, dots))
     if not any(dots for _, _, dots in rows):
         return ""

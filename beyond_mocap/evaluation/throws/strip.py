@@ -14,8 +14,8 @@ _COLOURS = {"network": "#c2571a", "deviation": "#1f6fb2"}
 
 
 def strip(rows: Sequence[tuple[str, str, Sequence[tuple[float, str]]]], aim: float, unit: str) -> str:
-    """The picture. rows: title, kind (of _COLOURS), and (value, what it is of) of each dot; aim: value of an upright line;
-    unit: the axis's text."""
+    """The picture. rows: title, kind (of _COLOURS), and (value, what it is of) of each dot; aim: value of an upright
+    line; unit: the axis's text."""
     values = [value for _, _, dots in rows for value, _ in dots]
     step, end = _axis(max([1.2 * aim, *values]))
     bottom = _TOP + _LINE * len(rows)

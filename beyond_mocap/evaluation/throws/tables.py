@@ -35,7 +35,8 @@ def test_table(new: Subjects, old: Subjects, his: fredriksson.Printed | None = N
     for subject in both:
         lines.append(_row([subject, *map(_signed, _row_of(new, subject) - _row_of(old, subject))]))
     lines += [
-        _row(["avg.", *[_signed(one.mean) for one in found]]), _row(["stdev.", *_numbers([one.spread for one in found])]),
+        _row(["avg.", *[_signed(one.mean) for one in found]]),
+        _row(["stdev.", *_numbers([one.spread for one in found])]),
         _row(["Shapiro-Wilk p", *[_p(one.normal) for one in found]]), _row(["p", *[_told(one) for one in found]]),
         _row(["would be seen", *_numbers([_seen(one) for one in found])]),
     ]  # fmt: skip

@@ -46,8 +46,8 @@ def trials_report(folder: Path) -> str:
 def _fit_text(made: Sequence[TrialResult]) -> str:
     residual, single = (_mean([getattr(r, name) for r in made]) for name in ("residual", "single"))
     rate = _mean([r.rate for r in made])
-    return (f"<p>Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on the whole. "
-            "Bars end one standard deviation up and down.</p>")
+    return (f"<p>Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on the "
+            "whole. Bars end one standard deviation up and down.</p>")
 
 
 def _throws(made: Sequence[TrialResult]) -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from ..report import check_depth
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,10 @@ def _number(value) -> float:
 
 def _read(path: Path) -> Mapping:
     try:
-        return json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError) as error:
+        found = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(path, f"cannot be read: {error}", "a report in JSON", "reconstruct the folder again") from None
+    if not isinstance(found, Mapping):
+        raise InputError(path, "holds no object", "a report in JSON", "reconstruct the folder again")
+    check_depth(found, path)
+    return found

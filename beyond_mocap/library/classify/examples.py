@@ -13,6 +13,7 @@ from ...errors import Cancelled, InputError
 from ...motion.humanoid import identify
 from ...motion.motion import Motion
 from ..proposals import GAITS, Proposal, propose
+from ..word_sources import is_open
 from .signals import Signals, signals
 
 _COLOURS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], "low", "middle", "high"))
@@ -48,14 +49,20 @@ def act_of(row: ClipAnnotation) -> str:
 
 
 def examples_of(
-    folder: str | Path, unit: float | None = None, progress=None, cache_dir=None, cancelled=None
+    folder: str | Path, unit: float | None = None, progress=None, cache_dir=None, cancelled=None, note=None
 ) -> tuple[Example, ...]:
-    """The annotated clips below a library's folder, in its order. unit: metres per unit of the BVH files, guessed where
-    None. progress(fraction, text). InputError where no clip has words, a file cannot be read or has no legs; Cancelled."""
-    read = _clips(folder, True, unit, progress, cache_dir, cancelled)
+    """The annotated clips below a library's folder, in its order. What a table has as proposed, and nobody has accepted
+    (`word_sources.is_open`), is no example: note(text) tells how many rows these are. unit: metres per unit of the BVH
+    files, guessed where None. progress(fraction, text). InputError where no clip has words, a file cannot be read or
+    has no legs; Cancelled."""
+    clips = _Clips(folder, cache_dir)
+    read = clips.read(True, unit, progress, cancelled)
     out = tuple(Example.of(name, motion, rows) for name, motion, rows in read)
     if not out:
-        raise InputError(folder, "no clip with words", "some ten annotated clips", "annotate a few, then learn")
+        found = "no clip with words" + (f" ({clips.told()})" if clips.open else "")
+        raise InputError(folder, found, "some ten annotated clips", "annotate a few, then learn")
+    if clips.open and note is not None:
+        note(clips.told())
     return out
 
 
@@ -63,29 +70,46 @@ def without_words(
     folder: str | Path, unit: float | None = None, progress=None, cache_dir=None, cancelled=None
 ) -> Iterator[tuple[str, Motion]]:
     """The clips of which nobody has said anything yet: path below the folder, and motion. As `examples_of`."""
-    for name, motion, _ in _clips(folder, False, unit, progress, cache_dir, cancelled):
+    for name, motion, _ in _Clips(folder, cache_dir).read(False, unit, progress, cancelled):
         yield name, motion
 
 
-def _clips(folder, worded: bool, unit, progress, cache_dir, cancelled) -> Iterator[tuple]:
-    """(path below the folder, motion, rows) of all clips that have words, or of those that have none."""
-    from ...files import bvh
-    from .. import cache
-    from ..scan import Annotations, readable_clips
+class _Clips:
+    """A library's recordings, and what people have said of them. open: rows of tables that were proposed only."""
 
-    folder = Path(folder)
-    paths, conversions, _ = readable_clips(folder, cache.place(folder, cache_dir)[0])
-    annotations = Annotations(folder, paths)
-    for number, path in enumerate(paths):
-        file = conversions.readable(path)
-        if cancelled is not None and cancelled():
-            raise Cancelled("looking at clips: cancelled")
-        if progress is not None:
-            progress(number / len(paths), f"Looking at {path.name}")
-        if bool(annotations.of(path, 30.0)) == worded:
+    def __init__(self, folder: str | Path, cache_dir):
+        from .. import cache
+        from ..scan import Annotations, readable_clips
+
+        self._folder, self.open = Path(folder), 0
+        place = cache.place(self._folder, cache_dir)[0]
+        self._paths, self._conversions, _ = readable_clips(self._folder, place)
+        self._said = Annotations(self._folder, self._paths, self._is_open)
+
+    def _is_open(self, row) -> bool:
+        self.open += is_open(row)
+        return is_open(row)
+
+    def told(self) -> str:
+        """How many rows are left out."""
+        what = "1 proposed row is" if self.open == 1 else f"{self.open} proposed rows are"
+        return f"{what} no example, for nobody has accepted {'it' if self.open == 1 else 'them'}"
+
+    def read(self, worded: bool, unit, progress, cancelled) -> Iterator[tuple]:
+        """(path below the folder, motion, rows) of all clips that have words, or of those that have none."""
+        from ...files import bvh
+
+        for number, path in enumerate(self._paths):
+            file = self._conversions.readable(path)
+            if cancelled is not None and cancelled():
+                raise Cancelled("looking at clips: cancelled")
+            if progress is not None:
+                progress(number / len(self._paths), f"Looking at {path.name}")
+            if bool(self._said.of(path, 30.0)) != worded:
+                continue
             motion = bvh.read(file, unit if file == path else None).motion
             try:
                 identify(motion.skeleton)
             except InputError as error:  # skeletons do not know their files
                 raise InputError(path, str(error)) from None
-            yield path.relative_to(folder).as_posix(), motion, annotations.of(path, motion.fps)
+            yield path.relative_to(self._folder).as_posix(), motion, self._said.of(path, motion.fps)

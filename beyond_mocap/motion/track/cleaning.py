@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, TimedLine
+from ...errors import InputError, TimedLine, told_time
 from ..runs import runs
 from .data import Track
 from .sampling import GAP_INTERVALS, LONG_GAP
@@ -120,7 +120,7 @@ def _with_missing_rows(times, positions, ball, name: str):
     gaps = np.flatnonzero(steps > GAP_INTERVALS * interval + 1e-9)
     if len(gaps) and steps[gaps].max() > _LONGEST_GAP:
         worst = gaps[np.argmax(steps[gaps])]
-        found = f"nothing between {times[worst]:g} and {times[worst + 1]:g} s"
+        found = f"nothing between {told_time(times[worst])} and {told_time(times[worst + 1])} s"
         raise InputError(name, found, "gaps of an hour at most", "cut the track")
     new = [np.linspace(times[i], times[i + 1], int(round(steps[i] / interval)) + 1)[1:-1] for i in gaps]
     at = np.repeat(gaps + 1, [len(piece) for piece in new])
@@ -164,7 +164,9 @@ def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     if len(times) < 5:
         return wrong
     off = _off_line(times[1:-1], positions[1:-1], times[:-2], positions[:-2], times[2:], positions[2:])
-    first, last = (_off_line(times[i], positions[i], times[j], positions[j], times[k], positions[k]) for i, j, k in _ENDS)
+    first, last = (
+        _off_line(times[i], positions[i], times[j], positions[j], times[k], positions[k]) for i, j, k in _ENDS
+    )
     beside = np.concatenate([[first], off, [last]])
     far = off > _SPIKE + _HARDEST / 8.0 * (times[2:] - times[:-2]) ** 2
     wrong[1:-1] = far & (off > 1.5 * np.maximum(beside[:-2], beside[2:]))
@@ -305,7 +307,9 @@ def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[str]:
     fast = track.times[1:][speed > FASTEST]
     out = []
     if snaps:
-        out.append(TimedLine(f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}", *zip(snaps, snaps)))
+        out.append(
+            TimedLine(f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}", *zip(snaps, snaps))
+        )
     if len(fast):
         out.append(TimedLine(f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}", *zip(fast, fast)))
     return out + [TimedLine(f"no samples from {a:.2f} to {b:.2f} s", (a, b)) for a, b in gaps if b - a > LONG_GAP]

@@ -1,4 +1,5 @@
-"""Tracks that nobody has measured: a line on the ground with speeds at its points, run along at a steady rate of samples.
+"""Tracks that nobody has measured: a line on the ground with speeds at its points, run along at a steady rate of
+samples.
 
 Between two points the speed changes evenly with time, as under a steady pull: its square changes evenly along the way,
 which lets a player start from a stand and come to one. A point with speed 0 is a stop.
@@ -30,10 +31,10 @@ def along(
     """The track of who goes along a line.
 
     line: (N, 2) metres, close enough that its corners do not show. arc: (P,) metres along it at which the P points lie,
-    rising, the first 0 and the last the line's length. speeds: (P,) m/s at the points. waits: (P,) seconds that are spent
-    where the speed is 0. start: seconds of the first sample. name: for messages. Samples lie 1 / HZ s apart, nearly: the
-    first and the last are the line's ends. InputError for a line that is too short, two stops in a row, speeds that are
-    none or beyond FASTEST.
+    rising, the first 0 and the last the line's length. speeds: (P,) m/s at the points. waits: (P,) seconds that are
+    spent where the speed is 0. start: seconds of the first sample. name: for messages. Samples lie 1 / HZ s apart,
+    nearly: the first and the last are the line's ends. InputError for a line that is too short, two stops in a row,
+    speeds that are none or beyond FASTEST.
     """
     line, arc, speeds, waits = (np.asarray(values, dtype=float) for values in (line, arc, speeds, waits))
     _check(line, arc, speeds, name)
@@ -74,9 +75,9 @@ def moved(times: np.ndarray, places: np.ndarray, name: str = "track") -> Track:
 def nurbs_line(
     points: np.ndarray, weights: np.ndarray, order: int, clamped: bool, fine: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The line (N, 3) of a NURBS with even knots, `fine` pieces for each control point but one, and (P,) where on it each
-    of the P control points counts most: at the mean of its knots. points (P, 3), weights (P,), order: degree plus one.
-    clamped: whether it begins and ends in its first and last point."""
+    """The line (N, 3) of a NURBS with even knots, `fine` pieces for each control point but one, and (P,) where on it
+    each of the P control points counts most: at the mean of its knots. points (P, 3), weights (P,), order: degree plus
+    one. clamped: whether it begins and ends in its first and last point."""
     from scipy.interpolate import BSpline
 
     count, degree = len(points), min(order, len(points)) - 1

@@ -142,8 +142,8 @@ def leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Wind
 
 
 def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
-    """Relative rotations (..., 6 each) that two-bone inverse kinematics gives the limb of frame n for the place where its
-    end is wanted in n + 1: of the joints that its network speaks of."""
+    """Relative rotations (..., 6 each) that two-bone inverse kinematics gives the limb of frame n for the place where
+    its end is wanted in n + 1: of the joints that its network speaks of."""
     name = LIMB_OF[number]
     local = {joint: pose.local[..., joint, :, :] for joint in chains.members[name]}
     limb = spread(chains.skeleton, after, chains.known[name], after.root, local, {}, xp)

@@ -112,7 +112,9 @@ def _check_widths(model: ThrowModel, chains: Chains) -> None:
         network = model.networks[name]
         if (network.inputs, network.outputs) != (inputs, outputs):
             found = f"{network.inputs} inputs and {network.outputs} outputs"
-            raise InputError(f"model: network {name}", found, f"{inputs} and {outputs} on this skeleton", "train it again")
+            raise InputError(
+                f"model: network {name}", found, f"{inputs} and {outputs} on this skeleton", "train it again"
+            )
 
 
 def _limits_of(model: ThrowModel) -> np.ndarray:

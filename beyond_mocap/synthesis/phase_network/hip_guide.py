@@ -1,5 +1,5 @@
-"""Where hands and feet would carry the hips: four places say how far a body has come, but hardly which way it faces; how
-all of them turn together from one frame to the next says how it turns."""
+"""Where hands and feet would carry the hips: four places say how far a body has come, but hardly which way it faces;
+how all of them turn together from one frame to the next says how it turns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The joint limits of a model's limb on other bones: of any rig that its motions are brought to, and of the mirror image.
+"""The joint limits of a model's limb on other bones: of any rig that its motions are brought to, and of the mirror
+image.
 
 Limits are boxes in the axes of the model's joints (`limits`). Retargeting and mirroring carry whole segments over, so
 that a joint of the other body has, up to a fixed turn (with a reflection, where mirrored) of its axes, the world
@@ -38,8 +39,8 @@ class LimbLimits:
         cls, limits: JointLimits, own: Motion, own_joints: tuple[int, ...], shown: Motion, joints: tuple[int, ...],
         mirrored: bool = False,
     ) -> LimbLimits:
-        """The limits of a model's limb `own_joints` for the limb `joints` of `shown`, which shows `own`, a motion of the
-        model's skeleton, frame by frame, at the same place. mirrored: it shows its mirror image at y = 0."""
+        """The limits of a model's limb `own_joints` for the limb `joints` of `shown`, which shows `own`, a motion of
+        the model's skeleton, frame by frame, at the same place. mirrored: it shows its mirror image at y = 0."""
         frames = np.unique(np.linspace(0, len(own) - 1, _FRAMES).astype(int))
         turns = [quaternion.to_matrix(forward_kinematics(_at(motion, frames))[1]) for motion in (own, shown)]
         image = _MIRROR if mirrored else np.eye(3)
@@ -49,12 +50,16 @@ class LimbLimits:
             left, _, right = np.linalg.svd(both.mean(axis=0))
             return left @ right
 
-        parents = [[motion.skeleton.parents[joint] for joint in limb] for motion, limb in ((own, own_joints), (shown, joints))]
-        return cls(limits.of_joints(own_joints), tuple(joints), between(*parents), between(list(own_joints), list(joints)))
+        parents = [
+            [motion.skeleton.parents[joint] for joint in limb] for motion, limb in ((own, own_joints), (shown, joints))
+        ]
+        return cls(
+            limits.of_joints(own_joints), tuple(joints), between(*parents), between(list(own_joints), list(joints))
+        )
 
     def held(self, rotations: np.ndarray, given: np.ndarray) -> np.ndarray:
-        """Local rotations (W, C, 4) of the limb's joints brought within their limits; where `given` (W, C, 4) lies beyond
-        them, no further than that."""
+        """Local rotations (W, C, 4) of the limb's joints brought within their limits; where `given` (W, C, 4) lies
+        beyond them, no further than that."""
         local, over = self.limits.within(self._carried(rotations), self._carried(given))
         if not over.any():
             return rotations

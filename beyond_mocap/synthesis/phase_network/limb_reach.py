@@ -62,7 +62,9 @@ class LimbReach:
         self._above_upper, self._above_middle, self._above_end = (
             [parents[joint] for joint in column] for column in (self._upper, self._middle, self._end)
         )
-        middle, end = (self._way_down(high, low) for high, low in ((self._upper, self._middle), (self._middle, self._end)))
+        middle, end = (
+            self._way_down(high, low) for high, low in ((self._upper, self._middle), (self._middle, self._end))
+        )
         self._lengths = middle + end
         self._kept = [0, 1, 2, 3] if hands_given else [2, 3]
 
@@ -77,7 +79,8 @@ class LimbReach:
         return posed(self.chains, root, self._bent(pose.local, places, turns, end, target))
 
     def all_the_way(self, pose: Pose, wanted: np.ndarray) -> np.ndarray:
-        """Local rotations (J, 3, 3) of the pose with its effectors brought to wanted (4, 3) m, as near as limbs reach."""
+        """Local rotations (J, 3, 3) of the pose with its effectors brought to wanted (4, 3) m, as near as limbs
+        reach."""
         tip, end = pose.positions[self._tip], pose.positions[self._end]
         return self._bent(pose.local, pose.positions, pose.turns, end, wanted - (tip - end))
 

@@ -138,8 +138,8 @@ class JointLimits:
         return out
 
     def within(self, local: np.ndarray, given: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Local rotations (..., J, 3, 3) brought back, and how far they were outside (..., J) rad. given (..., J, 3, 3):
-        rotations that are allowed, even where they lie outside."""
+        """Local rotations (..., J, 3, 3) brought back, and how far they were outside (..., J) rad. given (..., J, 3,
+        3): rotations that are allowed, even where they lie outside."""
         low, high, most = self.low, self.high, _BACK
         if given is not None:
             allowed = self.offsets(given)

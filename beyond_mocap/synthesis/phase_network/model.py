@@ -34,12 +34,12 @@ class ModelSettings:
     """What kind of model it is.
 
     kind: hierarchy (six networks) or single (one). points: control points of the phase function; 1 is feed-forward.
-    layers, units: hidden layers of each network, and units in each. wrist: whether the hands' rotations are given in the
-    description or inferred. frame: positions from where the hips stand on the ground in each frame (hip), or from where
-    the example begins (static, §7.3's capture frame). phase: by travelled distance (§7.4.1) or warped in time (§9.3).
-    ik_layer: limbs were trained with their inverse kinematics inside the loss. conditioned: children were trained on
-    what their parents predict (§9.4). guided: the networks of limbs are told how inverse kinematics would reach
-    (`features.reached`). carried: the network of the hips is told where hands and feet would carry them
+    layers, units: hidden layers of each network, and units in each. wrist: whether the hands' rotations are given in
+    the description or inferred. frame: positions from where the hips stand on the ground in each frame (hip), or from
+    where the example begins (static, §7.3's capture frame). phase: by travelled distance (§7.4.1) or warped in time
+    (§9.3). ik_layer: limbs were trained with their inverse kinematics inside the loss. conditioned: children were
+    trained on what their parents predict (§9.4). guided: the networks of limbs are told how inverse kinematics would
+    reach (`features.reached`). carried: the network of the hips is told where hands and feet would carry them
     (`hip_guide.carried`). fps: frames per second. action: throw or kick.
     """
 
@@ -81,8 +81,8 @@ class ModelSettings:
 class ThrowModel:
     """A trained model of throws or kicks.
 
-    networks: by name, `settings.networks`. leg_reach: {"left": (shortest, longest), "right": ...}, metres from the top of
-    the leg to the toe in the training data (eq. 7.3). examples: recorded movements in the normalised frame, at the
+    networks: by name, `settings.networks`. leg_reach: {"left": (shortest, longest), "right": ...}, metres from the top
+    of the leg to the toe in the training data (eq. 7.3). examples: recorded movements in the normalised frame, at the
     model's rate, on its skeleton. stature: metres. joint_limits: (J, 3, 3) radians, as of `limits.learn` of the
     training data, or None. reference: (N,) the limb's speed over evenly spaced phases, which `warped` phases
     are warped to, or None. trained_on: one line. notes: one line each.

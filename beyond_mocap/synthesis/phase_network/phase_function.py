@@ -1,8 +1,8 @@
 """How much each control point of a phase-functioned network counts at a phase: a Catmull-Rom spline that does not close
 (Fredriksson §3.6.2 eq. 3.25-3.26).
 
-As printed, theta_k1 and theta_k2 do not sum to one with the others. The uniform Catmull-Rom spline through p_0 .. p_3 is
-p_1 + t (p_2 - p_0) / 2 + t^2 (p_0 - 5/2 p_1 + 2 p_2 - 1/2 p_3) + t^3 (3/2 (p_1 - p_2) + 1/2 (p_3 - p_0)); collecting
+As printed, theta_k1 and theta_k2 do not sum to one with the others. The uniform Catmull-Rom spline through p_0 .. p_3
+is p_1 + t (p_2 - p_0) / 2 + t^2 (p_0 - 5/2 p_1 + 2 p_2 - 1/2 p_3) + t^3 (3/2 (p_1 - p_2) + 1/2 (p_3 - p_0)); collecting
 each point's factors gives theta_k1 = 1 - 5/2 t^2 + 3/2 t^3 (printed: 1/2 t^3) and
 theta_k2 = 1/2 t + 2 t^2 - 3/2 t^3 (printed: 1/2 t^2); theta_k0 and theta_k3 are printed right.
 """

@@ -1,5 +1,5 @@
-"""How far a movement has come, 0 .. 1 (Fredriksson §7.4): by what the limb has travelled, by how far a leg is stretched,
-or by time warping (§9.3)."""
+"""How far a movement has come, 0 .. 1 (Fredriksson §7.4): by what the limb has travelled, by how far a leg is
+stretched, or by time warping (§9.3)."""
 
 from __future__ import annotations
 
@@ -110,12 +110,12 @@ def _warped_to(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 
 def warp(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Where in `reference` (M,) each moment of `curve` (N,) belongs: indices (N,), rising, 0 at the start and M - 1 at the
-    end.
+    """Where in `reference` (M,) each moment of `curve` (N,) belongs: indices (N,), rising, 0 at the start and M - 1 at
+    the end.
 
-    Dynamic time warping (Sakoe and Chiba 1978): the cheapest monotone road through |curve_i - reference_j|, within a band
-    about the straight one. A moment that belongs to several indices is given their middle; flat stretches of the road
-    are made to rise, because a phase that stands still says nothing.
+    Dynamic time warping (Sakoe and Chiba 1978): the cheapest monotone road through |curve_i - reference_j|, within a
+    band about the straight one. A moment that belongs to several indices is given their middle; flat stretches of the
+    road are made to rise, because a phase that stands still says nothing.
     """
     cost = np.abs(curve[:, None] - reference[None, :])
     count, length = cost.shape

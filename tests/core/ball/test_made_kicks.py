@@ -89,7 +89,8 @@ def test_a_tall_body_kicks_too():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"foot": "third"}, {"style": "toe"}, {"speed": 60.0}, {"target": (60.0, 0.0, 2.0)}, {"target": (4.0, 0.0, 5.0)}]
+    "wrong", [{"foot": "third"}, {"style": "toe"}, {"speed": 60.0}, {"target": (60.0, 0.0, 2.0)},
+              {"target": (4.0, 0.0, 5.0)}]
 )
 def test_what_cannot_be_kicked_is_told(wrong):
     with pytest.raises(InputError):

@@ -9,14 +9,18 @@ FREE = Ball("free", 0.05, 0.2, 9.81)
 
 
 def test_a_ball_without_air_meets_it_where_a_parabola_does():
-    place, seconds = meets_wall(np.array([0.0, 0, 1.5]), np.array([20.0, 2.0, 3.0]), FREE, np.array([10.0, 0.0]), [1.0, 0])
+    place, seconds = meets_wall(
+        np.array([0.0, 0, 1.5]), np.array([20.0, 2.0, 3.0]), FREE, np.array([10.0, 0.0]), [1.0, 0]
+    )
     assert abs(seconds - 0.5) < 1e-6
     assert np.allclose(place, [10.0, 1.0, 1.5 + 1.5 - 0.5 * 9.81 * 0.25], atol=1e-6)
 
 
 def test_a_slanting_wall_and_air():
     ahead = np.array([1.0, 1.0])
-    place, seconds = meets_wall(np.array([0.0, 0, 2.0]), np.array([15.0, 12.0, 1.0]), BASEBALL, np.array([6.0, 0.0]), ahead)
+    place, seconds = meets_wall(
+        np.array([0.0, 0, 2.0]), np.array([15.0, 12.0, 1.0]), BASEBALL, np.array([6.0, 0.0]), ahead
+    )
     assert abs((place[:2] - [6.0, 0.0]) @ ahead) < 1e-4
     assert seconds > 6.0 / 27.0
 

@@ -31,7 +31,8 @@ def test_where_all_holds_nothing_is_told(jog, told, track_of):
     ([(12, 18)], "0.4-0.6 s"),
     ([(12, 18), (24, 30)], "0.4-1.0 s"),
     ([(12, 18), (60, 61)], "0.4-0.6, 2.0 s"),
-    ([(i * 30, i * 30 + 2 + i) for i in range(8)], "2.0-2.1, 3.0-3.1, 4.0-4.2, 5.0-5.2, 6.0-6.2, 7.0-7.3 s and 2 shorter"),
+    ([(i * 30, i * 30 + 2 + i) for i in range(8)],
+     "2.0-2.1, 3.0-3.1, 4.0-4.2, 5.0-5.2, 6.0-6.2, 7.0-7.3 s and 2 shorter"),
 ])
 def test_stretches_are_joined_and_the_longest_named(spans, text):
     flags = np.zeros(300, bool)
@@ -99,7 +100,9 @@ def test_words_that_are_not_shown_are_told_but_for_key_moments_and_what_nobody_h
 def test_a_body_in_the_ground_is_told(jog, told):
     places = jog.motion.root_positions.copy()
     places[60:91, 2] -= 0.2
-    (line,) = [line for line in told(replace(jog, motion=replace(jog.motion, root_positions=places))) if "ground" in line]
+    (line,) = [
+        line for line in told(replace(jog, motion=replace(jog.motion, root_positions=places))) if "ground" in line
+    ]
     assert line.startswith("12.0-13.0 s: ")
 
 
@@ -117,4 +120,6 @@ def test_every_line_carries_its_seconds(cut, told, library, track_of):
     report = evaluate(take, track_of(take, shift=(0.5, 0.0)), library)
     assert len(report["warning_seconds"]) == len(report["warnings"]) > 1
     assert all(first <= last for spans in report["warning_seconds"] for first, last in spans)
-    assert report["warning_seconds"][[line.split(":")[0] for line in report["warnings"]].index("12.0-13.9 s")] == [[12.0, 13.933]]
+    assert report["warning_seconds"][[line.split(":")[0] for line in report["warnings"]].index("12.0-13.9 s")] == [
+        [12.0, 13.933]
+    ]

@@ -162,6 +162,7 @@ def test_seconds_that_no_match_has_do_not_stop_the_page(tmp_path, changed):
 
 @pytest.mark.parametrize("changed, told", [
     ({"warnings": 5}, "its warnings are no list"), ({"warnings": None}, "its warnings are no list"),
+    ({"skate": json.loads('{"a":' * 900 + "1" + "}" * 900)}, "nested more than 30 deep"),
     ({"root_error_m": {"mean": 10**400}}, ""), ({"per_second": {"start_s": 1e300, "root_error_m": [1.0]}}, ""),
 ])
 def test_odd_values_of_one_player_touch_nobody_else(tmp_path, changed, told):
@@ -170,7 +171,8 @@ def test_odd_values_of_one_player_touch_nobody_else(tmp_path, changed, told):
     assert told in text and f"{1 if told else 2} of 2 players made" in text and "8.0 cm off the track" in text
 
 
-@pytest.mark.parametrize("told", ["", "[]", "{\"players\": 3}", "{\"players\": [{\"name\": \"x\"}]}", "{", "\xff"])
+@pytest.mark.parametrize("told", ["", "[]", "{\"players\": 3}", "{\"players\": [{\"name\": \"x\"}]}", "{", "\xff",
+                                  '{"title": ' + "[" * 900 + "]" * 900 + "}"])  # fmt: skip
 def test_a_broken_match_json_is_told_in_one_line(tmp_path, told):
     (tmp_path / "match.json").write_text(told, "latin-1")
     with pytest.raises(InputError, match="match.json") as caught:

@@ -64,7 +64,8 @@ def test_a_body_behind_its_place_is_off_in_time_but_not_beside_the_path(source, 
 
 def test_a_surface_that_is_not_stood_on_is_seen(source):
     ridden = ride(source, source.path, RIGID)
-    corners = np.array([[-99, -99, 0.05], [99, -99, 0.05], [99, 99, 0.05], [-99, 99, 0.05]]) + ridden.origin[0] * [0, 0, 1]
+    corners = np.array([[-99, -99, 0.05], [99, -99, 0.05], [99, 99, 0.05], [-99, 99, 0.05]]) + ridden.origin[0] * [0, 0,
+                                                                                                                   1]
     sunk = figures(source, ridden, source.path, Terrain(corners, [[0, 1, 2], [0, 2, 3]]))["ground_mm"]
     assert sunk["deepest"] == pytest.approx(sunk["source_deepest"] - 50.0, abs=0.1)
     assert sunk["standing_p95"] > 30.0 > sunk["source_standing_p95"]

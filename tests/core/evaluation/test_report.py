@@ -12,6 +12,7 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline, words_per_frame
 from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation import evaluate, evaluate_played, played_from_tables, played_from_take, table
 from beyond_mocap.evaluation.figures import filled_timeline
+from beyond_mocap.evaluation.report import flat
 from beyond_mocap.files import bvh, tables
 from beyond_mocap.library.library import Gait
 from beyond_mocap.library.made import MADE_FOLDER
@@ -246,7 +247,8 @@ def _same(a, b):
         for left, right in zip(a, b, strict=True):
             _same(left, right)
     elif isinstance(a, float):
-        assert a == pytest.approx(b, rel=0.02, abs=0.01)  # shares of a few dozen steps: one more or less on a rounded frame
+        # shares of a few dozen steps: one more or less on a rounded frame
+        assert a == pytest.approx(b, rel=0.02, abs=0.01)
     else:
         assert a == b
 
@@ -296,3 +298,11 @@ def test_table_puts_reports_side_by_side(uncut, track_of, library):
     assert any(line.startswith("| root_error_m.mean |") for line in lines)
     assert any(line.startswith("| keys 1.labels | kick |") for line in lines)
     assert all(line.count("|") == 4 for line in lines)
+
+
+def test_a_report_that_is_nested_too_deep_is_told():
+    deep = json.loads('{"a":' * 900 + "1" + "}" * 900)
+    for made in (flat, lambda report: table({"one": report})):
+        with pytest.raises(InputError, match="report: nested more than 30 deep"):
+            made(deep)
+    assert flat({"a": {"b": [{"c": 1}, {"c": 2}]}}) == {"a.b 1.c": 1, "a.b 2.c": 2}

@@ -1,4 +1,5 @@
-"""Throws measured and compared: his p-values come back from his own tables, planted deviations and impacts as planted."""
+"""Throws measured and compared: his p-values come back from his own tables, planted deviations and impacts as
+planted."""
 
 import numpy as np
 import pytest
@@ -108,7 +109,9 @@ def test_floating_hands_carry_the_ball_along():
     place, velocity = let_go(made.motion, joint, grip, at)
     other, faster = let_go(made.motion, joint, grip, at, times * [0.0, 2.0, -1.0] + [0.1, 0.0, 0.0])
     assert faster - velocity == pytest.approx([0.0, 2.0, -1.0], abs=1e-6)
-    assert other - place == pytest.approx(np.array([0.1, 0.0, 0.0]) + made.release * np.array([0.0, 2.0, -1.0]), abs=1e-6)
+    assert other - place == pytest.approx(
+        np.array([0.1, 0.0, 0.0]) + made.release * np.array([0.0, 2.0, -1.0]), abs=1e-6
+    )
 
 
 def test_impact_is_where_the_plane_is_crossed_or_the_ground_met():

@@ -70,6 +70,14 @@ def test_errors_of_trials_are_in_the_table(tmp_path):
     assert [r.error for r in read_results(tmp_path)] == ["", "<no markers>"]
 
 
+@pytest.mark.parametrize("text", ['{"a":' * 900 + "1" + "}" * 900, "[" * 100000, "[]"])
+def test_reports_of_another_form_are_told_in_one_line(tmp_path, text):
+    (tmp_path / "a.report.json").write_text(text, "utf-8")
+    with pytest.raises(InputError, match="a.report.json") as caught:
+        trials_report(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
 def test_a_folder_without_reports_is_said(tmp_path):
     with pytest.raises(InputError, match="no reports of trials"):
         trials_report(tmp_path)

@@ -21,7 +21,8 @@ READERS = (bvh.read, read_ball, read_c3d, read_marker_set, read_model, read_mesh
 @pytest.mark.parametrize("read", READERS)
 def test_each_reader_tells_what_it_is_given_instead_of_a_file(tmp_path, read):
     (tmp_path / "folder").mkdir()
-    given = {"gone": "no such file; expected an? .+; check the path", "folder": "a folder; expected an? .+; name a file",
+    given = {"gone": "no such file; expected an? .+; check the path",
+             "folder": "a folder; expected an? .+; name a file",
              "nul\0": "cannot be read .+; expected an? .+ that can be read"}  # fmt: skip
     for name, said in given.items():
         with pytest.raises(InputError, match=said) as told:
@@ -48,5 +49,7 @@ def test_text_is_utf8_and_loses_the_mark_at_its_start(tmp_path):
     (tmp_path / "a").write_bytes("\ufeffJörg\r\n".encode())
     assert utf8(tmp_path / "a", "a thing") == "Jörg\r\n"
     (tmp_path / "b").write_bytes("Jörg".encode("cp1252"))
-    with pytest.raises(InputError, match="no text in UTF-8; expected a thing; choose another file, or save it as UTF-8"):
+    with pytest.raises(
+        InputError, match="no text in UTF-8; expected a thing; choose another file, or save it as UTF-8"
+    ):
         utf8(tmp_path / "b", "a thing")

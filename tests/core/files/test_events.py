@@ -92,6 +92,14 @@ def test_events_of_another_match_are_refused():
         read_events(files() / "opta_f24.xml", match=made_match())
 
 
+def test_events_with_neither_numbers_nor_names_are_told_and_left_out():
+    """Wyscout 2 has the provider's ids alone, so that nothing says whether they are of another match."""
+    events = read_events(files() / "wyscout_events_v2.json", match=made_match())
+    (note,) = events.notes
+    assert "players cannot be assigned" in note and "neither shirt numbers nor names" in note
+    assert len(events.events) > 100 and not any(event.player for event in events.events)
+
+
 TABLE = """time_s,type,player,detail,success,x,y
 1.5,pass,home_7,right_foot/chipped,True,-3,2
 2.0,header,away 3,,,,
@@ -150,7 +158,9 @@ def test_any_content_is_read_or_refused(tmp_path_factory, content):
 
 
 def test_metrica_s_table_of_events_is_read(tmp_path):
-    head = "Team,Type,Subtype,Period,Start Frame,Start Time [s],End Frame,End Time [s],From,To,Start X,Start Y,End X,End Y"
+    head = (
+        "Team,Type,Subtype,Period,Start Frame,Start Time [s],End Frame,End Time [s],From,To,Start X,Start Y,End X,End Y"
+    )
     one = "Away,PASS,HEAD,1,1,2.5,2,2.6,Player7,Player3,0.6,0.25,0.7,0.2"
     other = "Home,BALL LOST,,2,9,2800,9,2800,Player9,,,,,"
     duel = "Away,CHALLENGE,AERIAL-LOST,1,3,3.5,3,3.5,Player3,,0.5,0.5,,"

@@ -26,7 +26,8 @@ def made_model(kind="hierarchy", dtype=np.float32, examples=2, **changed):
                         [[0, 0.1, 0]])  # fmt: skip
     told = ModelSettings(kind=kind, layers=2, units=4, points=3, fps=25.0)
     return ThrowModel(**{
-        "settings": told, "skeleton": skeleton, "networks": {name: made_network(random, dtype) for name in told.networks},
+        "settings": told, "skeleton": skeleton,
+        "networks": {name: made_network(random, dtype) for name in told.networks},
         "leg_reach": {"left": (0.3, 0.9), "right": (0.31, 0.92)}, "stature": 1.74,
         "examples": tuple(made_example(random, skeleton, i) for i in range(examples)),
         "joint_limits": np.sort(random.normal(size=(3, 3, 3)), axis=1), "reference": random.uniform(size=9),
@@ -47,7 +48,8 @@ def made_example(random, skeleton, i):
     turns = random.normal(size=(7, 3, 4))
     turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
     return Example(name=f"throw {i}", subject="Jané", motion=Motion(skeleton, random.normal(size=(7, 3)), turns, 25.0),
-                   limb=i, release=3.3 + i / 3, impact=random.normal(size=3), launch=random.normal(size=3) if i else None,
+                   limb=i, release=3.3 + i / 3, impact=random.normal(size=3),
+                   launch=random.normal(size=3) if i else None,
                    stature=1.7, before=random.normal(size=(2, 4, 3)) if i else None)  # fmt: skip
 
 
@@ -269,7 +271,9 @@ def test_a_damaged_file_is_told_or_read(tmp_path_factory, changes):
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.integers(0, 10**9), st.sampled_from(["offsets", "hip/weights/0", "header"]), st.binary(min_size=1, max_size=40))
+@given(
+    st.integers(0, 10**9), st.sampled_from(["offsets", "hip/weights/0", "header"]), st.binary(min_size=1, max_size=40)
+)
 def test_a_damaged_array_with_a_right_checksum_is_told_or_read(tmp_path_factory, place, name, junk):
     path = tmp_path_factory.mktemp("fuzz") / "x.npz"
     with zipfile.ZipFile(io.BytesIO(WHOLE)) as archive, zipfile.ZipFile(path, "w") as out:

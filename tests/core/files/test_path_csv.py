@@ -22,7 +22,8 @@ from beyond_mocap.files.path_csv import read_curve
     (b"x\ty\n0,5\t0\n1\t2\n", [[0.5, 0, 0], [1, 2, 0]]),
     (b"x,x_m,y_m\n9,0,0\n9,1,0\n", [[0, 0, 0], [1, 0, 0]]),
 ], ids=["plain", "other columns, Windows", "straight up", "quoted", "repeated points stay",
-        "decimal commas", "semicolons and points", "short names with semicolons", "short names", "tabs", "the full name counts"])  # fmt: skip
+        "decimal commas", "semicolons and points", "short names with semicolons", "short names", "tabs",
+        "the full name counts"])  # fmt: skip
 def test_points_in_the_order_of_their_rows(tmp_path, content, points):
     (tmp_path / "c.csv").write_bytes(content)
     np.testing.assert_allclose(read_curve(tmp_path / "c.csv"), points)
@@ -65,7 +66,8 @@ def test_what_is_no_file_is_told(tmp_path, name):
 
 
 @settings(deadline=None)
-@given(st.sampled_from([b"", b"x_m,y_m,z_m\n", b"x;y;z\n"]), st.one_of(st.binary(max_size=120), st.text("0123456789.,;-+eEinfa\n\r\"' xyz_m", max_size=120)))
+@given(st.sampled_from([b"", b"x_m,y_m,z_m\n", b"x;y;z\n"]),
+       st.one_of(st.binary(max_size=120), st.text("0123456789.,;-+eEinfa\n\r\"' xyz_m", max_size=120)))
 def test_any_content_is_read_or_refused(tmp_path_factory, header, content):
     file = tmp_path_factory.mktemp("fuzz") / "c.csv"
     file.write_bytes(header + (content if isinstance(content, bytes) else content.encode()))

@@ -31,7 +31,9 @@ def test_the_chosen_clip_says_the_gait(library, chosen):
 
 
 def test_no_other_clip_carries_the_word_but_for_actions(library, chosen):
-    assert carrying(library, "walking") == {"walk.bvh", "bows/turn.bvh"} and carrying(chosen, "walking") == {"bows/turn.bvh"}
+    assert carrying(library, "walking") == {"walk.bvh", "bows/turn.bvh"} and carrying(chosen, "walking") == {
+        "bows/turn.bvh"
+    }
     assert carrying(chosen, "running") == {"run.bvh"}
     words, vocabulary = chosen.frames.words, chosen.frames.vocabulary
     clip = np.array([clip.path == "kick.bvh" for clip in chosen.clips])[chosen.frames.clip]

@@ -50,7 +50,8 @@ def test_words_that_are_there_are_replaced_only_when_told(clip):
 
 def test_into_the_table_that_speaks_of_the_clip(clip):
     table = clip.parents[1] / "annotations.csv"
-    table.write_text(HEADER + "kicks/a.bvh,120,0,9,,jogging,first\nkicks/low.bvh,120,0,9,,running,old\nkicks/z.bvh,60,0,9,4,kick,\"last, one\"\n")
+    table.write_text(HEADER + "kicks/a.bvh,120,0,9,,jogging,first\nkicks/low.bvh,120,0,9,,running,old\n"
+                     "kicks/z.bvh,60,0,9,4,kick,\"last, one\"\n")  # fmt: skip
     with pytest.raises(InputError, match="annotations.csv"):
         keep(clip)
     assert keep(clip, overwrite=True) == table and read(clip) == ROWS
@@ -81,8 +82,10 @@ def test_there_and_back_through_seconds():
 
 
 def test_rows_are_cut_to_the_clip():
-    rows = (ClipAnnotation(-5, 40, None, ("walking",)), ClipAnnotation(90, 140, 135, ("kick",)), ClipAnnotation(80, 140, None, ("jogging",)))
-    assert keep_words.within(rows, 100) == (ClipAnnotation(0, 40, None, ("walking",)), ClipAnnotation(80, 99, None, ("jogging",)))
+    rows = (ClipAnnotation(-5, 40, None, ("walking",)), ClipAnnotation(90, 140, 135, ("kick",)),
+            ClipAnnotation(80, 140, None, ("jogging",)))
+    assert keep_words.within(rows, 100) == (ClipAnnotation(0, 40, None, ("walking",)),
+                                            ClipAnnotation(80, 99, None, ("jogging",)))
 
 
 def test_a_place_that_cannot_be_written(clip, monkeypatch):

@@ -92,12 +92,16 @@ def test_own_scores_are_those_of_what_was_recorded(keeper):
     reference = library_reference(keeper, 30.0)
     clip = the_dive(keeper)
     row = reference.index[clip.path]
-    assert reference.first[row + 1] - reference.first[row] == int((clip.recorded - 1) / clip.motion.fps * 30.0 + 1e-6) + 1
+    assert (
+        reference.first[row + 1] - reference.first[row] == int((clip.recorded - 1) / clip.motion.fps * 30.0 + 1e-6) + 1
+    )
     assert LANDING_FOLDER + clip.path not in reference.index
 
 
 def test_a_dive_is_played_to_its_feet_on_the_track(keeper, track_of, timeline_of):
-    track = track_of(speed=lambda t: 2.2 * np.exp(-(((t - 5.0) / 0.4) ** 2)), seconds=11.0, turn=lambda t: 0.0 * t + 1.0)
+    track = track_of(
+        speed=lambda t: 2.2 * np.exp(-(((t - 5.0) / 0.4) ** 2)), seconds=11.0, turn=lambda t: 0.0 * t + 1.0
+    )
     take = synthesize(keeper, Plan(track=track, timeline=timeline_of((5.0, "dive left"))))
     sources = np.array(take.clips)[take.clip]
     played = np.flatnonzero(sources == LANDING_FOLDER + "saves/dive.bvh")
@@ -110,7 +114,9 @@ def test_a_dive_is_played_to_its_feet_on_the_track(keeper, track_of, timeline_of
 
 
 def test_an_edit_far_from_a_dive_leaves_what_is_made_as_it_was(keeper, track_of, timeline_of):
-    track = track_of(speed=lambda t: 2.2 * np.exp(-(((t - 5.0) / 0.4) ** 2)), seconds=24.0, turn=lambda t: 0.0 * t + 1.0)
+    track = track_of(
+        speed=lambda t: 2.2 * np.exp(-(((t - 5.0) / 0.4) ** 2)), seconds=24.0, turn=lambda t: 0.0 * t + 1.0
+    )
     plan = Plan(track=track, timeline=timeline_of((5.0, "dive left")))
     before = synthesize(keeper, plan)
     after = resynthesize(keeper, replace(plan, timeline=timeline_of((5.0, "dive left"), (18.0, "dive right"))), before)

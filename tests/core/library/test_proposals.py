@@ -52,12 +52,15 @@ def test_where_and_at_which_rate_it_is_recorded_does_not_matter():
     assert abs(slower.annotation.key - kick.annotation.key / 2.0) <= 1.0
 
 
-@pytest.mark.parametrize("name", ["sprinting_8_6", "running_4_9", "jog_sprint_jog", "walking_back", "standing_turn_left", "celebration"])
+@pytest.mark.parametrize(
+    "name", ["sprinting_8_6", "running_4_9", "jog_sprint_jog", "walking_back", "standing_turn_left", "celebration"]
+)
 def test_fast_strides_are_no_kicks(name):
     assert with_word(clip(name), "kick") == [] and with_word(clip(name), "jump") == []
 
 
-@pytest.mark.parametrize("name", ["jog_sprint_jog", "run_stop_run", "stand_sprint_stop", "start_stop_walking", "walk_jog_walk", "walking_back", "walking_left"])
+@pytest.mark.parametrize("name", ["jog_sprint_jog", "run_stop_run", "stand_sprint_stop", "start_stop_walking",
+                                  "walk_jog_walk", "walking_back", "walking_left"])
 def test_gaits_and_directions_are_those_that_were_written(name):
     motion = clip(name)
     said, meant = np.full(len(motion), "", object), np.full(len(motion), "", object)
@@ -111,7 +114,8 @@ def test_short_and_still_clips_bring_no_trouble():
 
 @pytest.mark.skipif(not (REAL / "annotations.csv").is_file(), reason="no recordings to measure on beside the clone")
 def test_kicks_of_real_recordings():
-    """Every labelled kick of one player: found, the side right, the key frame within 3 frames at 120 fps in nine of ten."""
+    """Every labelled kick of one player: found, the side right, the key frame within 3 frames at 120 fps in nine of
+    ten."""
     from beyond_mocap.annotation import read_annotation_csv
 
     near, sides, false, planted = [], 0, 0, 0

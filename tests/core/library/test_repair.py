@@ -68,7 +68,9 @@ def test_the_faster_the_run_the_more_a_foot_may_creep(speed, slid):
     if speed == 0.0:  # on the spot: the travel taken away leaves feet that slide
         motion = replace(motion, root_positions=motion.root_positions - np.outer(1.0 * seconds, [1.0, 0.0, 0.0]))
     else:
-        motion = replace(motion, root_positions=motion.root_positions + np.outer(0.04 * speed * seconds, [1.0, 0.0, 0.0]))
+        motion = replace(
+            motion, root_positions=motion.root_positions + np.outer(0.04 * speed * seconds, [1.0, 0.0, 0.0])
+        )
     assert repair.slides(motion, standing) == slid
     done = repair.grounded(motion, standing)
     assert done.slid == slid and np.array_equal(done.motion.rotations, motion.rotations) != slid
@@ -100,7 +102,9 @@ def test_a_drifting_floor_is_levelled(walk):
 def test_a_floor_that_rises_under_a_suit_is_brought_down_before_feet_are_looked_for(slope):
     """Half a metre in five seconds."""
     level = gait(2.8, 5.0, 60.0)
-    rising = replace(level, root_positions=level.root_positions + np.outer(np.arange(len(level)) / 60.0 * slope, [0, 0, 1.0]))
+    rising = replace(
+        level, root_positions=level.root_positions + np.outer(np.arange(len(level)) / 60.0 * slope, [0, 0, 1.0])
+    )
     found, drift = repair.without_drift(rising)
     assert drift == pytest.approx(0.5, abs=0.05)
     off = (found.root_positions - level.root_positions)[:, 2]
@@ -213,4 +217,6 @@ def test_boots_without_toe_joints_stand_on_the_ground_and_not_in_it(walk, plants
         offset = bare.skeleton.end_offsets[bare.skeleton.end_parents.index(limb.foot)]
         tip = places[:, limb.foot] + quaternion.rotate(rotations[:, limb.foot], offset)
         assert abs(np.median(tip[stands[:, side], 2])) < 0.035
-        assert np.median(places[stands[:, side], limb.foot, 2]) == pytest.approx(contacts.sole_height(bare.skeleton), abs=0.02)
+        assert np.median(places[stands[:, side], limb.foot, 2]) == pytest.approx(
+            contacts.sole_height(bare.skeleton), abs=0.02
+        )

@@ -101,6 +101,37 @@ def test_a_span_of_the_match_is_enough():
     assert (found.touches[found.times > 330.0] == -1).all()
 
 
+@pytest.mark.parametrize("late, believed", [(2.9, 0.8), (-6.0, 0.7), (250.0, 0.0)])
+def test_in_a_short_span_events_of_the_match_are_believed_where_their_lag_is_usual(late, believed):
+    found = []
+    for seed in range(3):
+        touches, events, _ = planted(seed=seed, lag=(late, late), count=450)
+        for start in np.arange(100.0, 800.0, 45.0):
+            own = [touch for touch in touches if start <= touch.time <= start + 45.0]
+            clocks = clocks_or_none(events, own, (start, start + 45.0))
+            assert all(abs(clock.lag - late) < 1.0 for clock in clocks), start
+            found.append(bool(clocks))
+    assert np.mean(found) >= believed
+
+
+def test_in_a_short_span_events_of_another_match_are_not_believed():
+    found = []
+    for seed in range(6):
+        touches, _, _ = planted(seed=seed, count=450)
+        _, others, _ = planted(seed=seed + 50, count=450)
+        for start in np.arange(100.0, 800.0, 45.0):
+            own = [touch for touch in touches if start <= touch.time <= start + 45.0]
+            found.append(bool(clocks_or_none(others, own, (start, start + 45.0))))
+    assert np.mean(found) < 0.03
+
+
+def clocks_or_none(events, touches, span):
+    try:
+        return list(aligned(events, touches, HALVES[:1], span).clocks.values())
+    except InputError:
+        return []
+
+
 def test_too_few_events_are_told_and_left():
     touches, events, _ = planted()
     few = MatchEvents(events.events[:4], "made")

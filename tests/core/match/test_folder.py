@@ -59,7 +59,9 @@ def test_what_decides_the_results_is_in_the_identity_and_nothing_else(order, tmp
 
 
 @pytest.mark.parametrize("more, told", [
-    ({"start": 5.0, "end": 5.0}, "--to: 5 s; expected later than --from 5 s"), ({"window": 1.0}, "window: 1 s"),
+    ({"start": 5.0, "end": 5.0}, "--to: 5 s; expected later than --from 5 s"),
+    ({"start": 1234.5674, "end": 1234.567}, "--to: 1234.567 s; expected later than --from 1234.5674 s"),
+    ({"window": 1.0}, "window: 1 s"),
     ({"overlap": 200.0}, "overlap: 200 s"), ({"start": np.nan}, "--from: nan"), ({"end": np.nan}, "--to: nan"),
 ])  # fmt: skip
 def test_an_order_without_sense_is_told(order, more, told):
@@ -148,12 +150,67 @@ def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
 
 @pytest.mark.parametrize("text, told", [
     ("{", "no JSON"), ("[]", "no list of players"), ('{"players": [3]}', "no list of players"),
-    ('{"players": [], "version": 99}', "version 99"), ("[" * 100000, "no JSON"), ("\0\0", "no JSON"),
+    ('{"players": [], "version": 99}', "version 99"), ('{"players": []}', "no version"), ("[" * 100000, "no JSON"),
+    ("\0\0", "no JSON"),
 ])  # fmt: skip
 def test_a_state_that_cannot_be_read_is_told(tmp_path, text, told):
     (tmp_path / "match.json").write_text(text)
     with pytest.raises(InputError, match=f"match.json: {told}"):
         read_state(tmp_path)
+
+
+@pytest.fixture
+def begun(order):
+    """What decides the results of an order, whose folder has one piece of work and its state."""
+    known = identity(order, "key")
+    with opened(order.out, known) as folder:
+        folder.tell({"identity": known, "players": [{"id": "a"}]})
+        folder.place("search", "a").write_bytes(b"piece")
+    return known
+
+
+def cut(state: Path, drop: str = "") -> None:
+    """Half of a state; or the whole without one of its keys."""
+    told = json.loads(state.read_text())
+    text = json.dumps({key: value for key, value in told.items() if key != drop}, indent=1)
+    state.write_text(text if drop else text[: len(text) // 2])
+
+
+@pytest.mark.parametrize("drop, told", [("", "no JSON"), ("players", "no list of players"), ("digest", "no digest"),
+                                        ("version", "no version")])  # fmt: skip
+def test_a_damaged_state_is_set_aside_and_the_work_goes_on(order, begun, drop, told):
+    cut(order.out / "match.json", drop)
+    damaged = (order.out / "match.json").read_bytes()
+    with opened(order.out, begun) as folder:
+        assert folder.place("search", "a").read_bytes() == b"piece" and folder.before == {}
+        assert told in folder.notes[0] and "match.json.damaged" in folder.notes[0] and len(folder.notes) == 1
+        assert (order.out / "match.json.damaged").read_bytes() == damaged
+    with opened(order.out, begun) as folder:  # the run before ended before it told anything
+        assert folder.place("search", "a").read_bytes() == b"piece" and folder.notes == ()
+
+
+def test_a_damaged_state_of_another_order_or_version_is_refused(order, begun):
+    other = identity(changed(order, seed=1), "key")
+    cut(order.out / "match.json")
+    with pytest.raises(InputError, match="holds the results of another order"):
+        with opened(order.out, other):
+            pass
+    (order.out / "match.json").write_text('{"players": [], "version": 99}')
+    with pytest.raises(InputError, match="version 99"):
+        with opened(order.out, begun):
+            pass
+    assert not (order.out / "match.json.damaged").exists() and (order.out / ".work" / "search" / "a.npz").exists()
+
+
+def test_a_state_that_somebody_else_wrote_is_refused_and_left(order, tmp_path):
+    folder = tmp_path / "theirs"
+    folder.mkdir()
+    (folder / "match.json").write_text('{"matchInfo": {}}')
+    for _ in range(2):
+        with pytest.raises(InputError, match="no list of players"):
+            with opened(folder, identity(order, "key")):
+                pass
+    assert [path.name for path in folder.iterdir()] == ["match.json"]
 
 
 def test_files_of_players_have_names_that_every_system_takes():

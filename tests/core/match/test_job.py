@@ -175,6 +175,19 @@ def test_figures_that_are_made_outlast_a_run_that_ends_before_them(made, order_t
     assert [row["status"] for row in read_state(order.out)["players"]] == ["done"] * 3
 
 
+def test_a_cut_state_is_told_and_nothing_is_searched_again(made, order_to, tmp_path):
+    order = order_to(tmp_path / "cut")
+    shutil.copytree(made[0], order.out)
+    state = order.out / "match.json"
+    state.write_bytes(state.read_bytes()[:-2000])
+    pieces = {path: path.stat().st_mtime_ns for path in order.out.glob(".work/*/*.npz")}
+    result = make_match(order)
+    assert [line for line in result.notes if "no JSON" in line and "kept as match.json.damaged" in line]
+    assert pieces and pieces == {path: path.stat().st_mtime_ns for path in order.out.glob(".work/*/*.npz")}
+    (order.out / "match.json.damaged").unlink()
+    assert kept_files(order.out) == kept_files(made[0])
+
+
 def test_edited_words_touch_their_player_and_nobody_else(made, order_to, tmp_path):
     order = order_to(tmp_path / "edited")
     make_match(order)

@@ -1,6 +1,8 @@
 """The verb `match`: what it makes, and that everything wrong is one clear line and leaves nothing behind."""
 
 import json
+import shutil
+from pathlib import Path
 
 import pytest
 
@@ -78,6 +80,54 @@ def test_who_is_not_there_and_texts_of_nobody_are_told(match, tmp_path):
     assert not [line for line in error if "home_7.txt" in line]
 
 
+def test_words_for_a_time_at_which_nobody_is_there_are_told(match, tmp_path):
+    words = tmp_path / "words"
+    words.mkdir()
+    (words / "home_7.txt").write_text("13 kick right\n75.25 kick right\n20 21 dribble\n13.5 15 dribble\n")
+    span = {"from": 12, "to": 14, "players": None, "annotations": words}
+    told = "home_7.txt: 2 of your words not used (20 21 dribble ...), since home_7 is there from 12 to 14 s"
+    status, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
+    assert status == 0 and [line for line in error if ".txt" in line] == [f"note: {told}"]
+    assert told in read_state(tmp_path / "out")["notes"]
+    text = tmp_path / "out" / "annotations" / "away_6.txt"
+    text.write_text(text.read_text() + "75.25 kick right\n")
+    _, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
+    told = "away_6.txt: 1 of your words not used (75.25 kick right), since away_6 is there from 12 to 14 s"
+    assert f"note: {told}" in error
+
+
+def test_texts_of_players_who_are_away_are_told_where_everybody_is_asked_for(tmp_path):
+    from beyond_mocap.match.order import MatchOrder
+    from beyond_mocap.match.parts import unused_lines
+
+    for name in ("home_7", "away_9"):
+        (tmp_path / f"{name}.txt").write_text("13 kick right\n")
+    files = {"home 7": "home_7", "away 9": "away_9", "away 8": "away_8"}
+    order = dict(tracking=Path("t"), library=Path("l"), out=Path("o"), annotations=tmp_path)
+    assert unused_lines([], MatchOrder(**order, players=("home 7",)), files) == []
+    (line,) = unused_lines([], MatchOrder(**order), files)
+    assert line.startswith("home_7.txt, away_9.txt: not used")
+
+
+def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
+    """One that needs no second file says so; two files that lie apart are read, and are of another match."""
+    named = {"events": SMALL / "small_events.csv", "events-meta": SMALL / "small_meta.xml", "events-provider": "csv"}
+    status, _, error = match("--no-figures", **named)
+    assert status == 0 and any("small_meta.xml: not used, since events of csv are in one file" in one for one in error)
+    kloppy = pytest.importorskip("kloppy")
+    folder = Path(kloppy.__file__).parent / "tests" / "files"
+    if not (folder / "opta_f24.xml").is_file():
+        pytest.skip("this kloppy comes without its own test files")
+    (tmp_path / "events").mkdir()
+    apart = shutil.copy(folder / "opta_f24.xml", tmp_path / "events" / "monday.xml")
+    status, _, error = match(events=apart, out=tmp_path / "new")
+    assert status == 2 and "no second file beside it for opta" in error[-1]
+    named = {"events-meta": folder / "opta_f7.xml", "events-provider": "OPTA"}
+    status, _, error = match(events=apart, out=tmp_path / "new", **named)
+    assert status == 2 and "players" in error[-1] and "are not in the tracking" in error[-1]
+    assert not (tmp_path / "new").exists()
+
+
 @pytest.mark.parametrize("written", [["--scene", "x.blend"], ["--scene=x.blend"], ["--sce", "x.blend"], ["--scen=x"]])
 def test_an_option_is_taken_out_however_it_is_written(written):
     assert without(["match", "--seed", "3", *written, "--json"], "--scene") == ["match", "--seed", "3", "--json"]
@@ -93,6 +143,11 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"provider": "nobody"}, 2, "provider: 'nobody'"),
     ({"events": "no.csv"}, 2, "no.csv"),
     ({"meta": "no.xml"}, 2, "no.xml"),
+    ({"events": str(SMALL / "small_events.csv"), "events-meta": "no.xml"}, 2, "no.xml"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "x"}, 2, "--events-provider: 'x'; expected one of"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "no second file beside it for opta"),
+    ({"events-meta": "no.xml"}, 2, "--events-meta: no.xml, without --events"),
+    ({"events-provider": "opta"}, 2, "--events-provider: opta, without --events"),
     ({"workers": 0}, 2, "'0' is not 1 to 256"),
     ({"scheduler": "tcp://127.0.0.1:9"}, 2, "not allowed with argument --workers"),
     ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "--scheduler: tcp://127.0.0.1:9 does not answer"),

@@ -115,7 +115,9 @@ def test_a_circle_drawn_as_a_closed_spline():
     spline = make_interp_spline(angle, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), bc_type="periodic")
     path = SplinePath(spline.t, spline.c, 3, closed=True)
     assert ArcLength(path).length == pytest.approx(2 * np.pi, abs=1e-5)  # what the cubic is off the circle
-    assert path.at(np.array([-0.5, 7.0])) == pytest.approx(path.at(np.array([2 * np.pi - 0.5, 7.0 - 2 * np.pi])), abs=1e-12)
+    assert path.at(np.array([-0.5, 7.0])) == pytest.approx(
+        path.at(np.array([2 * np.pi - 0.5, 7.0 - 2 * np.pi])), abs=1e-12
+    )
 
 
 def test_lengths_are_found_where_the_path_stands_for_a_while():

@@ -119,7 +119,9 @@ def face_pitch(body, motion) -> float:
     head = motion.skeleton.index("Head")
     mine = (body.joints[:, 0] == head) & (body.weights[:, 0] == 1.0)
     places, world = forward_kinematics(motion)
-    shown = [deformed(one, motion.skeleton, places[0], world[0])[mine] for one in (body, low_poly_body(motion.skeleton))]
+    shown = [
+        deformed(one, motion.skeleton, places[0], world[0])[mine] for one in (body, low_poly_body(motion.skeleton))
+    ]
     drawn, rest = (points - points.mean(axis=0) for points in shown)
     u, _, v = np.linalg.svd(drawn.T @ rest)
     forward = (u @ v) @ np.array([1.0, 0.0, 0.0])

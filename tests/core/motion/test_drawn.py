@@ -13,7 +13,9 @@ def test_a_steady_speed_takes_way_over_speed_and_ends_at_the_end():
     track = along(STRAIGHT, [0, 20], [2.5, 2.5], [1, 1], start=3.0)
     assert track.times[0] == 3.0 and track.times[-1] == pytest.approx(11.0)
     np.testing.assert_allclose(np.diff(track.times), 1 / HZ, rtol=1e-6)
-    np.testing.assert_allclose(track.positions, np.column_stack([2.5 * (track.times - 3.0), 0 * track.times]), atol=1e-9)
+    np.testing.assert_allclose(
+        track.positions, np.column_stack([2.5 * (track.times - 3.0), 0 * track.times]), atol=1e-9
+    )
 
 
 def test_speeds_change_evenly_and_are_met_at_the_points():

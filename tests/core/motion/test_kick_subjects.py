@@ -25,7 +25,9 @@ def test_a_harder_kick_swings_further_back_and_faster():
     feet = []
     for speed in (13.0, 22.0):
         style = kick_style(who, KICKS["instep"], speed, np.random.default_rng(1))
-        feet.append(np.linalg.norm(contact(style, neutral_stance(who.skeleton), "right", [(0.0, 0.0)])[1][0], axis=1).max())
+        feet.append(
+            np.linalg.norm(contact(style, neutral_stance(who.skeleton), "right", [(0.0, 0.0)])[1][0], axis=1).max()
+        )
     assert feet[1] > feet[0]
 
 

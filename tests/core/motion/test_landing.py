@@ -134,6 +134,8 @@ def test_the_way_up_that_needs_less_turning_is_taken(dive):
 def test_frames_behind_a_jump_of_markers_near_the_end_are_made_too(dive):
     broken = np.array(dive.rotations)
     elbow = BODY.left.lower_arm
-    broken[-5:, elbow] = quaternion.multiply(broken[-5:, elbow], quaternion.from_rotation_vector(np.array([0.0, 1.2, 0.0])))
+    broken[-5:, elbow] = quaternion.multiply(
+        broken[-5:, elbow], quaternion.from_rotation_vector(np.array([0.0, 1.2, 0.0]))
+    )
     found = landed(Motion(SKELETON, dive.root_positions, broken, FPS), [getting_up(SKELETON, 60.0).motion])
     assert found.recorded == len(dive) - 5

@@ -66,7 +66,8 @@ def test_either_hand_serves_a_dive_whose_side_is_where_it_goes():
 
 
 @pytest.mark.parametrize(
-    "words, later", [("jump left high dive", True), ("catchb dive", True), ("catchb high", False), ("kick slide", False)]
+    "words, later", [("jump left high dive", True), ("catchb dive", True), ("catchb high", False),
+                     ("kick slide", False)]
 )
 def test_only_a_dive_by_hand_may_meet_the_ball_after_its_key(words, later):
     assert (striking.met_within(words.split()) > 0.0) == later

@@ -329,7 +329,9 @@ def test_a_report_never_takes_the_place_of_answers(tmp_path, capfd):
 def test_names_are_drawn_as_they_are(tmp_path):
     pytest.importorskip("matplotlib")
     names = {"ours": r"$\frac$", "theirs": "a $ b $ <c>"}
-    clips = [replace(clip, system=names.get(clip.system, clip.system), scenario=f"${clip.scenario}_$") for clip in CLIPS]
+    clips = [
+        replace(clip, system=names.get(clip.system, clip.system), scenario=f"${clip.scenario}_$") for clip in CLIPS
+    ]
     study = ordered(clips, 4)
     page = study_page(analysed(study, planted(tmp_path / "a", study, {})))
     assert page.count("data:image/png") == 3 and "&lt;c&gt;" in page and "<c>" not in page

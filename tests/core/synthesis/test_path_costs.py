@@ -41,7 +41,9 @@ def test_whoever_stands_on_both_feet_is_dragged(library, order, track_of):
 
 def test_a_bow_to_the_other_side_costs(library, order, track_of):
     found = costs(library, order(track=track_of(1.4, turn=0.9)), turn=1.0)
-    left, right = (np.median(misfit(found, frames_of(library, "bows/turn.bvh", mirrored))) for mirrored in (False, True))
+    left, right = (
+        np.median(misfit(found, frames_of(library, "bows/turn.bvh", mirrored))) for mirrored in (False, True)
+    )
     assert left < 0.1 and right > 0.3
 
 

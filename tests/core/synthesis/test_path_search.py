@@ -55,7 +55,8 @@ def test_the_clip_of_the_asked_speed_is_played(library, order, track_of, speed):
 
 def test_where_the_feed_creeps_no_standing_body_glides(library, order, track_of):
     stands = library.stance_seconds
-    assert stands[np.isin(library.frames.clip, [i for i, c in enumerate(library.clips) if c.path == "stand.bvh"])].min() > 3
+    assert stands[np.isin(library.frames.clip,
+                          [i for i, c in enumerate(library.clips) if c.path == "stand.bvh"])].min() > 3
     walks = [i for i, c in enumerate(library.clips) if c.path == "walk.bvh"]
     assert stands[np.isin(library.frames.clip, walks)].max() < 1.0
     edit = found(library, order(track=track_of(0.6)))
@@ -115,7 +116,9 @@ def test_a_stretch_whose_order_is_the_same_is_joined_without_a_cut(library, orde
 
 def test_in_a_hurry_the_rest_is_searched_quickly(library, order):
     asked, told = order((6.0, "kick right")), []
-    search = PathSearch(library, asked, progress=lambda fraction, text: told.append(fraction), hurry=lambda: len(told) > 9)
+    search = PathSearch(
+        library, asked, progress=lambda fraction, text: told.append(fraction), hurry=lambda: len(told) > 9
+    )
     edit = search.run()
     whole = found(library, asked)
     assert 70 < search.hurried < 100 and len(edit) == 241

@@ -75,7 +75,9 @@ def test_blocks_tell_words_and_pose(library, order):
     found = block_reasons(library, asked, edit, Plan.alpha)
     assert [(reason.first, reason.end) for reason in found] == edit.pieces
     assert not found[0].seam and all(reason.seam["pose"] >= 0.0 for reason in found[1:] if reason.seam)
-    walking = [r for r in found if all("walking" in library.clips[r.clip].words_at(f) for f in np.linspace(*r.shown, 9))]
+    walking = [
+        r for r in found if all("walking" in library.clips[r.clip].words_at(f) for f in np.linspace(*r.shown, 9))
+    ]
     assert walking and all(r.costs["words"] < 0.0 for r in walking)
 
 

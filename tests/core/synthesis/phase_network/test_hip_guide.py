@@ -1,4 +1,5 @@
-"""Where hands and feet carry the hips: exactly there where a body goes as one, and where feet stand, not where hands swing."""
+"""Where hands and feet carry the hips: exactly there where a body goes as one, and where feet stand, not where hands
+swing."""
 
 import numpy as np
 import pytest

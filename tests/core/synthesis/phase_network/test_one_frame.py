@@ -91,7 +91,8 @@ def test_one_pose_at_once_is_the_same_kinematics(plain_and_dressed, which):
 
 @pytest.mark.parametrize("which", [0, 1])
 @pytest.mark.parametrize("settings", [
-    {}, {"wrist": "inferred"}, {"frame": "static"}, {"points": 1}, {"wrist": "inferred", "frame": "static", "points": 5},
+    {}, {"wrist": "inferred"}, {"frame": "static"}, {"points": 1},
+    {"wrist": "inferred", "frame": "static", "points": 5},
     {"guided": True}, {"guided": True, "wrist": "inferred"},
     {"carried": True}, {"carried": True, "frame": "static"},
 ])

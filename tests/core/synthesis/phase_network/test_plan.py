@@ -49,7 +49,9 @@ def test_blends_keep_the_release_and_the_speed_of_the_hand(examples, launches):
     made = planned(examples, launches, wish).description
     hand = made.effectors[:, made.limb]
     speed = np.linalg.norm(np.diff(hand, axis=0), axis=1) * made.fps
-    own = [np.linalg.norm(np.diff(describe(e).effectors[:, e.limb], axis=0), axis=1).max() * e.motion.fps for e in examples]
+    own = [
+        np.linalg.norm(np.diff(describe(e).effectors[:, e.limb], axis=0), axis=1).max() * e.motion.fps for e in examples
+    ]
     assert 0.85 * min(own) < speed.max() < 1.1 * max(own)
     assert abs(int(np.argmax(speed)) - made.release) < 3.0
     assert np.allclose(made.impact, [wish.distance, 0.0, wish.height])
