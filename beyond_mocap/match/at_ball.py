@@ -27,7 +27,7 @@ def at_ball(take: Take, ball: np.ndarray) -> Take:
     """The take with its striking parts on the ball (T, 3) m, NaN where it is not known, at each key moment at which
     they were meant to be. Frames further than EASE from such a moment keep their bits."""
     meetings = [meeting for key in take.keys if (meeting := _meeting(take.motion, key, ball)) is not None]
-    return replace(take, motion=met_at(take.motion, take.contacts, meetings).motion) if meetings else take
+    return replace(take, motion=met_at(take.motion, take.contacts, meetings, grounded=True).motion) if meetings else take
 
 
 def _meeting(motion: Motion, key: KeyResult, ball: np.ndarray) -> Meeting | None:

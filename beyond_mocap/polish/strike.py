@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..motion import quaternion
 from ..motion.humanoid import Limb, heading_from_positions, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.striking import Surface, ball_gap, by_both_hands, contact_gap, met_within, surfaces
 from ..motion.track import BALL_RADIUS
+from .above_ground import above_ground
 from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
 from .meeting import Aim, Room, best_aim, eased, held_meeting, lofted, meetings, shifted
 
@@ -38,7 +38,6 @@ OUT_OF_REACH = 0.15
 MOST_DROP = 0.04
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
-_SOLE, _ROUNDING = 0.02, 0.03  # metres of the lowest foot joint above the ground, and over which it nears that
 _IN_THE_AIR = 0.2
 _HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
 _STOPPING = {"receive", "trap", "catch", "catchb"}
@@ -357,7 +356,7 @@ def _bounded(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarra
     """A shift (3,) m that a body can make: not too far, and a limb neither below the ground nor beyond its joints."""
     shift = shift * min(1.0, MOST_MOVED[part.part] / max(np.linalg.norm(shift), 1e-9))
     if part.part == "foot":
-        shift = _above_ground(body, part, at, _beside_pelvis(body, part, at, shift))
+        shift = above_ground(body, part, at, _beside_pelvis(body, part, at, shift))
     if part.part in MOST_SWING and None not in _chain(body, part):
         shift = swung(body, _chain(body, part), _swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
     return shift
@@ -370,25 +369,6 @@ def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.
     own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
     ranged = np.clip(wanted, min(PELVIS_RANGE[0], own), max(PELVIS_RANGE[1], own))
     return shift + away * (ranged / max(wanted, 1e-9) - 1.0)
-
-
-def _above_ground(body: Body, part: Surface, at, shift: np.ndarray) -> np.ndarray:
-    """Shifts (..., 3) m of a foot at frames `at` that does not go through the ground, but where it is there already."""
-    tip = _tip(body, part, at)
-    lowest = np.minimum(np.min(body.line(part, at), axis=0)[..., 2], tip[..., 2])
-    out = shift.copy()
-    least, wish = np.minimum(_SOLE - lowest, 0.0), shift[..., 2]
-    # a maximum without a corner: at its sharpest _ROUNDING is between the two, and nothing where nothing is moved
-    corner = _ROUNDING * np.minimum(1.0, np.linalg.norm(shift, axis=-1) / (2.0 * _ROUNDING))
-    out[..., 2] = 0.5 * (wish + least + np.hypot(wish - least, corner))
-    return out
-
-
-def _tip(body: Body, part: Surface, at) -> np.ndarray:
-    """(..., 3) m: the end of a foot at frames `at`."""
-    skeleton, toe = body.skeleton, _limb(body, part).toe_or_foot
-    offset = next((o for p, o in zip(skeleton.end_parents, skeleton.end_offsets) if p == toe), np.zeros(3))
-    return body.places[at, toe] + quaternion.rotate(body.world[at, toe], offset)
 
 
 def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
@@ -430,7 +410,7 @@ def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: Sequence
     for part, limb, shift, share in zip(scene.parts, limbs, shifts, scene.shares):
         swing = _swing(body, part, scene.at, shift)
         moves = swung(body, limb.chain, swing, share)
-        moves = _above_ground(body, part, slice(None), moves) if part.part == "foot" else moves
+        moves = above_ground(body, part, slice(None), moves) if part.part == "foot" else moves
         root = root - share[:, None] * [0.0, 0.0, swing.lowered]
         rotations = limb_carried(body, limb, moves, root, rotations)
     return Body.posed(body.skeleton, root, rotations)

@@ -15,6 +15,7 @@ import numpy as np
 from ..motion.humanoid import identify
 from ..motion.motion import Motion
 from ..motion.striking import Surface, ball_gap, nearest_on
+from .above_ground import above_ground
 from .carry import MOST_SWING, Body, Resting, arm, leg, limb_carried, spine_bent, swing_to, swung
 from .meeting import eased
 
@@ -49,9 +50,10 @@ class Met:
     moved: np.ndarray
 
 
-def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting]) -> Met:
+def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting], grounded: bool = False) -> Met:
     """A motion with its parts on the ball at every strike, as far as a body can; standing (T, 2) bool: left and right
-    foot on the ground. Frames away from the strikes keep their bits."""
+    foot on the ground. grounded: the ground is at height 0, and no foot goes through it. Frames away from the strikes
+    keep their bits."""
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
     gap, moved = np.full(len(meetings), np.nan), np.full(len(meetings), np.nan)
     count = len(motion)
@@ -63,7 +65,7 @@ def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting]) ->
         span = np.flatnonzero(share > 0.0)
         low, high = span[0], span[-1] + 1
         body = Body.posed(motion.skeleton, root[low:high], rotations[low:high])
-        struck, moved[number], gap[number] = _reached(body, meeting, at - low, share[low:high])
+        struck, moved[number], gap[number] = _reached(body, meeting, at - low, share[low:high], grounded)
         root[low:high], rotations[low:high] = struck.root, struck.rotations
     return Met(replace(motion, root_positions=root, rotations=rotations), gap, moved)
 
@@ -82,7 +84,9 @@ def _share(meeting: Meeting, at: int, count: int, standing: np.ndarray, fps: flo
     return eased((frames - low) / max(at - low, 1e-9), (high - frames) / max(high - at, 1e-9))
 
 
-def _reached(body: Body, meeting: Meeting, at: int, share: np.ndarray) -> tuple[Body, float, float]:
+def _reached(
+    body: Body, meeting: Meeting, at: int, share: np.ndarray, grounded: bool
+) -> tuple[Body, float, float]:
     """The body with its part at the ball, how far the part was moved and what gap is left, m."""
     shift, best = np.zeros(3), (body, 0.0, abs(_gap(body, meeting, at)))
     struck = body
@@ -95,7 +99,9 @@ def _reached(body: Body, meeting: Meeting, at: int, share: np.ndarray) -> tuple[
             break
         shift = shift + need
         shift *= min(1.0, MOST / max(np.linalg.norm(shift), 1e-9))
-        struck = _carried(body, meeting.surface, at, shift, share)
+        if grounded and meeting.surface.part == "foot":
+            shift = above_ground(body, meeting.surface, at, shift)
+        struck = _carried(body, meeting.surface, at, shift, share, grounded)
         left = abs(_gap(struck, meeting, at))
         if left < best[2]:
             best = struck, float(np.linalg.norm(shift)), left
@@ -106,7 +112,9 @@ def _gap(body: Body, meeting: Meeting, at: int) -> float:
     return float(ball_gap(body.line(meeting.surface, at), meeting.surface.radius, meeting.ball, meeting.radius))
 
 
-def _carried(body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray) -> Body:
+def _carried(
+    body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, grounded: bool
+) -> Body:
     """The body with the surface moved by `shift` (3,) m at frame `at`, by its share (W,) around it."""
     human = identify(body.skeleton)
     root, rotations = body.root, body.rotations
@@ -114,7 +122,10 @@ def _carried(body: Body, surface: Surface, at: int, shift: np.ndarray, share: np
         limb = getattr(human, surface.side)
         kind, chain = ("foot", leg(limb)) if surface.part == "foot" else ("hand", arm(limb))
         swing = swing_to(body, chain, at, body.places[at, chain[2]] + shift, MOST_SWING[kind])
-        rotations = limb_carried(body, Resting.of(body, chain), swung(body, chain, swing, share))
+        moves = swung(body, chain, swing, share)
+        if grounded and surface.part == "foot":
+            moves = above_ground(body, surface, slice(None), moves)
+        rotations = limb_carried(body, Resting.of(body, chain), moves)
     elif surface.part in ("head", "chest"):
         rotations = spine_bent(body, surface, at, shift, share)
     else:

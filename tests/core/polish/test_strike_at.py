@@ -1,5 +1,7 @@
 """A part brought to a ball that stays: the gap is closed by every part, frames away from it keep their bits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,20 @@ def test_every_part_meets_the_ball(kind, off):
     assert abs(gap) < 0.005 and abs(found.gap[0] - abs(gap)) < 1e-9 and found.moved[0] < 0.12
     away = np.abs(np.arange(len(motion)) - AT) > 31
     assert found.motion.rotations[away].tobytes() == motion.rotations[away].tobytes()
+
+
+def test_on_the_ground_no_foot_goes_through_it():
+    """A foot in the ball, as after bodies were moved: it comes out to the side, not downwards."""
+    motion = volley("pass", fps=FPS).motion
+    surface = striking_surface(motion.skeleton, "foot", "right")
+    standing = np.ones((len(motion), 2), bool)
+    standing[AT - 25 : AT + 32, 1] = False
+    own = forward_kinematics(motion)[0][:, surface.end[0], 2]
+    low = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, own[AT] - 0.03])  # toes just above ground
+    meeting = Meeting(float(AT), surface, ball_for(low, surface, (-0.1, 0.0, 0.03)), 0.11, 30.0, 30.0)
+    free, held = (met_at(low, standing, [meeting], grounded=grounded) for grounded in (False, True))
+    toes = [forward_kinematics(found.motion)[0][AT, surface.end[0], 2] for found in (free, held)]
+    assert toes[0] < 0.0 < toes[1] and held.gap[0] < 0.005
 
 
 def test_it_comes_and_goes_smoothly():
