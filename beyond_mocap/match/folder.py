@@ -83,7 +83,7 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     check_folder(path)
     new, kept = not path.exists(), (path / _WORK).exists()
     if (path / STATE).exists() and not _has_pieces(path):
-        read_state(path)
+        _own_state(path)
     try:
         (path / _WORK).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -113,16 +113,21 @@ def _state_before(path: Path, identity: Mapping[str, object]) -> tuple[dict, tup
     if not (path / STATE).exists():
         return {}, ()
     try:
-        state = read_state(path)
-        if not isinstance(state.get("digest"), str):
-            raise _Damaged(path / STATE, "no digest")
-        return state, ()
+        return _own_state(path), ()
     except _Damaged as error:
         told = _DIGEST.search((path / STATE).read_bytes()[:_HEAD]) if (path / STATE).is_file() else None
         if told:
             _check_order(path, {"digest": told[1].decode()}, identity)
         os.replace(path / STATE, path / f"{STATE}.damaged")
         return {}, (f"{error.what}: kept as {STATE}.damaged, and what is done is found by its pieces",)
+
+
+def _own_state(path: Path) -> dict:
+    """What match.json says, with the digest of its order. InputError as `read_state`."""
+    state = read_state(path)
+    if not isinstance(state.get("digest"), str):
+        raise _Damaged(path / STATE, "no digest")
+    return state
 
 
 class _Damaged(InputError):
@@ -149,13 +154,17 @@ def read_state(folder: str | os.PathLike) -> dict:
     except (ValueError, RecursionError) as error:
         raise _Damaged(path, f"no JSON ({' '.join(str(error).split())[:80]})") from None
     players = state.get("players") if isinstance(state, dict) else None
-    if not isinstance(players, list) or not all(isinstance(one, dict) and "id" in one for one in players):
+    if not isinstance(players, list) or not all(isinstance(one, dict) and _is_id(one.get("id")) for one in players):
         raise _Damaged(path, "no list of players")
     if "version" not in state:
         raise _Damaged(path, "no version")
     if state["version"] != VERSION:
         raise InputError(path, f"version {state['version']}", f"{VERSION}", "make the match anew with this version")
     return state
+
+
+def _is_id(value) -> bool:
+    return isinstance(value, str) and bool(value)
 
 
 def file_names(ids: Iterable[str]) -> dict[str, str]:
@@ -194,10 +203,11 @@ def _check_order(path: Path, before: dict, identity: Mapping[str, object]) -> No
     if not before or before.get("digest") == digest_of(identity):
         return
     earlier = before.get("identity")
-    earlier = earlier if isinstance(earlier, dict) else {}
-    other = next((name for name, value in plain(dict(identity)).items() if earlier.get(name) != value), "order")
+    known = plain(dict(identity)).items() if isinstance(earlier, dict) else ()
+    other = next((name for name, value in known if earlier.get(name) != value), None)
+    what = f" (its {_NAMES.get(other, other)} differs)" if other else ""
     raise InputError(
-        path, f"holds the results of another order (its {_NAMES.get(other, other)} differs)",
+        path, f"holds the results of another order{what}",
         "a folder of this order's own", "choose another folder, or delete this one",
     )
 

@@ -151,7 +151,8 @@ def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
 @pytest.mark.parametrize("text, told", [
     ("{", "no JSON"), ("[]", "no list of players"), ('{"players": [3]}', "no list of players"),
     ('{"players": [], "version": 99}', "version 99"), ('{"players": []}', "no version"), ("[" * 100000, "no JSON"),
-    ("\0\0", "no JSON"),
+    ("\0\0", "no JSON"), ('{"version": 1, "players": [{"id": ["a"]}]}', "no list of players"),
+    ('{"version": 1, "players": [{"id": ""}]}', "no list of players"),
 ])  # fmt: skip
 def test_a_state_that_cannot_be_read_is_told(tmp_path, text, told):
     (tmp_path / "match.json").write_text(text)
@@ -189,10 +190,20 @@ def test_a_damaged_state_is_set_aside_and_the_work_goes_on(order, begun, drop, t
         assert folder.place("search", "a").read_bytes() == b"piece" and folder.notes == ()
 
 
+def test_a_state_without_a_digest_and_without_pieces_is_refused(tmp_path):
+    text = '{"version": 1, "players": [], "of": "somebody else"}'
+    (tmp_path / "match.json").write_text(text)
+    with pytest.raises(InputError, match="match.json: no digest"):
+        with opened(tmp_path, {"seed": 1}):
+            pass
+    assert [path.name for path in tmp_path.iterdir()] == ["match.json"]
+    assert (tmp_path / "match.json").read_text() == text
+
+
 def test_a_damaged_state_of_another_order_or_version_is_refused(order, begun):
     other = identity(changed(order, seed=1), "key")
     cut(order.out / "match.json")
-    with pytest.raises(InputError, match="holds the results of another order"):
+    with pytest.raises(InputError, match="holds the results of another order; expected"):  # which, it does not say
         with opened(order.out, other):
             pass
     (order.out / "match.json").write_text('{"players": [], "version": 99}')
