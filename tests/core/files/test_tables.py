@@ -147,6 +147,13 @@ def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["r.json"] and json.loads(file.read_text()) == {"a": 1}
 
 
+def test_halves_of_characters_are_written_and_read_back(tmp_path):
+    """A file's name that is no UTF-8, and a name out of somebody's JSON."""
+    told = {"tracking": os.fsdecode(b"/home/\xff/match.dat"), "name": json.loads('"R\\ud83fs"'), "plain": "Ræs"}
+    atomic_write(tmp_path / "x.json", json.dumps(told, ensure_ascii=False))
+    assert json.loads((tmp_path / "x.json").read_text("utf-8")) == told
+
+
 def test_a_missing_folder_is_told(tmp_path):
     with pytest.raises(InputError, match="No such file"):
         atomic_write(tmp_path / "none" / "x.txt", "x")
