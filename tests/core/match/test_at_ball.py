@@ -11,7 +11,7 @@ from beyond_mocap.library.library import build
 from beyond_mocap.match.at_ball import OPEN, at_ball
 from beyond_mocap.match.shown import shown
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.motion.striking import contact_gap
+from beyond_mocap.motion.striking import contact_gap, surfaces
 from beyond_mocap.polish.crowd.correction import CURVES, FEET, ROOT, Correction
 from tests.core.match.small_match import LIBRARY, SECONDS
 
@@ -60,3 +60,18 @@ def test_who_is_far_from_the_ball_plays_as_he_does(striker):
     (take,) = shown(library, edit, ball, *SECONDS)
     assert at_ball(take, take.ball.positions + [0.0, 0.0, 3.0]) is take
     assert at_ball(take, np.full_like(take.ball.positions, np.nan)) is take
+
+
+def test_a_second_touch_soon_after_does_not_take_the_foot_off_the_first(striker):
+    library, edit, ball, key, _ = striker
+    (take,) = shown(library, edit, ball, *SECONDS)
+    soon = replace(key, frame=round(key.frame) + 5.0)
+    keys, places = (soon, key), np.array(take.ball.positions)
+    skeleton, motion = take.motion.skeleton, take.motion
+    for number, one in enumerate(keys):  # a ball 5 cm away from the foot, on its one side, then on its other
+        at = round(one.frame)
+        posed = pose_kinematics(skeleton, motion.root_positions[at], motion.rotations[at])
+        foot = np.mean(surfaces(skeleton, key.words)[0].line(*posed), axis=0)
+        places[at] = foot + np.array([(-1.0) ** number * 0.21, 0.0, 0.0])
+    found = at_ball(replace(take, keys=keys, ball=replace(take.ball, positions=places)), places)
+    assert max(gap_at(found, one) for one in keys) < OPEN
