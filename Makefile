@@ -40,7 +40,7 @@ training:
 test test-core test-blender test-oldest: export OPENBLAS_NUM_THREADS = 1
 test test-core test-blender test-oldest: export OMP_NUM_THREADS = 1
 test: venv venv-oldest training
-	@mkdir -p build; status=0; \
+	@mkdir -p build; status=0; if [ -e .venv-4.5 ]; then export BLENDERS_IN_TURN=1; fi; \
 	for pair in "test-core test-training" "test-blender test-oldest"; do \
 	  set -- $$pair; $(MAKE) -s $$2 >build/$$2.txt 2>&1 & second=$$!; \
 	  $(MAKE) -s $$1 || status=1; wait $$second || status=1; cat build/$$2.txt; \

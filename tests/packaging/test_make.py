@@ -1,0 +1,27 @@
+"""What `make test` tells the tests that it runs."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+TOP = Path(__file__).resolve().parents[2]
+STUBS = """
+include real.mk
+venv venv-oldest training: ;
+test-core test-training test-blender test-oldest: ; @echo $@ $$BLENDERS_IN_TURN
+"""
+
+
+@pytest.mark.parametrize("oldest", [True, False])
+def test_two_blenders_take_turns_and_one_tries_all(tmp_path, oldest):
+    if shutil.which("make") is None:
+        pytest.skip("no make here")
+    shutil.copy(TOP / "Makefile", tmp_path / "real.mk")
+    (tmp_path / "Makefile").write_text(STUBS)
+    (tmp_path / ".venv-4.5").mkdir() if oldest else None
+    made = subprocess.run(["make", "-s", "test"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    told = dict(line.partition(" ")[::2] for line in made.stdout.splitlines() if line.startswith("test-"))
+    turn = "1" if oldest else ""
+    assert (told["test-blender"], told["test-oldest"]) == (turn, turn)
