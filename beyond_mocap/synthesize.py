@@ -297,7 +297,8 @@ def with_warnings(
     library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
     gave way is told."""
     told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
-    told += left_out(recordings, order, take.edit)
+    if take.plan.method == "path":  # the others never choose what of a clip is left out
+        told += left_out(recordings, order, take.edit)
     if hurried is not None:
         since = take.start_time + hurried / recordings.fps
         told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))

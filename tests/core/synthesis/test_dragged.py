@@ -10,6 +10,7 @@ from beyond_mocap.synthesis.dragged import left_out
 from beyond_mocap.synthesis.path_search import PathSearch
 from beyond_mocap.synthesis.slots import KEY_RATES
 from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.synthesize import synthesize
 
 KEY, ENTRY = 4.0, 1.2
 """Seconds of the key moment in the track, and of the clip's entry and exit, in all of which both feet stand."""
@@ -67,3 +68,12 @@ def test_who_stands_has_the_whole_clip_and_no_choice(search, speed):
     edit, first, last = header_shown(looked)
     assert first < 0.15 - ENTRY / 1.3 and last > ENTRY / 1.3 - 0.15
     assert left_out(looked.library, looked.wanted, edit) == []
+
+
+@pytest.mark.parametrize("method", ["path", "distance"])
+def test_only_a_search_that_leaves_it_out_says_so(with_header, track_of, timeline_of, method):
+    """By distance, what another key moment leaves no room for is cut off whether it drags or not."""
+    moments = ((KEY, "header standing"), (KEY + 0.4, "header standing"))
+    track = track_of(lambda t: np.full(len(t), 4.5))
+    take = synthesize(with_header, Plan(track=track, timeline=timeline_of(*moments), method=method))
+    assert any("is left out" in line for line in take.warnings) == (method == "path")
