@@ -156,8 +156,8 @@ class Library:
     @cached_property
     def extended(self) -> "Library":
         """The recordings and, behind them, what `library.made` makes of them: the speeds between and above them, and
-        kicks and taken balls on the run; made on first use and kept beside the cache. It has no clusters. InputError where no recording
-        shows locomotion."""
+        kicks and taken balls on the run; made on first use and kept beside the cache. It has no clusters. InputError
+        where no recording shows locomotion."""
         measure_gaits(self)  # a library without locomotion stays an error
         made = cache.load(*self.kept, "made") if self.kept else None
         if made is None:
@@ -179,8 +179,8 @@ class Library:
 
     def lacks(self, speed: np.ndarray, at_keys: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track at `speed` (T,) m/s, at the library's rate, stays in a gap for a fifth of a second or more,
-        or has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick, or, where a foot `takes` (K,)
-        bool the ball, any recorded taking of a ball can be played without sliding."""
+        or has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick, or, where one `takes` (K,)
+        bool the ball, any recorded taking of a ball with the foot, can be played without sliding."""
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.gaps)
         kick, take = (touch_speed(self.frames, self.clips, self.keys, act) for act in (KICK, TAKE))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, TAKES_FROM), kick)

@@ -110,7 +110,7 @@ def aligned(
         clocks[half.number], times[members] = found
     _check(events, clocks)
     for number in [number for number, clock in clocks.items() if not clock.fits]:
-        notes.append(f"{_told(number, clocks.pop(number))}: they are left out")
+        notes.append(f"{_told(number, clocks.pop(number))}, which may be chance: they are left out")
         times[[i for i, event in enumerate(events.events) if event.period == number]] = np.nan
     pairs = _pairs(events.events, times, touches)
     notes += [_told(number, clock) for number, clock in clocks.items()]

@@ -71,14 +71,16 @@ def unused_lines(parts: Iterable[Part], order: MatchOrder, files: Mapping[str, s
     away = [] if order.players else [file for player, file in files.items() if player not in there]
     idle = [f"{file}.txt" for file in away if _own_text(order.annotations, file) is not None]
     if idle:
-        out.append(f"{', '.join(idle)}: not used, since nobody of them is there in that time")
+        who = "he is" if len(idle) == 1 else "they are"
+        out.append(f"{', '.join(idle)}: not used, since {who} not there in that time")
     for part in parts:
         if part.unused:
             first = format_timeline(timeline_of(part.unused[:1])).strip()
             edges = [(track.times[0], track.times[-1]) for track in part.role.asked]
-            there = ", ".join(f"{told_time(start)} to {told_time(end)} s" for start, end in edges)
-            found = f"{len(part.unused)} of your words not used ({first}{' ...' * (len(part.unused) > 1)})"
-            out.append(f"{part.file}.txt: {found}, since {part.role.player.id} is there from {there}")
+            times = ", ".join(f"{told_time(start)} to {told_time(end)} s" for start, end in edges)
+            count = len(part.unused)
+            found = f"{count} of your lines {'is' if count == 1 else 'are'} not used ({first}{' ...' * (count > 1)})"
+            out.append(f"{part.file}.txt: {found}, since {part.role.player.id} is there from {times}")
     return out
 
 

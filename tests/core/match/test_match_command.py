@@ -85,14 +85,14 @@ def test_words_for_a_time_at_which_nobody_is_there_are_told(match, tmp_path):
     words.mkdir()
     (words / "home_7.txt").write_text("13 kick right\n75.25 kick right\n20 21 dribble\n13.5 15 dribble\n")
     span = {"from": 12, "to": 14, "players": None, "annotations": words}
-    told = "home_7.txt: 2 of your words not used (20 21 dribble ...), since home_7 is there from 12 to 14 s"
+    told = "home_7.txt: 2 of your lines are not used (20 21 dribble ...), since home_7 is there from 12 to 14 s"
     status, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
     assert status == 0 and [line for line in error if ".txt" in line] == [f"note: {told}"]
     assert told in read_state(tmp_path / "out")["notes"]
     text = tmp_path / "out" / "annotations" / "away_6.txt"
     text.write_text(text.read_text() + "75.25 kick right\n")
     _, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
-    told = "away_6.txt: 1 of your words not used (75.25 kick right), since away_6 is there from 12 to 14 s"
+    told = "away_6.txt: 1 of your lines is not used (75.25 kick right), since away_6 is there from 12 to 14 s"
     assert f"note: {told}" in error
 
 
