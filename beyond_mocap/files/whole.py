@@ -64,7 +64,7 @@ def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def atomic_write(path: str | os.PathLike, content: str | bytes) -> None:
-    """Write a whole file: text as UTF-8 with line ends as given, and halves of characters, which JSON and names of files
-    may have and UTF-8 has not, as JSON escapes them. InputError as for `beside`."""
+    """Write a whole file: text as UTF-8 with line ends as given, and halves of characters, which JSON and names of
+    files may have and UTF-8 has not, as JSON escapes them. InputError as for `beside`."""
     with beside(path) as part:
         part.write_bytes(content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content)
