@@ -28,7 +28,7 @@ from .content_digest import digest_of
 STATE = "match.json"
 WORDS = "annotations"
 VERSION = 1
-_WORK, _LOCK = ".work", "lock"
+_WORK, _LOCK, _ORDER = ".work", "lock", "order"  # the last has the order's digest, should match.json be lost
 _LONGEST = 100  # characters of a file's name
 _PART = re.compile(r"\..+\.\d+\.\d+\.part")  # what `files.whole.beside` writes before it has its name
 _HEAD, _DIGEST = 1000, re.compile(rb'"digest": *"([0-9a-f]+)"')  # bytes in which match.json says whose it is
@@ -93,6 +93,7 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
         before, notes = _state_before(path, identity)
         _check_order(path, before, identity)
         _sweep(path)
+        atomic_write(path / _WORK / _ORDER, digest_of(identity))
         try:
             yield MatchFolder(path, digest_of(identity), before, notes)
         finally:
@@ -115,11 +116,18 @@ def _state_before(path: Path, identity: Mapping[str, object]) -> tuple[dict, tup
     try:
         return _own_state(path), ()
     except _Damaged as error:
-        told = _DIGEST.search((path / STATE).read_bytes()[:_HEAD]) if (path / STATE).is_file() else None
-        if told:
-            _check_order(path, {"digest": told[1].decode()}, identity)
+        _check_order(path, _digest_kept(path), identity)
         os.replace(path / STATE, path / f"{STATE}.damaged")
         return {}, (f"{error.what}: kept as {STATE}.damaged, and what is done is found by its pieces",)
+
+
+def _digest_kept(path: Path) -> dict[str, str]:
+    """The digest of the order whose match.json is damaged, as far as that or the pieces' folder still says."""
+    told = _DIGEST.search((path / STATE).read_bytes()[:_HEAD])
+    if told:
+        return {"digest": told[1].decode()}
+    kept = path / _WORK / _ORDER
+    return {"digest": kept.read_text("ascii", "replace")} if kept.is_file() else {}
 
 
 def _own_state(path: Path) -> dict:

@@ -190,6 +190,16 @@ def test_a_damaged_state_is_set_aside_and_the_work_goes_on(order, begun, drop, t
         assert folder.place("search", "a").read_bytes() == b"piece" and folder.notes == ()
 
 
+def test_an_empty_state_of_another_order_is_refused(order, begun):
+    (order.out / "match.json").write_text("")
+    with pytest.raises(InputError, match="holds the results of another order"):
+        with opened(order.out, identity(changed(order, seed=1), "key")):
+            pass
+    assert (order.out / "match.json").read_text() == ""
+    with opened(order.out, begun) as folder:
+        assert "kept as match.json.damaged" in folder.notes[0]
+
+
 def test_a_state_without_a_digest_and_without_pieces_is_refused(tmp_path):
     text = '{"version": 1, "players": [], "of": "somebody else"}'
     (tmp_path / "match.json").write_text(text)
