@@ -97,5 +97,8 @@ def entries(value, where: str) -> list:
 
 def shown(value) -> str:
     """A value as it stands in the file, shortened."""
-    said = json.dumps(value, ensure_ascii=True, default=str)
+    try:
+        said = json.dumps(value, ensure_ascii=True, default=str)
+    except RecursionError:  # what can just be read may be too deep to be written
+        return "a value nested too deep"
     return said if len(said) <= 40 else said[:37] + "..."

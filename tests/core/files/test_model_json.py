@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.errors import InputError
+from beyond_mocap.files.json_values import number
 from beyond_mocap.files.model_json import model_text, parse_model, read_model, write_model
 from beyond_mocap.markers.model import BallMarker, Freedom, MarkerModel
 from beyond_mocap.motion.skeleton import Skeleton
@@ -94,6 +95,14 @@ def test_what_is_wrong_is_told_with_its_place(path, value, said):
     at[path[-1]] = value
     with pytest.raises(InputError, match=said):
         parse_model(json.dumps(whole), "m.json")
+
+
+def test_a_value_that_is_too_deep_to_be_shown_is_told():
+    deep = []
+    for _ in range(100000):
+        deep = [deep]
+    with pytest.raises(InputError, match="player 1: a value nested too deep; expected a number"):
+        number(deep, "player 1")
 
 
 def test_files_that_are_none(tmp_path):
