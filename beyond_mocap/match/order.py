@@ -54,7 +54,7 @@ class MatchOrder:
     figures: bool = True
     window: float = WINDOW
     overlap: float = OVERLAP
-    variety: float = 0.6
+    variety: float = 0.3
     workers: int = 1
     scheduler: str = ""
 
