@@ -20,7 +20,7 @@ from ..motion.runs import runs
 from ..polish.crowd.capsules import FAR, capsules, lines, touching
 from ..polish.crowd.correction import CURVES, Correction, carried
 from ..polish.crowd.crowd_body import CrowdBody, moved
-from ..polish.crowd.episodes import Episode, joined_spans
+from ..polish.crowd.episodes import Episode, Span, meetings
 from ..polish.crowd.pressure import Pressure
 from ..polish.crowd.pushing import ALLOWED, pushed
 
@@ -32,9 +32,6 @@ PASSES = 5
 
 DONE = 0.015
 """Metres of overlap from which on bodies are looked at once more after the first pass."""
-
-Span = tuple[int, int, tuple[int, int]]
-"""First frame, end, and the numbers of two bodies."""
 
 
 def kept_apart(
@@ -60,20 +57,14 @@ def kept_apart(
         placed = [moved(body, own) for body, own in zip(bodies, curves)]
         deep = _touching_spans(bodies, placed, round(REACH * fps), DONE if turn else ALLOWED)
         met += deep
-        again = [episode for episode in joined_spans(met) if any(_within(span, episode) for span in deep)]
-        if not again:
+        if not deep:
             break
-        for episode in again:
+        for episode in meetings(deep, met):
             _part(episode, bodies, curves, pressures, fps)
         done = [Correction.of(own, start, fps) for own in curves]
         curves = [correction.curves(start, len(body.lines)) for correction, body in zip(done, bodies)]
         bodies = [_as_bent(*each, start) for each in zip(bodies, motions, curves, firsts)]
     return tuple(done)
-
-
-def _within(span: Span, episode: Episode) -> bool:
-    first, end, pair = span
-    return episode.first <= first and end <= episode.end and pair in episode.pairs
 
 
 def overlap_depths(motions: Sequence[Motion], firsts: Sequence[int]) -> list[np.ndarray]:

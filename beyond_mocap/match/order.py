@@ -57,7 +57,7 @@ class MatchOrder:
     figures: bool = True
     window: float = WINDOW
     overlap: float = OVERLAP
-    variety: float = 0.6
+    variety: float = 0.3
     workers: int = 1
     scheduler: str = ""
     events_meta: Path | None = None

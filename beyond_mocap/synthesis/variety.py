@@ -17,6 +17,10 @@ from ..library.library import Library
 PERIOD = 3.6
 """Seconds from one liked lag to the next."""
 
+SPREAD = 0.6180339887
+"""Of a period by which a clip's places in it are ahead of those of the clip before: a clip that is shorter than a period
+has room for some lags only, and others have room for the rest. Multiples of the golden section lie evenly."""
+
 LIKED, DISLIKED = 0.05, 0.45
 """Seconds from a liked lag within which all is well, and from which on it is as bad as it gets."""
 
@@ -42,7 +46,8 @@ def taste(library: Library, lag: float, variety: float, start: float) -> Taste |
         return None
     frames = library.frames
     period = round(PERIOD * library.fps)
-    place = (np.arange(len(frames)) - frames.first[frames.clip]) % period
+    offset = np.arange(len(frames.first)) * SPREAD % 1.0 * period
+    place = (np.arange(len(frames)) - frames.first[frames.clip] + offset.astype(int)[frames.clip]) % period
     off = np.arange(period) / period - lag / PERIOD
     away = np.abs(off - np.round(off)) * PERIOD
     table = variety * np.clip((away - LIKED) / (DISLIKED - LIKED), 0.0, 1.0)

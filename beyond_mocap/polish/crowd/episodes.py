@@ -8,6 +8,9 @@ import numpy as np
 
 from ...motion.runs import runs
 
+Span = tuple[int, int, tuple[int, int]]
+"""First frame, end, and the numbers of two bodies."""
+
 
 @dataclass(frozen=True)
 class Episode:
@@ -33,7 +36,7 @@ def episodes(positions: np.ndarray, distance: float, reach: int) -> list[Episode
     return joined_spans(found)
 
 
-def joined_spans(spans: list[tuple[int, int, tuple[int, int]]]) -> list[Episode]:
+def joined_spans(spans: list[Span]) -> list[Episode]:
     """Spans (first frame, end, pair of bodies) as episodes: those that overlap in time and share a body are one."""
     groups: list[tuple[int, int, set, set]] = []
     for first, end, pair in sorted(spans):
@@ -45,3 +48,20 @@ def joined_spans(spans: list[tuple[int, int, tuple[int, int]]]) -> list[Episode]
         groups.append((first, end, bodies, pairs))
     whole = [Episode(tuple(sorted(bodies)), first, end, tuple(sorted(pairs))) for first, end, bodies, pairs in groups]
     return sorted(whole, key=lambda episode: (episode.first, episode.bodies))
+
+
+def meetings(spans: list[Span], met: list[Span]) -> list[Episode]:
+    """These spans as episodes, together with all who meet their bodies at the same time by the spans `met`, and in turn
+    those: nobody is pushed into somebody who is not looked at."""
+    spans = list(spans)
+    while True:
+        found = joined_spans(spans)
+        more = [
+            (max(first, one.first), min(end, one.end), pair)
+            for one in found
+            for first, end, pair in met
+            if first < one.end and one.first < end and set(pair) & set(one.bodies) and pair not in one.pairs
+        ]
+        if not more:
+            return found
+        spans += more

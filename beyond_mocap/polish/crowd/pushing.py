@@ -23,13 +23,13 @@ from .sides import sides, way_out
 ALLOWED = 0.005
 """Metres of overlap that are left as they are."""
 
-ROOM = 0.03
+ROOM = 0.06
 """Metres between two capsules, more than ALLOWED lets them, up to which their contact is followed."""
 
 INERTIA = 4.0
 """How much a metre of pressure counts for the side it pressed to, against a metre between two lines."""
 
-_ROUNDS, _ARMS_ALONE = 16, 4
+_ROUNDS, _ARMS_ALONE = 24, 4
 _STEP = 0.35
 _LOOKED_OVER = 8  # rounds after which it is looked anew who is near
 _CLOSE, _AROUND = 0.1, 4  # metres within which, and frames around which bodies are near

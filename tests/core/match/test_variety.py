@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
+from beyond_mocap.library.library import build
 from beyond_mocap.match.variety import APART, in_step, lags, share_in_step
 from beyond_mocap.motion.track import Track
 from beyond_mocap.plan import Plan
@@ -47,16 +48,31 @@ def walker(lag, variety=0.6):
     return Plan(track=Track(times, np.column_stack([1.4 * times, 0.0 * times])), variety=variety, lag=lag, made=False)
 
 
+def share_of(takes, frames=slice(None)):
+    """Share in step of takes made from clips at 30 frames per second, all at one place."""
+    names = sorted({name for take in takes for name in take.clips})
+    shown = np.array([[2 * names.index(t.clips[c]) + m for c, m in zip(t.clip, t.mirrored)] for t in takes])[:, frames]
+    seconds = np.array([take.clip_frame for take in takes])[:, frames] / 30.0
+    return share_in_step(shown, seconds, np.zeros((*shown.shape, 2)))
+
+
 def test_two_who_walk_alike_are_out_of_step(library):
     takes = [synthesize(library, walker(lag)) for lag in (0.0, 1.5)]
-    same = [synthesize(library, walker(0.0, 0.0))] * 2
-    shares = []
-    for pair in (same, takes):
-        names = sorted({name for take in pair for name in take.clips})
-        shown = [[2 * names.index(t.clips[c]) + m for c, m in zip(t.clip, t.mirrored)] for t in pair]
-        seconds = [t.clip_frame / 30.0 for t in pair]
-        shares.append(share_in_step(np.array(shown), np.array(seconds), np.zeros((2, len(shown[0]), 2))))
-    assert shares[0] == 1.0 and shares[1] < 0.1
+    assert share_of([synthesize(library, walker(0.0, 0.0))] * 2) == 1.0 and share_of(takes) < 0.1
+
+
+def test_a_dozen_who_begin_to_run_at_once_from_short_clips_are_out_of_step(tmp_path, clip_file):
+    """Each clip of 1.2 s has room for a third of the lags only; together they have room for all."""
+    clip_file(tmp_path / "walk.bvh", 1.4, 5.0, "walking")
+    for number in range(6):
+        clip_file(tmp_path / f"run{number}.bvh", 4.0, 1.2, "running", seed=number, phase=number / 6.0)
+    library = build(tmp_path)
+    times = np.arange(0, 6.01, 0.04)
+    speed = np.where((times > 2.0) & (times < 4.0), 4.0, 1.4)
+    way = np.cumsum(np.append(0.0, speed[:-1] * 0.04))
+    track = Track(times, np.column_stack([way, 0.0 * way]))
+    plans = [Plan(track=track, variety=0.6, lag=lag, made=False) for lag in np.arange(12) * APART]
+    assert share_of([synthesize(library, plan) for plan in plans], slice(54, 126)) < 0.08
 
 
 def test_no_variety_is_no_taste(library):

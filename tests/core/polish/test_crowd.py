@@ -13,7 +13,7 @@ from beyond_mocap.polish.crowd.attention import looking
 from beyond_mocap.polish.crowd.banded_squares import BandedSquares
 from beyond_mocap.polish.crowd.capsules import nearest, overlap, touching
 from beyond_mocap.polish.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, applied, carried, joined
-from beyond_mocap.polish.crowd.episodes import episodes, joined_spans
+from beyond_mocap.polish.crowd.episodes import episodes, joined_spans, meetings
 from beyond_mocap.polish.crowd.spacing import DISTANCE, STEADY, keeping, spaced
 
 FPS = 30.0
@@ -120,6 +120,15 @@ def test_episodes_that_share_a_body_at_one_time_are_one():
         for other in found[number + 1 :]:
             apart = one.end <= other.first or other.end <= one.first
             assert apart or not set(one.bodies) & set(other.bodies)
+
+
+def test_a_meeting_is_looked_at_with_all_who_are_there_then():
+    """Bodies 1 and 2 meet while 2 has 3 and 3 has 4 beside him; 0 had met 1 before, and 5 and 6 are elsewhere."""
+    met = [(0, 20, (0, 1)), (10, 80, (2, 3)), (25, 45, (3, 4)), (0, 90, (5, 6)), (30, 50, (1, 2))]
+    assert [(one.bodies, one.first, one.end, one.pairs) for one in meetings([(30, 50, (1, 2))], met)] == [
+        ((1, 2, 3, 4), 30, 50, ((1, 2), (2, 3), (3, 4))),
+    ]
+    assert meetings(met, met) == joined_spans(met)
 
 
 def test_tracks_that_cross_are_spaced_by_the_least_smooth_shift():

@@ -1,4 +1,4 @@
-"""Capsules that go through each other, and bodies whose contacts press on: on one side, and until nothing comes back."""
+"""Capsules that go through each other part to one side, and their contacts press until nothing comes back at them."""
 
 import numpy as np
 import pytest
