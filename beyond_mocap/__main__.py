@@ -392,6 +392,7 @@ def main(
     this one cannot send work to others, as within Blender.
     """
     told = None
+    _escape(sys.stdout)
     try:
         argv = sys.argv[1:] if argv is None else argv
         options = parser(prog).parse_args(argv)
@@ -413,6 +414,13 @@ def main(
         told.end()
     print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
     return status
+
+
+def _escape(stream) -> None:
+    """Lets a stream write what its encoding lacks as escapes, where it would raise: names of files and people on a
+    console of another script."""
+    if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
+        stream.reconfigure(errors="backslashreplace")
 
 
 class _interrupts:

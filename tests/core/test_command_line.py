@@ -1,5 +1,6 @@
 """The command: exit statuses, one line for what is wrong, nothing half-written, and tables that can be read back."""
 
+import io
 import json
 import os
 import signal
@@ -205,6 +206,14 @@ def test_mirror(run, clips_folder, tmp_path):
     assert np.allclose(motions[0].root_positions * [1, -1, 1], motions[1].root_positions, atol=1e-4)
     assert run("mirror", once, once)[0] == 0
     assert once.read_bytes() == twice.read_bytes()
+
+
+def test_a_console_of_another_script_is_written_to_all_the_same(clips_folder, tmp_path, monkeypatch):
+    console = io.TextIOWrapper(io.BytesIO(), encoding="cp1252", errors="strict")
+    monkeypatch.setattr(sys, "stdout", console)
+    assert main(["mirror", str(clips_folder / "walk.bvh"), str(tmp_path / "\u0110or\u0111e.bvh")]) == 0
+    console.flush()
+    assert b"\\u0110or\\u0111e.bvh: " in console.buffer.getvalue()
 
 
 def test_help_and_version(run):
