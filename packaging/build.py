@@ -49,7 +49,9 @@ def lay_out(folder, packages, platform):
     names = wheels.gather(packages, platform, folder / "wheels")
     stage.copy_parts(TOP, folder)
     text = (TOP / "blender_manifest.toml").read_text("utf-8")
-    (folder / "blender_manifest.toml").write_text(stage.complete_manifest(text, packages, platform.name, names), "utf-8")
+    (folder / "blender_manifest.toml").write_text(
+        stage.complete_manifest(text, packages, platform.name, names), "utf-8"
+    )
 
 
 def version():
@@ -62,7 +64,10 @@ def pack(folder, out):
     import bpy  # noqa: F401  (brings bl_pkg)
     from bl_pkg.bl_extension_cli import cli_extension_handler as extension_tool
 
-    for verb in (["validate", str(folder)], ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"]):
+    for verb in (
+        ["validate", str(folder)],
+        ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"],
+    ):
         if extension_tool(verb) != 0:
             sys.exit(f"Blender's own tool refused: {verb[0]} {folder}")
 

@@ -55,8 +55,19 @@ def lint_zip(path, platform):
         names = archive.namelist()
     wheels = [name.removeprefix("wheels/") for name in names if name.startswith("wheels/") and name.endswith(".whl")]
     return [
-        *(f"{path.name}: {name} does not belong in it" for name in names if name.startswith(NEVER) or "__pycache__" in name),
-        *(f"{path.name}: {name} is for another platform" for name in wheels
-          if not any(wheel(name).serves(platform, python) for python in platform.pythons)),
-        *(f"{path.name}: lacks {name}" for name in ("__init__.py", "LICENSE", "blender_manifest.toml") if name not in names),
+        *(
+            f"{path.name}: {name} does not belong in it"
+            for name in names
+            if name.startswith(NEVER) or "__pycache__" in name
+        ),
+        *(
+            f"{path.name}: {name} is for another platform"
+            for name in wheels
+            if not any(wheel(name).serves(platform, python) for python in platform.pythons)
+        ),
+        *(
+            f"{path.name}: lacks {name}"
+            for name in ("__init__.py", "LICENSE", "blender_manifest.toml")
+            if name not in names
+        ),
     ]

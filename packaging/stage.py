@@ -2,7 +2,17 @@
 
 import shutil
 
-PARTS = ("__init__.py", "batch.py", "LICENSE", "README.md", "CHANGELOG.md", "beyond_mocap", "scene", "operators", "panels")
+PARTS = (
+    "__init__.py",
+    "batch.py",
+    "LICENSE",
+    "README.md",
+    "CHANGELOG.md",
+    "beyond_mocap",
+    "scene",
+    "operators",
+    "panels",
+)
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc")
 
 
@@ -18,7 +28,9 @@ def copy_parts(source, folder):
 
 def complete_manifest(text, packages, platform, wheels):
     """The committed manifest's text, with the platform, the wheels and a copyright line per bundled package."""
-    holders = [f"{package.copyright} ({package.name} {package.bundled_version}, {package.license})" for package in packages]
+    holders = [
+        f"{package.copyright} ({package.name} {package.bundled_version}, {package.license})" for package in packages
+    ]
     own = next(line for line in text.splitlines() if line.startswith("copyright = "))
     ours = own.removeprefix("copyright = [").removesuffix("]")
     added = [

@@ -129,7 +129,10 @@ def _made_lines(played: Played) -> list[TimedLine]:
     """A line per kind of made clip: running, two recordings blended, kicks, taken balls."""
     blends, kicks, takes = (_whose(played, MADE_FOLDER + name) for name in (BLENDED, KICKED, TAKEN))
     kinds = (
-        (_made(played) & ~blends & ~kicks & ~takes, "made running, since no recording has the speed that the track asks for"),
+        (
+            _made(played) & ~blends & ~kicks & ~takes,
+            "made running, since no recording has the speed that the track asks for",
+        ),
         (blends, "blended from a slower and a faster recording, since none has the speed that the track asks for"),
         (kicks, "a kick made on the run, since no recorded one is as fast as the player"),
         (takes, "a ball taken on the run, made, since nobody recorded takes one as fast as the player goes"),

@@ -15,8 +15,8 @@ needed, quick ones, and weaving ones. The fastest recording played faster with s
 figures and lose the look: knees pop, the body floats.
 
 Recorded kicks are seldom faster than a jog, and who takes a ball with his foot in a recording all but stands; carried
-along at 8 m/s their standing foot slides by metres. `motion.gestures` makes both on the run at the speeds they lack; they
-stand in for recorded ones wherever they carry the words by which those answer.
+along at 8 m/s their standing foot slides by metres. `motion.gestures` makes both on the run at the speeds they lack;
+they stand in for recorded ones wherever they carry the words by which those answer.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
 
 
 def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
-    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite where there is none."""
+    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite where there is
+    none."""
     speed = frames.speed  # worked out over all frames each time it is asked for
     found = [
         speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]

@@ -1,1 +1,2 @@
-"""How it becomes seamless: smoothing of seams, time warp, the fit to the path, and limbs that reach for their targets."""
+"""How it becomes seamless: smoothing of seams, time warp, the fit to the path, and limbs that reach for their
+targets."""

@@ -2,8 +2,9 @@
 
 Both are real, so that places, velocities and accelerations agree at both ends of the fade. Compared on 33 takes of 20 s
 from three libraries, jerk at seams over the real 95th percentile (median; share of seams above it): the jump spread by
-eq. 25 (Faustino §3.3.1) 0.90; 33 %, inertialization (the jump and its velocity decaying by a quintic, half on each side;
-Bollo 2018) 0.84; 31 %, all of it after the seam 0.84; 30 % with feet moved half as far again, and this fade 0.73; 25 %.
+eq. 25 (Faustino §3.3.1) 0.90; 33 %, inertialization (the jump and its velocity decaying by a quintic, half on each
+side; Bollo 2018) 0.84; 31 %, all of it after the seam 0.84; 30 % with feet moved half as far again, and this fade 0.73;
+25 %.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ def faded_rotations(
 ) -> np.ndarray:
     """Rotations (T, J, 4) mixed at frames `at` (R,) with those of the other piece (R, J, 4) by their `share`.
 
-    A joint turns the same way round throughout a fade: two swinging arms may be half a turn apart, and the shorter arc of
-    each frame alone would change sides in the middle. Taken is the side that is shorter in the mean of the fade.
+    A joint turns the same way round throughout a fade: two swinging arms may be half a turn apart, and the shorter arc
+    of each frame alone would change sides in the middle. Taken is the side that is shorter in the mean of the fade.
     """
     out = np.array(rotations, dtype=float)
     ends = np.where(after[:, None, None], other, out[at])
@@ -50,8 +51,8 @@ def faded_rotations(
 
 
 def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
-    """Rotation vectors (R, J, 3) in radians, of up to a whole turn, that make rotations (R, J, 4) without changing sides
-    within a fade; `through` (R,) falls where the next fade begins."""
+    """Rotation vectors (R, J, 3) in radians, of up to a whole turn, that make rotations (R, J, 4) without changing
+    sides within a fade; `through` (R,) falls where the next fade begins."""
     begins = np.diff(through, prepend=np.inf) <= 0.0
     flips = np.sum(turn * np.roll(turn, 1, axis=0), axis=-1) < 0.0
     turn = turn * np.where(np.cumsum(flips & ~begins[:, None], axis=0) % 2 == 1, -1.0, 1.0)[..., None]

@@ -10,17 +10,17 @@ UPRIGHT = np.cos(np.radians(50.0))
 
 
 def chained_facing(start: float, turn: np.ndarray) -> np.ndarray:
-    """(T,) facing in radians from `start` on, turning by `turn` (T,) per frame as recorded; at a seam `turn` is 0, so that
-    the next stretch begins in the direction in which the last one ended."""
+    """(T,) facing in radians from `start` on, turning by `turn` (T,) per frame as recorded; at a seam `turn` is 0, so
+    that the next stretch begins in the direction in which the last one ended."""
     return start + np.cumsum(turn) - turn[0]
 
 
 def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -> np.ndarray:
     """(S,) radians by which a stretch has to be turned more at each seam because the body is not upright there.
 
-    up: (T, 3) direction of the torso (hips to neck) in the facing frame; expected: (S, 3) the same for the frame that the
-    stretch before would have gone on with. Facing says little about a body that lies or dives: where both torsos lean more
-    than 50 degrees, the stretch is turned until they lie the same way (§3.2.6, the extra check on the spine).
+    up: (T, 3) direction of the torso (hips to neck) in the facing frame; expected: (S, 3) the same for the frame that
+    the stretch before would have gone on with. Facing says little about a body that lies or dives: where both torsos
+    lean more than 50 degrees, the stretch is turned until they lie the same way (§3.2.6, the extra check on the spine).
     """
     out = np.zeros(len(seams))
     for number, (seam, before) in enumerate(zip(seams, expected)):
@@ -31,9 +31,11 @@ def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -
     return out
 
 
-def chained_root(place: np.ndarray, velocity: np.ndarray, sway: np.ndarray, facing: np.ndarray, fps: float) -> np.ndarray:
-    """(T, 2) root on the ground from `place` (2,) on: the path's velocity (T, 2, m/s, facing frame) summed up, plus sway
-    (T, 2). Across a seam the last displacement is repeated (eq. 24), which is what summing velocities does."""
+def chained_root(
+    place: np.ndarray, velocity: np.ndarray, sway: np.ndarray, facing: np.ndarray, fps: float
+) -> np.ndarray:
+    """(T, 2) root on the ground from `place` (2,) on: the path's velocity (T, 2, m/s, facing frame) summed up, plus
+    sway (T, 2). Across a seam the last displacement is repeated (eq. 24), which is what summing velocities does."""
     flat = np.concatenate([velocity, np.zeros((len(velocity), 1))], axis=1)
     turn = quaternion.about_up(facing)
     step = quaternion.rotate(turn, flat)[:, :2] / fps

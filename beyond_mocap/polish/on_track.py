@@ -48,9 +48,10 @@ def facing(
     direction (T,) of travel on the track and speed (T,) m/s there; velocity (T, 2) m/s of the recording in its facing
     frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle
     to the direction of travel; where either stands still there is no such angle and the recording's turning decides,
-    with a little of `aim`. Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the facing has to
-    be, NaN where it is free: what lies around a stretch that is made anew. firm (T,): how many times firmer than usual
-    the recording's own turning is followed (`firmness`). aim: (T,) radians that a body which stands slowly turns to.
+    with a little of `aim`. Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the
+    facing has to be, NaN where it is free: what lies around a stretch that is made anew. firm (T,): how many times
+    firmer than usual the recording's own turning is followed (`firmness`). aim: (T,) radians that a body which stands
+    slowly turns to.
     """
     count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)

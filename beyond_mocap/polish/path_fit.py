@@ -93,9 +93,9 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) 
 def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
     """Where the body is on the ground: (T, 3) metres, the pelvis's x and y and the height of the ground under it.
 
-    standing: (T, 2, 2) bool, left and right, heel and toe. Level ground is as high as `contacts.recorded_floor`. Where the soles that stand lie within a hand's breadth of
-    height, the ground is flat; else its height is that of the feet that stand, smoothed, and between stances a straight
-    line over time.
+    standing: (T, 2, 2) bool, left and right, heel and toe. Level ground is as high as `contacts.recorded_floor`. Where
+    the soles that stand lie within a hand's breadth of height, the ground is flat; else its height is that of the feet
+    that stand, smoothed, and between stances a straight line over time.
     """
     body = identify(motion.skeleton)
     positions, _ = forward_kinematics(motion)

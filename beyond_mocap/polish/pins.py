@@ -2,9 +2,9 @@
 
 A limb comes to its pin and leaves it within FADE seconds: there it is off its own way by what it is off at the pin,
 fading away. At a pin that holds it comes to rest, at a momentary one it passes. It gets there by two-bone inverse
-kinematics (`reach`). Where the limb is too short, first the spine bends towards the pin and then the pelvis comes nearer,
-the feet held where they are; what still lacks is told. The gaze turns the head, with it the neck and a little the chest,
-as far as a neck can. Frames without a pin keep their bits.
+kinematics (`reach`). Where the limb is too short, first the spine bends towards the pin and then the pelvis comes
+nearer, the feet held where they are; what still lacks is told. The gaze turns the head, with it the neck and a little
+the chest, as far as a neck can. Frames without a pin keep their bits.
 """
 
 from __future__ import annotations
@@ -108,8 +108,9 @@ def pinned(motion: Motion, contacts: np.ndarray, pins: Sequence, start: float, l
 
 
 def target(pins: Sequence, start: float, fps: float, count: int) -> Target:
-    """What the pins of one part, in the order of time, ask for over `count` frames. A pin holds on all frames that touch
-    its time; between two that are less than twice FADE apart the part is not let go. Pins outside count for nothing."""
+    """What the pins of one part, in the order of time, ask for over `count` frames. A pin holds on all frames that
+    touch its time; between two that are less than twice FADE apart the part is not let go. Pins outside count for
+    nothing."""
     share, place, stays = np.zeros(count), np.zeros((count, 3)), []
     at, fade = np.arange(count), max(FADE * fps, 1.0)
     for pin in pins:
@@ -191,7 +192,9 @@ class _Work:
         if "gaze" in targets:
             part.gaze(targets["gaze"], self.look, whole=False)
         self.root[low:high] = part.root
-        self.rotations[low:high] = quaternion.normalized(quaternion.signed_like(part.rotations, self.rotations[low:high]))
+        self.rotations[low:high] = quaternion.normalized(
+            quaternion.signed_like(part.rotations, self.rotations[low:high])
+        )
 
     def lift(self, part: str, found: Target) -> None:
         """A foot on its way to or from a pin does not stand."""
@@ -231,8 +234,8 @@ def _chains(body: Humanoid) -> dict[str, tuple]:
 
 
 class _Part:
-    """The frames W of a motion that pins touch without a break: root (W, 3) m, rotations (W, J, 4), and places and world
-    rotations of the joints, kept up to date."""
+    """The frames W of a motion that pins touch without a break: root (W, 3) m, rotations (W, J, 4), and places and
+    world rotations of the joints, kept up to date."""
 
     def __init__(self, skeleton: Skeleton, body: Humanoid, root: np.ndarray, rotations: np.ndarray):
         self.skeleton, self.body = skeleton, body
@@ -266,8 +269,8 @@ class _Part:
         return own + off
 
     def _off_from(self, off: np.ndarray, own: np.ndarray, edge: int, gap: np.ndarray, held: bool) -> np.ndarray:
-        """(G, 3) m that the limb is off in the frames `gap` next to a pin's frame `edge`: as much as there, and where the
-        pin holds it goes on a while as it was going there, so that the limb comes to rest and leaves softly."""
+        """(G, 3) m that the limb is off in the frames `gap` next to a pin's frame `edge`: as much as there, and where
+        the pin holds it goes on a while as it was going there, so that the limb comes to rest and leaves softly."""
         if not held or not len(gap):
             return np.broadcast_to(off[edge], (len(gap), 3))
         beside = edge - 1 if gap[0] > edge else edge + 1

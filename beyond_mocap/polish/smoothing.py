@@ -10,8 +10,8 @@ LONGEST = 12
 
 
 def bump(offset: np.ndarray, reach: float) -> np.ndarray:
-    """Eq. 25: how much of a discontinuity is added at `offset` frames (N,) from it, `reach` being s: it grows to 1/2 just
-    before the discontinuity, jumps to -1/2 at it and shrinks to 0, with a continuous slope everywhere else."""
+    """Eq. 25: how much of a discontinuity is added at `offset` frames (N,) from it, `reach` being s: it grows to 1/2
+    just before the discontinuity, jumps to -1/2 at it and shrinks to 0, with a continuous slope everywhere else."""
     x = (np.asarray(offset, dtype=float) + reach) / max(reach, 1e-9)
     rising = 0.5 * x**2
     falling = -0.5 * x**2 + 2.0 * x - 2.0
@@ -19,8 +19,8 @@ def bump(offset: np.ndarray, reach: float) -> np.ndarray:
 
 
 def reaches(seams: np.ndarray, count: int, longest: int = LONGEST) -> np.ndarray:
-    """(S,) the s of eq. 25 for each seam: half of the shorter neighbouring stretch, so that windows never overlap, and at
-    most `longest` frames."""
+    """(S,) the s of eq. 25 for each seam: half of the shorter neighbouring stretch, so that windows never overlap, and
+    at most `longest` frames."""
     edges = np.concatenate([[0], seams, [count]])
     lengths = np.diff(edges)
     return np.minimum(np.minimum(lengths[:-1], lengths[1:]) / 2.0, longest)
@@ -37,8 +37,8 @@ def spread_values(values: np.ndarray, seams: np.ndarray, ahead: np.ndarray, long
 
 
 def spread_rotations(rotations: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: int = LONGEST) -> np.ndarray:
-    """The same for rotations (T, J, 4), `ahead` (S, J, 4): the discontinuity of eq. 26 is the rotation from the expected
-    pose to the one after the seam, spread as a share of its rotation vector.
+    """The same for rotations (T, J, 4), `ahead` (S, J, 4): the discontinuity of eq. 26 is the rotation from the
+    expected pose to the one after the seam, spread as a share of its rotation vector.
 
     Eq. 26 subtracts the other way round for the root, which would double its jump; all joints are treated alike here.
     """

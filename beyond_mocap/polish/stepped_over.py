@@ -19,8 +19,8 @@ _JOINS = 0.12  # s at either end of it in which what is planted goes over into w
 
 def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: tuple[int, int], fps: float) -> Pose:
     """Root (T, 3) m and local rotations (T, J, 4) with feet that stand and step within the frames first .. end of
-    `stretch`, and are as they were elsewhere, bit for bit. standing (T, 2, 2) bool: heels and toes, left and right, that
-    stand in whichever motion is shown most."""
+    `stretch`, and are as they were elsewhere, bit for bit. standing (T, 2, 2) bool: heels and toes, left and right,
+    that stand in whichever motion is shown most."""
     first, end = stretch
     around, joins = int(_AROUND * fps), max(int(round(_JOINS * fps)), 1)
     if end - first < 2 * joins + 3:

@@ -160,9 +160,9 @@ class _Foot:
         self.middle = self.points.mean(axis=1)
 
     def with_lift_left_out(self, first: int, end: int, reach: int) -> _Foot:
-        """The foot kept on the ground in frames first .. end too, carried along by the body from where it stood to where
-        it will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands flat
-        there."""
+        """The foot kept on the ground in frames first .. end too, carried along by the body from where it stood to
+        where it will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands
+        flat there."""
         new = copy.copy(self)
         for name in ("held", "before", "behind", "through", "points", "middle", "yaw"):
             setattr(new, name, getattr(self, name).copy())

@@ -8,8 +8,8 @@ STEEPNESS = 4.59512
 
 
 def catch_up(error: float, frames: int, window: int) -> np.ndarray:
-    """(frames,) metres of `error` regained by each frame of a locomotion stretch, spread over its first `window` frames by
-    the logistic of eq. 27, 28.
+    """(frames,) metres of `error` regained by each frame of a locomotion stretch, spread over its first `window` frames
+    by the logistic of eq. 27, 28.
 
     Eq. 27 runs from 1 % to 99 % of the error; it is stretched here to run from 0 to all of it, so that the next section
     does not inherit a rest.
@@ -24,9 +24,9 @@ def catch_up(error: float, frames: int, window: int) -> np.ndarray:
 def warp(source: np.ndarray, target: np.ndarray, idle: float = 1e-3) -> np.ndarray:
     """Fractional source frames (F,) to show so that each output frame has travelled its share of the way.
 
-    source: (M,) metres travelled at each source frame, target: (F,) at each output frame, both from 0 and not decreasing.
-    Both are taken as shares of their totals, so that the whole stretch is played. `idle` metres are added per frame on
-    both sides: where nobody moves, time itself passes.
+    source: (M,) metres travelled at each source frame, target: (F,) at each output frame, both from 0 and not
+    decreasing. Both are taken as shares of their totals, so that the whole stretch is played. `idle` metres are added
+    per frame on both sides: where nobody moves, time itself passes.
     """
     m, f = len(source), len(target)
     if m < 2 or f < 2:

@@ -1,9 +1,9 @@
 """The output cut into slots of about eight frames, and the pieces that clips of key moments fill among them.
 
 A key moment's clip is played as long as its own entry and exit ask (Faustino §3.2.2): from the last slot edge before
-the entry to the first one after the exit, at one rate, so that the key frame is on time; where its feet would be dragged
-along there, also without that part (`dragged`). Between two key moments that crowd each other lies an edge half way,
-which neither crosses.
+the entry to the first one after the exit, at one rate, so that the key frame is on time; where its feet would be
+dragged along there, also without that part (`dragged`). Between two key moments that crowd each other lies an edge half
+way, which neither crosses.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ PERIOD = 3.6
 """Seconds from one liked lag to the next."""
 
 SPREAD = 0.6180339887
-"""Of a period by which a clip's places in it are ahead of those of the clip before: a clip that is shorter than a period
-has room for some lags only, and others have room for the rest. Multiples of the golden section lie evenly."""
+"""Of a period by which a clip's places in it are ahead of those of the clip before: a clip that is shorter than a
+period has room for some lags only, and others have room for the rest. Multiples of the golden section lie evenly."""
 
 LIKED, DISLIKED = 0.05, 0.45
 """Seconds from a liked lag within which all is well, and from which on it is as bad as it gets."""

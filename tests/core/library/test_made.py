@@ -1,5 +1,5 @@
-"""What recordings lack is made: speeds between and above them, kicks and taken balls on the run; offered only where asked
-for, and told."""
+"""What recordings lack is made: speeds between and above them, kicks and taken balls on the run; offered only where
+asked for, and told."""
 
 from __future__ import annotations
 

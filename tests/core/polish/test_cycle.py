@@ -98,7 +98,9 @@ def test_the_recorded_end_comes_where_the_path_ends(stop):
         out = cycled(stop, length)
         shown = out.residuals
         assert shown.step.sum() == pytest.approx(length, abs=1e-6)
-        assert np.array_equal(shown.frames[-20:], stop.frames[-20:]) and np.array_equal(shown.frames[:20], stop.frames[:20])
+        assert np.array_equal(shown.frames[-20:], stop.frames[-20:]) and np.array_equal(
+            shown.frames[:20], stop.frames[:20]
+        )
         assert abs(out.scale - 1.0) <= MOST_SCALE + 1e-6
 
 

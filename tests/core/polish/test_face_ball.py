@@ -26,7 +26,10 @@ def turn_for(degrees, distance=1.0):
     root = KICK.motion.root_positions
     arm = foot_at(KICK.motion.rotations, frame)[:2] - root[frame, :2]
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    ball = np.tile([*(root[frame, :2] + distance * np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])), 0.11], (len(root), 1))
+    ball = np.tile(
+        [*(root[frame, :2] + distance * np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])), 0.11],
+        (len(root), 1),
+    )
     touch = Touch(float(frame), tuple(WORDS), 20.0, 20.0)
     return turned_to_ball(KICK.motion.skeleton, root, KICK.motion.rotations, ball, [touch], 60.0), ball[frame], frame
 
@@ -51,4 +54,6 @@ def test_without_a_ball_or_a_foot_nothing_turns():
     root, rotations, skeleton = KICK.motion.root_positions, KICK.motion.rotations, KICK.motion.skeleton
     ball = np.full((len(root), 3), 1.0)
     for words, path in ((tuple(WORDS), np.full((len(root), 3), np.nan)), (("header",), ball)):
-        assert not np.any(turned_to_ball(skeleton, root, rotations, path, [Touch(float(frame), words, 20.0, 20.0)], 60.0))
+        assert not np.any(
+            turned_to_ball(skeleton, root, rotations, path, [Touch(float(frame), words, 20.0, 20.0)], 60.0)
+        )

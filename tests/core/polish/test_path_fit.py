@@ -57,7 +57,9 @@ def test_the_path_of_a_flat_walk_lies_on_its_ground(height, floor):
         assert np.linalg.norm(path.at(np.arange(len(motion)) / 30.0) - places, axis=1).max() < 0.1
 
 
-@pytest.mark.parametrize("places, times", [(WAY[:1], TIMES[:1]), (WAY[:3], TIMES[[0, 0, 1]]), (WAY[:3] * np.nan, TIMES[:3])])
+@pytest.mark.parametrize(
+    "places, times", [(WAY[:1], TIMES[:1]), (WAY[:3], TIMES[[0, 0, 1]]), (WAY[:3] * np.nan, TIMES[:3])]
+)
 def test_what_cannot_be_fitted_is_refused(places, times):
     with pytest.raises(InputError):
         fit_spline(places, times)

@@ -40,7 +40,13 @@ def test_its_ends_are_met():
 
 
 def test_bad_lines_are_refused():
-    for line in (np.zeros((1, 3)), np.zeros((5, 3)), np.zeros((0, 3)), [[0, 0, 0], [np.nan, 1, 0]], [[0, 0, 0], [0.1, 0, 0]]):
+    for line in (
+        np.zeros((1, 3)),
+        np.zeros((5, 3)),
+        np.zeros((0, 3)),
+        [[0, 0, 0], [np.nan, 1, 0]],
+        [[0, 0, 0], [0.1, 0, 0]],
+    ):
         with pytest.raises(InputError, match="^line:"):
             through(np.array(line, dtype=float), "line")
 
@@ -65,7 +71,9 @@ def test_a_b_spline_of_the_highest_degree_is_a_bezier_curve():
     assert b_spline(POINTS, 5).at(u[:, 0]) == pytest.approx(bernstein @ POINTS, abs=1e-12)
 
 
-@pytest.mark.parametrize("points, degree", [(POINTS, 6), (POINTS, 0), (POINTS[:1], 1), (POINTS * np.nan, 3), (POINTS * 0, 3)])
+@pytest.mark.parametrize(
+    "points, degree", [(POINTS, 6), (POINTS, 0), (POINTS[:1], 1), (POINTS * np.nan, 3), (POINTS * 0, 3)]
+)
 def test_b_splines_that_cannot_be_are_refused(points, degree):
     with pytest.raises(InputError, match="control points"):
         b_spline(points, degree)

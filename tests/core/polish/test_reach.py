@@ -138,7 +138,8 @@ def test_wrong_joints_are_refused(running):
 
 
 def test_a_knee_that_bends_backwards_in_one_frame_does_not_flip():
-    """Blended poses may overstretch a knee for a frame; the plane it bends in comes from the frames before and after."""
+    """Blended poses may overstretch a knee for a frame; the plane it bends in comes from the frames before and
+    after."""
     motion = gait(2.0, 2.0, 30.0)
     limb = identify(motion.skeleton).left
     rotations = np.array(motion.rotations)

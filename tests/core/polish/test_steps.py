@@ -119,7 +119,8 @@ def test_a_slow_turn_on_the_spot_is_stepped(still):
 
 
 def test_no_foot_waits_while_the_other_one_steps_again_and_again(still):
-    """The right foot's place moves on by itself, as where one recording fades into another: still the left one has its turn."""
+    """The right foot's place moves on by itself, as where one recording fades into another: still the left one has its
+    turn."""
     skeleton, root, rotations = dragged(still, (0.3, 0.0))
     legs = identify(skeleton)
     rotations = rotations.copy()
