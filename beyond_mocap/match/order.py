@@ -12,7 +12,7 @@ from ..files.event_providers import EVENT_PROVIDERS
 from .content_digest import digest_of_file
 from .units import OVERLAP, WINDOW
 
-FORM = 2
+FORM = 3
 """Raised whenever the same order would give other results, so that kept ones are not taken for them."""
 
 WINDOWS = (5.0, 600.0)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..motion import quaternion
-from ..motion.humanoid import identify
+from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics, world_rotation
 from ..motion.skeleton import Skeleton
 from .carry import Body, Resting, leg, limb_carried
@@ -42,13 +42,27 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
     for side, limb in enumerate((legs.left, legs.right)):
         carries = standing[:, side].any(axis=1).astype(float)[:, None]
         moved, turned = _offsets([values[:, limb.foot] for values in (*fresh, *stays)], share, carries, fps)
-        chain = leg(limb)
-        away = fresh[0][:, limb.foot] + moved - body.places[:, limb.foot]
+        chain, foot = leg(limb), quaternion.multiply(turned, fresh[1][:, limb.foot])
+        place = fresh[0][:, limb.foot] + moved
+        place[:, 2] += _sunk(skeleton, limb, place, foot, [fresh[0], stays[0]], share)
+        away = place - body.places[:, limb.foot]
         rotations = limb_carried(body, Resting.of(body, chain), away, rotations=rotations)
         above = quaternion.inverse(world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
-        foot = quaternion.multiply(above, quaternion.multiply(turned, fresh[1][:, limb.foot]))
-        rotations[:, limb.foot] = quaternion.signed_like(foot, rotations[:, limb.foot])
+        rotations[:, limb.foot] = quaternion.signed_like(quaternion.multiply(above, foot), rotations[:, limb.foot])
     return root, rotations
+
+
+def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
+    """(T,) m by which a foot's joints would be below the ground, which is at height 0, and below where either motion has
+    them: what a standing foot is shifted and turned by fades as it lifts, and may take its toes down.
+
+    place (T, 3) m and foot (T, 4): of the ankle, world; motions: joints' places (T, J, 3) m of the new and the old one.
+    """
+    toes = [limb.toe] if limb.toe is not None and skeleton.parents[limb.toe] == limb.foot else []
+    new, old = (places[:, [limb.foot, *toes], 2].min(axis=1) for places in motions)
+    allowed = np.minimum(np.where(share > 0.0, np.minimum(new, old), new), 0.0)
+    ends = [place[:, 2], *(place[:, 2] + quaternion.rotate(foot, skeleton.offsets[toe])[:, 2] for toe in toes)]
+    return np.maximum(allowed - np.min(ends, axis=0), 0.0)
 
 
 def _offsets(feet: list[np.ndarray], share: np.ndarray, carries: np.ndarray, fps: float) -> Pose:

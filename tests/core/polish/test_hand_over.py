@@ -57,3 +57,22 @@ def test_a_motion_beside_the_old_one_joins_it(walk):
     own = np.linalg.norm(np.diff(apart[..., :2], axis=0), axis=-1) * 30.0
     still = stands.all(axis=2)
     assert (speed - own)[still[1:] & still[:-1]].max() < 0.02
+
+
+def test_no_foot_goes_below_the_ground_for_what_the_old_one_had(walk):
+    """The old motion's toes point down, into the ground; where the new one alone counts they are above it."""
+    body, old = identify(walk.skeleton), walk.rotations.copy()
+    for limb in (body.left, body.right):
+        down = quaternion.from_rotation_vector(np.tile([0.0, 0.2, 0.0], (len(walk), 1)))
+        old[:, limb.foot] = quaternion.multiply(old[:, limb.foot], down)
+    joints = [body.left.foot, body.left.toe, body.right.foot, body.right.toe]
+
+    def lowest(pose):
+        return pose_kinematics(walk.skeleton, *pose)[0][:, joints, 2].reshape(-1, 2, 2).min(axis=2)
+
+    new = walk.root_positions, walk.rotations
+    share, stands = old_share(len(walk), STRETCH, HAND), contacts.points(walk)
+    assert lowest((walk.root_positions, old))[share > 0.0].min() < -0.01
+    after = lowest(handed_over(walk.skeleton, new, (walk.root_positions, old), share, stands, 30.0))[share == 0.0]
+    own = np.minimum(lowest(new)[share == 0.0], 0.0)
+    assert (after - own).min() > -1e-3
