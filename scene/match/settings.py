@@ -51,7 +51,7 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         name="Events", description="What happened, from a provider or as CSV; empty: found in the ball's course", **FILE
     )
     events_metadata_file: StringProperty(
-        name="Events' Metadata", description="Lineups or metadata of the events; empty: a file beside them that fits",
+        name="Events' Meta", description="Lineups or metadata of the events; empty: a file beside them that fits",
         **FILE,
     )
     events_provider: EnumProperty(name="Events' Provider", items=TOLD, description="Whose form the events have")
