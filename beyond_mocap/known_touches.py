@@ -16,7 +16,7 @@ import numpy as np
 from .annotation import KeyMoment, Timeline
 from .ball.tracked.solve import SolvedBall, SolvedTouch
 from .errors import InputError, TimedLine
-from .motion.striking import meeting_words, striking_part, surfaces
+from .motion.striking import striking_part, surfaces
 from .motion.track import BALL_RADIUS
 from .plan import Plan, SolvedCourse, Touched
 from .polish.dribble import dribble
@@ -194,8 +194,7 @@ def with_course(take: Take, plan: Plan) -> Take:
 def _touching(take: Take) -> list[KeyResult]:
     """The key moments in which some part meets the ball, in the order of time."""
     skeleton = take.motion.skeleton
-    meets = (key for key in take.keys if surfaces(skeleton, meeting_words(key.words, key.asked.words)))
-    return sorted(meets, key=lambda key: key.frame)
+    return sorted((key for key in take.keys if surfaces(skeleton, key.touching)), key=lambda key: key.frame)
 
 
 def _around(pair: tuple[int, int], others: list[tuple[int, int]], turns: list[float], fps: float) -> tuple[int, int]:

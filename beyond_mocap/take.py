@@ -8,6 +8,7 @@ import numpy as np
 
 from .annotation import KeyMoment, Timeline
 from .motion.motion import Motion
+from .motion.striking import meeting_words
 from .plan import Pin, Plan, SolvedCourse
 from .synthesis.edit_list import EditList
 
@@ -39,6 +40,11 @@ class KeyResult:
     mirrored: bool
     words: tuple[str, ...]
     used_instead: tuple[str, ...] | None = None
+
+    @property
+    def touching(self) -> tuple[str, ...]:
+        """The words that say which part meets the ball (`striking.meeting_words`)."""
+        return meeting_words(self.words, self.asked.words)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..motion.motion import Motion, pose_kinematics
-from ..motion.striking import ball_gap, meeting_words, surfaces
+from ..motion.striking import ball_gap, surfaces
 from ..motion.track import BALL_RADIUS
 from ..polish.strike_at import Meeting, met_at
 from ..take import KeyResult, Take
@@ -28,16 +28,12 @@ within them."""
 def at_ball(take: Take, ball: np.ndarray) -> Take:
     """The take with its striking parts on the ball (T, 3) m, NaN where it is not known, at each key moment at which
     they were meant to be. Frames further than EASE from such a moment keep their bits."""
-    touches = [key for key in take.keys if surfaces(take.motion.skeleton, _words(key))]
+    touches = [key for key in take.keys if surfaces(take.motion.skeleton, key.touching)]
     found = (_meeting(take.motion, key, ball, _alone(key, touches)) for key in touches)
     meetings = [meeting for meeting in found if meeting is not None]
     if not meetings:
         return take
     return replace(take, motion=met_at(take.motion, take.contacts, meetings, grounded=True).motion)
-
-
-def _words(key: KeyResult) -> tuple[str, ...]:
-    return meeting_words(key.words, key.asked.words)
 
 
 def _alone(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[float, float]:
@@ -50,7 +46,7 @@ def _alone(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[float, float]:
 def _meeting(motion: Motion, key: KeyResult, ball: np.ndarray, alone: tuple[float, float]) -> Meeting | None:
     """What brings a part to the ball at one key moment; None where it is there, or too far."""
     frame = int(np.clip(np.rint(key.frame), 0, len(motion) - 1))
-    parts = surfaces(motion.skeleton, _words(key))
+    parts = surfaces(motion.skeleton, key.touching)
     if not np.isfinite(ball[frame]).all():
         return None
     places, world = pose_kinematics(motion.skeleton, motion.root_positions[frame], motion.rotations[frame])

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..library.library import FPS, Library
 from ..motion.motion import Motion
-from ..motion.striking import meeting_words, surfaces
+from ..motion.striking import surfaces
 from ..polish.crowd.correction import CURVES, Correction, applied
 from ..polish.crowd.spacing import keeping
 from ..take import Take
@@ -92,8 +92,7 @@ def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, en
 
 def _firm(take: Take) -> np.ndarray:
     """(T,) how firmly a player keeps his way: more where he touches the ball."""
-    words = {key.frame: meeting_words(key.words, key.asked.words) for key in take.keys}
-    touching = [frame for frame, own in words.items() if surfaces(take.motion.skeleton, own)]
+    touching = [key.frame for key in take.keys if surfaces(take.motion.skeleton, key.touching)]
     return keeping(len(take.motion), np.array(touching), take.motion.fps)
 
 
