@@ -15,7 +15,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from beyond_mocap.files.tracking import Match, read_match  # noqa: E402
-from beyond_mocap.library.library import Library, build  # noqa: E402
+from beyond_mocap.library.library import Library  # noqa: E402
+from beyond_mocap.library.build import build  # noqa: E402
 from beyond_mocap.motion.track import clean, sample  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesis.balance import balanced  # noqa: E402

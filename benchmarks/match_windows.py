@@ -18,7 +18,9 @@ import time
 import numpy as np
 
 from beyond_mocap.files.tracking import read_match
-from beyond_mocap.library.library import FPS, Library, build
+from beyond_mocap.library.features import FPS
+from beyond_mocap.library.library import Library
+from beyond_mocap.library.build import build
 from beyond_mocap.match.cut_plan import cut_plan
 from beyond_mocap.match.library_clips import bound
 from beyond_mocap.match.named_edit import NamedEdit, part

@@ -21,7 +21,7 @@ from beyond_mocap.annotation import Timeline
 from beyond_mocap.evaluation import jerk
 from beyond_mocap.evaluation.path_ride import figures
 from beyond_mocap.files import bvh
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.arc_length import ArcLength
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.track import Track

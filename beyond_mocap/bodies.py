@@ -42,7 +42,8 @@ from .synthesis.path_costs import Alike
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, WantedKey
 from .synthesize import look_of, sources_shown, words_shown
-from .take import BallPath, Take
+from .motion.track.ball_path import BallPath
+from .take import Take
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""

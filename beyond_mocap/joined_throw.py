@@ -29,7 +29,9 @@ from .ball.way import hermite
 from .errors import InputError, TimedLine, told_time
 from .evaluation.jerk import jerk, uncut_windows, windowed
 from .library.features import joined as joined_frames
-from .library.library import Clip, Library, described
+from .library.clip import Clip
+from .library.library import Library
+from .library.describe_clips import described
 from .motion import contacts, quaternion
 from .motion.humanoid import heading, heading_from_positions, identify, stature
 from .motion.motion import (

@@ -25,7 +25,7 @@ from .motion import quaternion
 from .motion.humanoid import heading
 from .motion.motion import Motion
 from .passes import ball_of, ball_path, bone_weights, planned
-from .take import BallPath
+from .motion.track.ball_path import BallPath
 
 LONG = 60.0
 """Seconds that everybody goes on standing, if nobody acts."""

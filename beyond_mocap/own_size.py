@@ -16,7 +16,8 @@ from .motion.motion import Motion
 from .motion.skeleton import Skeleton
 from .motion.track import BALL_RADIUS
 from .plan import Plan
-from .take import BallPath, Take
+from .motion.track.ball_path import BallPath
+from .take import Take
 
 _EVEN = 1e-9
 

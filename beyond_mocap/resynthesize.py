@@ -47,7 +47,8 @@ from .synthesis.wanted import Wanted, wanted
 from .synthesize import (
     Progress, finished, key_result, sources_shown, synthesize, with_made_gaits, words_shown,
 )
-from .take import BallPath, KeyResult, Take
+from .motion.track.ball_path import BallPath
+from .take import KeyResult, Take
 
 HAND_OVER = 0.5
 """Seconds before and behind a touched stretch in which its motion goes over into the old one."""

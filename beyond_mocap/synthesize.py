@@ -45,7 +45,8 @@ from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
 from .synthesis.used import Used
 from .synthesis.wanted import Wanted, wanted
-from .take import BallPath, KeyResult, PinResult, Take
+from .motion.track.ball_path import BallPath
+from .take import KeyResult, PinResult, Take
 
 NEAR_KEY = 1.5
 """Seconds around a key moment in which its own words may be shown, whoever avoids them."""

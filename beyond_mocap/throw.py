@@ -36,7 +36,7 @@ from .synthesis.phase_network.chains import EFFECTORS
 from .synthesis.phase_network.limb_limits import LimbLimits
 from .synthesis.phase_network.model import ThrowModel
 from .synthesis.phase_network.plan import Planned, Wish, planned, unlike
-from .take import BallPath
+from .motion.track.ball_path import BallPath
 
 KINDS: dict[str, Ball] = {**BALLS, **THROWN}
 """Balls by name."""

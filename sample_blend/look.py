@@ -20,7 +20,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from beyond_mocap.errors import InputError  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
-from beyond_mocap.files.tables import read_ball, read_provenance  # noqa: E402
+from beyond_mocap.files.tables import read_ball  # noqa: E402
+from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
 from beyond_mocap.motion.body import deformed, low_poly_body  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, pose_kinematics  # noqa: E402
 

@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.motion.track import sample
-from ..beyond_mocap.take import BallPath, Take
+from ..beyond_mocap.motion.track.ball_path import BallPath
+from ..beyond_mocap.take import Take
 from . import action, armature, ball, body, channels, curve, stage
 from .measure import frames_per_second, whole_frames
 from .session import Made

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.motion import quaternion
-from ..beyond_mocap.take import BallPath
+from ..beyond_mocap.motion.track.ball_path import BallPath
 from . import channels
 from .material import colour
 from .measure import frames_per_second, units_per_metre, whole_frames

@@ -101,7 +101,7 @@ def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How,
 
 def work(order: Order, library: "Library | None", progress, cancelled, hurry) -> Result:
     """Make what is ordered, out of the library, which is built where it is None. Never touches bpy."""
-    from ..beyond_mocap.library.library import build
+    from ..beyond_mocap.library.build import build
 
     clips = library or build(
         order.folder, unit=order.unit, **order.build, progress=progress, cancelled=lambda: cancelled() or hurry()

@@ -15,7 +15,8 @@ from hashlib import sha256
 
 import numpy as np
 
-from ..library.library import Clip, Library
+from ..library.clip import Clip
+from ..library.library import Library
 from ..motion.striking import striking_part
 from . import kept
 from .contact import Tool

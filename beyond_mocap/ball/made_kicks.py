@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..motion import quaternion
 from ..motion.adult import adult_skeleton
 from ..motion.arctangent import arctan2
-from ..motion.gait_tables import LEG
+from ..motion.adult import LEG
 from ..motion.kicks import BEFORE, KICKS, KickStyle, contact, kicked
 from ..motion.motion import Motion, place
 from ..motion.neutral import Neutral, neutral_stance

@@ -180,7 +180,7 @@ class _Player:
         """Library, track and annotations read."""
         from ..annotation import Timeline, read_timeline
         from ..files.tracking import read_track_csv
-        from ..library.library import build
+        from ..library.build import build
         from ..motion.track import clean
         from ..plan import Plan
 

@@ -20,6 +20,7 @@ from ..annotation import ClipAnnotation
 from ..errors import InputError
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
+from .clip import Clip
 from .clusters import Clusters
 from .features import Frames
 from .repair import Mended
@@ -112,8 +113,17 @@ def _header(key: str, library) -> dict:
     }
 
 
-def load(place: Path, key: str, name: str = "library"):
-    """The cached library, or None where there is none, it belongs to other content, or it is damaged."""
+def load(place: Path, key: str, name: str = "library") -> dict | None:
+    """Reads the fields of a cached library.
+
+    Args:
+        place: the cache's folder.
+        key: fingerprint of the content that it must belong to.
+        name: of the file, without its ending.
+
+    Returns:
+        The fields of a `Library` but its folder, or None where the cache is missing, damaged or of other content.
+    """
     try:
         with np.load(place / f"{name}.npz", allow_pickle=False) as arrays:
             header = json.loads(arrays["header"].tobytes())
@@ -124,9 +134,8 @@ def load(place: Path, key: str, name: str = "library"):
         return None
 
 
-def _restore(header: dict, arrays: dict):
-    from .library import Clip, Library
-
+def _restore(header: dict, arrays: dict) -> dict:
+    """The fields of a library but its folder."""
     skeleton = Skeleton(
         header["names"], header["parents"], arrays["offsets"], header["end_parents"], arrays["end_offsets"]
     )
@@ -145,4 +154,7 @@ def _restore(header: dict, arrays: dict):
         length: Clusters(length, *(arrays[f"clusters.{length}.{name}"] for name in ("start", "label", "medoid")))
         for length in header["lengths"]
     }
-    return Library("", skeleton, tuple(clips), frames, clusters, header["fps"], tuple(header["notes"]))
+    return {
+        "skeleton": skeleton, "clips": tuple(clips), "frames": frames, "clusters": clusters, "fps": header["fps"],
+        "notes": tuple(header["notes"]),
+    }  # fmt: skip

@@ -19,6 +19,8 @@ from ..motion.motion import at_frames, pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 
+FPS = 30.0
+"""Frames per second of every library."""
 HORIZON = 0.12
 ENERGY = 0.98
 SMOOTH_SECONDS = 0.7

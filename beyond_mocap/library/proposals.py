@@ -29,6 +29,7 @@ from ..motion.motion import Motion, forward_kinematics
 from ..motion.runs import runs
 from ..motion.striking import surfaces
 from .library import Library
+from .proposal import Proposal
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 GAITS = (("standing", 0.0), ("walking", 0.4), ("jogging", 2.0), ("running", 4.0), ("sprinting", 5.5))
 """Each gait and the speed in m/s from which on it holds, where no library says its own."""
 
-RULES, LEARNED = "rules", "learned"
 
 _WAYS = ("front", "left", "back", "right")
 _GAIT_SECONDS, _SHORTEST = 0.5, 0.5  # over which speed is averaged; of a stretch
@@ -51,17 +51,6 @@ _NOD = 1.0  # m/s of the head against the chest, forward: jumps without a ball h
 _TURN_RATE, _TURN = np.radians(45.0), np.radians(50.0)
 _TURN_SPEED = 2.0  # m/s: a body that travels faster goes round a curve
 _LYING, _UP = 0.45, 0.85  # of the leg's length: the pelvis of a body on the ground, of one that has got up
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """Words for a stretch of a recording, in its own frames; confidence: 0 to 1; why: what was seen, for a person;
-    source: RULES, or LEARNED from annotated clips."""
-
-    annotation: ClipAnnotation
-    confidence: float
-    why: str
-    source: str = RULES
 
 
 def propose(

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..library.chosen import with_chosen_gaits
-from ..library.library import FPS, Library
+from ..library.features import FPS
+from ..library.library import Library
 from ..library.made import MADE_FOLDER
 from ..plan import Plan
 from ..polish.hand_over import handed_over
@@ -23,7 +24,8 @@ from ..polish.meeting import eased
 from ..synthesis.edit_list import EditList, at_times
 from ..synthesis.footage import shown
 from ..synthesize import constructed
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
+from ..take import Take
 from .cut_plan import cut_plan
 from .joined_takes import one_take, own_part
 from .library_clips import bound

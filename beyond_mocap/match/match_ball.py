@@ -11,7 +11,8 @@ from ..files.match_data import Match
 from ..known_touches import course_of
 from ..motion.track import Track, clean
 from ..plan import Plan
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
+from ..take import Take
 
 _STEP = 1e-4  # m, to which places are rounded, as files have them
 

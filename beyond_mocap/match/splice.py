@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from ..library.library import FPS, Library
+from ..library.features import FPS
+from ..library.library import Library
 from ..own_size import in_library_size, size_of
 from ..plan import Plan
 from ..synthesis.balance import balanced

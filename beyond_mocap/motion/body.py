@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import quaternion
-from .gait_tables import LEG
+from .adult import LEG
 from .humanoid import Humanoid, Limb, identify
 from .motion import Motion
 from .neutral import Neutral, neutral_stance, rests_upright

@@ -24,7 +24,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-LEG = 0.873
+from .adult import LEG
+
 GRAVITY = 9.81
 FASTEST = 9.5
 # walking turns into running here (N: spontaneous change at 1.9 to 2.3 m/s)

@@ -84,7 +84,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
     """Build the library where it is not there yet, and play the scene. Never touches bpy."""
-    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.library.build import build
     from ...beyond_mocap.passes import passes
 
     library = order.library

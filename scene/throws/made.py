@@ -41,7 +41,7 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     """The throw, and the motion it is part of. Never touches bpy."""
     from ...beyond_mocap import joined_throw
     from ...beyond_mocap.ball.flight import fly
-    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.library.build import build
     from ...beyond_mocap.motion.retarget import Retargeter
 
     library = order.library

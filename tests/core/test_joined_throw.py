@@ -10,7 +10,7 @@ from beyond_mocap import joined_throw
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation.jerk import jerk, windowed
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading
 from beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics, place

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..flight import Launch, fly
 from ..physics import Ball
-from .hand import Hand
+from ...motion.hand import Hand
 
 _SETTLES = 0.10  # s before the release from which on the ball moves from its usual place to where it leaves
 _FOLLOWED = 10.0  # s of flight, bounces and rolling at most

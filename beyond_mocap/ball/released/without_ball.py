@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .first_guess import fastest
-from .hand import Hand
+from ...motion.hand import Hand
 
 SPEED_SIGMA = 0.06
 """Of the speed, one standard deviation."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.match.variety import APART, in_step, lags, share_in_step
 from beyond_mocap.motion.track import Track
 from beyond_mocap.plan import Plan

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import Cancelled
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.plan import Plan
 from beyond_mocap.synthesis.annotation_cost import AnnotationCost
 from beyond_mocap.synthesis.blocks import FINEST, BlockSearch

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import Cancelled, InputError
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.plan import Plan
 from beyond_mocap.synthesis.path_search import Between, PathSearch
 from beyond_mocap.synthesis.wanted import wanted
