@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from .annotation import Timeline, automatic_gaits
 from .annotation.gaze import wanted_offset
@@ -34,7 +33,7 @@ from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
 from .plan import Plan
 from .polish.gaze import CHEST, following
-from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
+from .polish.on_track import STANDS, follow_turning, root_with_sway
 from .polish.strike import Touch
 from .polish.strike_at import Meeting, Met, met_at
 from .synthesis.footage import Footage, fetch
@@ -248,7 +247,7 @@ class _Body:
         goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
         given = np.isfinite(kept)
         goal, trust = np.where(given, kept, goal), np.where(given, 1e6, trust)
-        return _followed(goal, trust, shown.turn)
+        return follow_turning(goal, trust, shown.turn)
 
     def _touches(self) -> list[Touch]:
         """The hit motions as stretches in which no steps are added."""
@@ -298,19 +297,6 @@ class _Body:
             if gap > 0.005:
                 told.append(f"{order.time:.2f} s: the {order.part} is {100.0 * gap:.1f} cm off the ball")
         return tuple(told)
-
-
-def _followed(goal: np.ndarray, trust: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(T,) rad: least squares of sum trust (a - goal)^2 + TURN_WEIGHT (a' - turn)^2, goals without jumps of whole
-    turns."""
-    diagonal, right = trust.copy(), trust * goal
-    diagonal[1:] += TURN_WEIGHT
-    diagonal[:-1] += TURN_WEIGHT
-    right[1:] += TURN_WEIGHT * turn[1:]
-    right[:-1] -= TURN_WEIGHT * turn[1:]
-    band = np.zeros((2, len(goal)))
-    band[0], band[1, :-1] = diagonal, -TURN_WEIGHT
-    return solveh_banded(band, right, lower=True) if len(goal) > 1 else goal
 
 
 def _with_sources(take: Take, library: Library, shown: Footage) -> Take:

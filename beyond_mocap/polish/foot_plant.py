@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d
 
+from ..base.banded_least_squares import BandedLeastSquares
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.contacts import sole_height
@@ -251,25 +251,16 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
     firm = np.minimum(weight[1:], weight[:-1])
     total = firm.sum(axis=1)
     pushed = np.einsum("tp,tpk->tk", firm, velocity)
-    right = np.zeros((count, velocity.shape[2]))
-    right[1:] -= pushed
-    right[:-1] += pushed
-    band = np.zeros((4, count))
-    _add_differences(band, np.array([-1.0, 1.0]), total)
-    _add_differences(band, np.array([-1.0, 3.0, -3.0, 1.0]), np.full(max(count - 3, 0), SMOOTH / scale**4))
-    band[0] += PULL * scale**2
+    squares = BandedLeastSquares(count, columns=velocity.shape[2])
+    squares.right[1:] -= pushed
+    squares.right[:-1] += pushed
+    squares.add_difference(1, total)
+    squares.add_difference(3, SMOOTH / scale**4)
+    squares.add_value(PULL * scale**2)
     if kept is not None:
         given = ~np.isnan(kept[:, 0])
-        band[0] += HOLD * given
-        right += HOLD * np.where(given[:, None], kept, 0.0)
-    return solveh_banded(band, right, lower=True)
-
-
-def _add_differences(band: np.ndarray, stencil: np.ndarray, weight: np.ndarray) -> None:
-    """Adds sum weight_t (sum_i stencil_i x_{t+i})^2 to a symmetric system in lower banded form."""
-    for i, a in enumerate(stencil):
-        for j, b in enumerate(stencil[: i + 1]):
-            band[i - j, j : j + len(weight)] += weight * a * b
+        squares.add_value(HOLD * given, goal=np.where(given[:, None], kept, 0.0))
+    return squares.solve()
 
 
 def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
@@ -291,10 +282,11 @@ def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
 
 def settled(right: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH) -> np.ndarray:
     """The smooth curve (T,) that is `right` / `weight` where weight is large, and small elsewhere."""
-    band = np.zeros((4, len(weight)))
-    _add_differences(band, np.array([-1.0, 3.0, -3.0, 1.0]), np.full(max(len(weight) - 3, 0), smooth / scale**6))
-    band[0] += weight + 2e-2
-    return solveh_banded(band, right, lower=True)
+    squares = BandedLeastSquares(len(weight))
+    squares.add_difference(3, smooth / scale**6)
+    squares.add_value(weight + 2e-2)
+    squares.right += right
+    return squares.solve()[:, 0]
 
 
 def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:

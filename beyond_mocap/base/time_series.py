@@ -1,0 +1,34 @@
+"""Values over frames: their rate of change and a smoothing with held ends."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def velocity(values: np.ndarray, fps: float) -> np.ndarray:
+    """Central differences over time, one-sided at the ends; zero for a single frame.
+
+    Args:
+        values: (T, ...), any unit.
+        fps: frames per second.
+    Returns:
+        (T, ...), that unit per second.
+    """
+    return np.gradient(values, axis=0) * fps if len(values) > 1 else np.zeros_like(values)
+
+
+def gaussian_smooth(values: np.ndarray, width: float) -> np.ndarray:
+    """Values averaged by a Gaussian bell, their ends held.
+
+    Args:
+        values: (T, K), any unit.
+        width: standard deviation, frames; below 1/3 nothing changes.
+    Returns:
+        (T, K), that unit.
+    """
+    reach = int(3.0 * width)
+    if reach < 1 or len(values) < 2:
+        return values
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    held = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
+    return np.stack([np.convolve(column, bell / bell.sum(), "valid") for column in held.T], axis=1)
