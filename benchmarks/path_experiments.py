@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from beyond_mocap.base.vectors import unit_vector
 from beyond_mocap.annotation import Timeline
 from beyond_mocap.evaluation import jerk
 from beyond_mocap.evaluation.path_ride import figures
@@ -180,7 +181,7 @@ def _level(ax, trial: Trial, colour: str, every: float = 0.5) -> None:
     """Stick figures from the side, every half second, set out along +x."""
     motion = trial.ridden.motion
     way = motion.root_positions[-1, :2] - motion.root_positions[0, :2]
-    way = way / max(np.linalg.norm(way), 1e-9)
+    way = unit_vector(way)
     straight = replace(motion, root_positions=motion.root_positions - [*motion.root_positions[0, :2], 0.0])
     plots.sticks(ax, straight, np.arange(0, len(motion), round(every * motion.fps)), colour, way)
     plots.from_the_side(ax)

@@ -19,6 +19,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
+from beyond_mocap.base.vectors import unit_vectors
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.motion.body import MATERIALS, BodyMesh, deformed, low_poly_body  # noqa: E402
 from beyond_mocap.motion.humanoid import heading  # noqa: E402
@@ -117,7 +118,7 @@ def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None
 def add_ribbon(points: np.ndarray, colour, width: float = 0.07, height: float = 0.012) -> None:
     """A path (N, 2) in metres as a flat ribbon on the grass."""
     way = np.gradient(np.asarray(points, dtype=float), axis=0)
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+    way = unit_vectors(way)
     side = 0.5 * width * np.stack([-way[:, 1], way[:, 0]], axis=-1)
     left, right = points + side, points - side
     rows = np.concatenate([np.c_[left, np.full(len(left), height)], np.c_[right, np.full(len(right), height)]])

@@ -17,6 +17,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
+from beyond_mocap.base.vectors import unit_vectors
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.motion.gait import gait  # noqa: E402
@@ -376,7 +377,7 @@ def _dribbled(times: np.ndarray, path: np.ndarray, begin: float, end: float) -> 
         ],
         -1,
     )
-    way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
+    way = unit_vectors(way, least=1e-6)
     since = ((end - times) / 0.75) % 1.0
     running = np.clip((times - begin) / 0.8, 0.0, 1.0) * np.minimum(speed, 3.5)
     ahead = 0.46 + 0.16 * running * np.sin(np.pi * since) ** 1.5

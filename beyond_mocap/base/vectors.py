@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 
-def unit_vectors(vectors: np.ndarray, least: float = 1e-9, otherwise: np.ndarray | float | None = None) -> np.ndarray:
+def unit_vectors(vectors: np.ndarray, otherwise: np.ndarray | float | None = None, least: float = 1e-9) -> np.ndarray:
     """Vectors at length one.
 
     Args:
         vectors: (..., K), any unit.
-        least: length below which a vector is not stretched to length one, in its unit; 0 makes NaN of a zero vector.
-        otherwise: (..., K), what stands for vectors no longer than `least`; None divides them by `least`.
+        otherwise: (..., K), what stands for vectors no longer than `least`; None divides them by `least`, so that zero
+            vectors stay zero.
+        least: length below which a vector is not stretched to length one, in its unit.
     Returns:
         (..., K).
     """
@@ -20,13 +21,13 @@ def unit_vectors(vectors: np.ndarray, least: float = 1e-9, otherwise: np.ndarray
     return unit if otherwise is None else np.where(length > least, unit, otherwise)
 
 
-def unit_vector(vector: np.ndarray, least: float = 1e-9, otherwise: np.ndarray | None = None) -> np.ndarray:
+def unit_vector(vector: np.ndarray, otherwise: np.ndarray | None = None, least: float = 1e-9) -> np.ndarray:
     """One vector at length one: as `unit_vectors`, but its length comes from a dot product, which rounds differently.
 
     Args:
         vector: (K,), any unit.
-        least: length below which it is not stretched to length one, in its unit.
         otherwise: (K,), what stands for a vector no longer than `least`; None divides it by `least`.
+        least: length below which it is not stretched to length one, in its unit.
     Returns:
         (K,).
     """

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..motion.track import Track, zero_phase_hann
 
 ROOT_WINDOW = 1.5
@@ -71,7 +72,7 @@ def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
     """
     speed = velocity(pelvis, fps)
     course = zero_phase_hann(speed, fps, ROOT_WINDOW)
-    course = course / np.maximum(np.linalg.norm(course, axis=-1, keepdims=True), 1e-9)
+    course = unit_vectors(course)
     along = np.sum(speed * course, axis=-1, keepdims=True)
     return (along - zero_phase_hann(along, fps, ROOT_WINDOW))[:, 0]
 

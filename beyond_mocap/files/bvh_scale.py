@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..errors import InputError
 from ..motion.humanoid import Humanoid, identify, leg_length
 from ..motion.motion import pose_kinematics
@@ -110,7 +111,7 @@ def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
     votes = {"Y": 0.0, "Z": 0.0}
     for positions, weight in ((posed, 1.0), (rest, 0.5)):
         rise = positions[..., top, :] - positions[..., feet, :].mean(axis=-2)
-        rise = rise / np.maximum(np.linalg.norm(rise, axis=-1, keepdims=True), 1e-9)
+        rise = unit_vectors(rise)
         votes["Y"] += weight * np.mean(rise[..., 2] > _UPRIGHT)
         votes["Z"] += weight * np.mean(-rise[..., 1] > _UPRIGHT)
     return "Z" if votes["Z"] > votes["Y"] else "Y"

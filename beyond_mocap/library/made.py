@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
+from ..base.vectors import cross
 from ..motion import contacts, gestures, quaternion
 from ..motion.arctangent import arctan2
 from ..motion.course import GaitStyle
@@ -171,7 +172,7 @@ def _elbow_and_lean(motion: Motion) -> np.ndarray:
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The angle (T,) in radians between vectors (T, 3)."""
-    return arctan2(np.linalg.norm(quaternion.cross(a, b), axis=1), np.sum(a * b, axis=1))
+    return arctan2(np.linalg.norm(cross(a, b), axis=1), np.sum(a * b, axis=1))
 
 
 def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: dict[str, float]) -> Iterator[Made]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import cross, unit_vectors
 from . import quaternion
 from .gait_tables import GRAVITY, smooth_step
 from .humanoid import Humanoid, identify
@@ -195,14 +196,10 @@ def _axes(skeleton: Skeleton, rotations: np.ndarray) -> tuple[np.ndarray, np.nda
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
     top = body.neck if body.neck is not None else body.chest
-    along = _unit(places[:, top] - places[:, body.hips])
+    along = unit_vectors(places[:, top] - places[:, body.hips])
     left = places[:, body.left.upper_leg] - places[:, body.right.upper_leg]
-    left = _unit(left - np.sum(left * along, axis=1, keepdims=True) * along)
-    return along, left, quaternion.cross(left, along)
-
-
-def _unit(v: np.ndarray) -> np.ndarray:
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
+    left = unit_vectors(left - np.sum(left * along, axis=1, keepdims=True) * along)
+    return along, left, cross(left, along)
 
 
 def _to_middle(skeleton: Skeleton, body: Humanoid, rotations: np.ndarray) -> np.ndarray:

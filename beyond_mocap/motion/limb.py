@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import cross, unit_vectors
 from . import quaternion
 
 
@@ -34,7 +35,7 @@ def bend(
     difference of the bones."""
     line = target - top
     asked = np.linalg.norm(line, axis=-1)
-    direction = unit(line, np.array([0.0, 0.0, -1.0]))
+    direction = unit_vectors(line, np.array([0.0, 0.0, -1.0]))
     nearest = np.abs(upper - lower) + 0.02 * (upper + lower)
     reach = np.maximum(soft_distance(asked, upper + lower, soft), nearest)
     across = pole - np.sum(pole * direction, axis=-1, keepdims=True) * direction
@@ -42,19 +43,13 @@ def bend(
     along = (upper**2 - lower**2 + reach**2) / (2.0 * reach)
     height = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     middle = top + along[..., None] * direction + height[..., None] * across
-    return middle, top + reach[..., None] * direction, quaternion.cross(direction, across)
-
-
-def unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) at length one; `otherwise` (..., 3) where they have none."""
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.where(length > 1e-9, v / np.maximum(length, 1e-9), otherwise)
+    return middle, top + reach[..., None] * direction, cross(direction, across)
 
 
 def _unit_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) at length one; any square to `direction` (..., 3) where they have none."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return v / length if np.all(length > 1e-9) else unit(v, _any_normal(direction))
+    return v / length if np.all(length > 1e-9) else unit_vectors(v, _any_normal(direction))
 
 
 def _any_normal(direction: np.ndarray) -> np.ndarray:
@@ -70,5 +65,5 @@ def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """
     left = -(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
     left = _unit_across(left, direction)
-    forward = quaternion.cross(left, -direction)
+    forward = cross(left, -direction)
     return quaternion.from_matrix(np.stack([forward, left, -direction], axis=-1))

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from . import quaternion
 from .humanoid import Humanoid, identify
 from .motion import Motion, pose_kinematics
@@ -76,7 +77,7 @@ def _rest_mirror(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
     """The mirror (3, 3) of the rest pose: across the line from hip to hip."""
     rest, _ = pose_kinematics(skeleton, np.zeros(3), quaternion.identity(len(skeleton)))
     across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
-    across = across / max(np.linalg.norm(across), 1e-9)
+    across = unit_vector(across)
     return np.eye(3) - 2.0 * np.outer(across, across)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from . import limb, quaternion
 from .humanoid import Humanoid, Limb, identify
 from .motion import Motion, pose_kinematics
@@ -159,8 +160,8 @@ def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[in
     ankle = posture.ankles[:, side]
     pole = knee_pole(posture, top, side)
     knee, end, hinge = limb.bend(top, ankle, np.array(upper), np.array(lower), pole, _SOFT)
-    thigh = limb.bone_frame(limb.unit(knee - top, -_Z), hinge)
-    shank = limb.bone_frame(limb.unit(end - knee, -_Z), hinge)
+    thigh = limb.bone_frame(unit_vectors(knee - top, -_Z), hinge)
+    shank = limb.bone_frame(unit_vectors(end - knee, -_Z), hinge)
     foot = foot_rotation(posture.feet[:, side])
     said = {joints.upper_leg: thigh, joints.lower_leg: shank, joints.foot: foot}
     if joints.toe is not None:

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from . import limb, quaternion
 from .anatomy import Anatomy, head_chain, spine_shares, study
 from .bone_map import Pairs, pair
@@ -188,7 +189,7 @@ class _Transfer:
         bending = spine[:-1] or spine
         if not bending or tops is None:
             return world
-        line = limb.unit(self.places[:, tops[0]] - _mid_hips(self.places, self.source), _UP)
+        line = unit_vectors(self.places[:, tops[0]] - _mid_hips(self.places, self.source), _UP)
         for _ in range(_TRUNK_ROUNDS):
             places = _laid(self.target.skeleton, world)
             start, middle = places[:, bending[0]], _mid_hips(places, self.target)
@@ -229,7 +230,7 @@ class _Transfer:
     def _pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray, height: np.ndarray) -> np.ndarray:
         """Where a knee points (T, 3): as the source's, which says little where it is straighter than the target's will
         be, `height` (T,) metres off the line hip-ankle; the rest of the way it bends about the thigh's own hinge."""
-        line = limb.unit(ankle - hip, -_UP)
+        line = unit_vectors(ankle - hip, -_UP)
         ahead = quaternion.rotate(self._turn(mine.upper_leg), np.array([1.0, 0.0, 0.0]))
         off, ahead = (v - np.sum(v * line, axis=1, keepdims=True) * line for v in (knee - hip, ahead))
         lacking = np.maximum(height - np.linalg.norm(off, axis=1), 0.0)

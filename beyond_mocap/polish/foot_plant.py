@@ -17,6 +17,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
+from ..base.vectors import cross
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.contacts import sole_height
@@ -204,7 +205,7 @@ def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
-    even, odd = np.sum(u * level, axis=1), np.sum(u * quaternion.cross(n, level), axis=1)
+    even, odd = np.sum(u * level, axis=1), np.sum(u * cross(n, level), axis=1)
     length = foot.longest
     asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
     most = np.hypot(even, odd)

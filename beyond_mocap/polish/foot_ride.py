@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
@@ -161,7 +162,7 @@ def _steady(foot: Foot) -> Foot:
     on its toes points nowhere."""
     level = np.linalg.norm((foot.toe - foot.heel)[:, :2], axis=1, keepdims=True)
     own = np.sum(quaternion.rotate(quaternion.inverse(foot.rotation), foot.left) * level**2, axis=0)
-    left = quaternion.rotate(foot.rotation, own / max(np.linalg.norm(own), 1e-9)) * [1.0, 1.0, 0.0]
+    left = quaternion.rotate(foot.rotation, unit_vector(own)) * [1.0, 1.0, 0.0]
     size = np.linalg.norm(left, axis=1, keepdims=True)
     return replace(foot, left=np.where(size > 0.1, left / np.maximum(size, 1e-9), foot.left))
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import heading_from_positions, identify
@@ -65,7 +66,7 @@ def following(
 def head_angles(seen: np.ndarray) -> np.ndarray:
     """(N, 2) radians of yaw (to the left) and pitch (up) by which a head turns to look where `seen` (N, 3) lies from
     it, x ahead of the body and y to its left; continuous but straight up and down."""
-    unit = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)
+    unit = unit_vectors(seen)
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
     side = arctan2(unit[:, 1], np.maximum(unit[:, 0], back))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..motion.striking import ball_gap, nearest_on
 from ..motion.track import BALL_RADIUS
 
@@ -111,7 +112,7 @@ def meetings(
     places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
     for other, own in avoid:
         out = (places - nearest_on(other, places))[:, :2]
-        out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+        out = unit_vectors(out)
         places[:, :2] += np.maximum(-ball_gap(other, own, places), 0.0)[:, None] * out
         places[:, :2] = ball[:2] + _within(places[:, :2] - ball[:2], level)
     return Meeting(places, places - touching + lift)
@@ -143,7 +144,7 @@ def held_meeting(hands: Sequence[Line], radius: float, ball: np.ndarray, room: R
     away = middle[:2] - ball[:2]
     place = np.array([*(ball[:2] + away * min(1.0, level / max(np.linalg.norm(away), 1e-12))), height])
     out = places - middle
-    out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+    out = unit_vectors(out)
     return place, place + (radius + BALL_RADIUS) * out - places
 
 

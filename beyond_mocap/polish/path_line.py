@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..errors import InputError
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path, SplinePath
@@ -190,7 +191,7 @@ def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tu
     """
     before, after = (at - reach) % period, (at + reach) % period
     chords = line[at] - line[before], line[after] - line[at]
-    return tuple(chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-12)[:, None] for chord in chords)
+    return tuple(unit_vectors(chord, least=1e-12) for chord in chords)
 
 
 def _room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:

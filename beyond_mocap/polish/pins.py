@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify
@@ -142,7 +143,7 @@ def look_axis(skeleton: Skeleton, rotations: np.ndarray) -> np.ndarray:
     facing = heading_from_positions(skeleton, places)
     ahead = np.column_stack([np.cos(facing), np.sin(facing), np.zeros(len(facing))])
     mean = quaternion.rotate(quaternion.inverse(world[:, _head(identify(skeleton))]), ahead).mean(axis=0)
-    return mean / max(np.linalg.norm(mean), 1e-9)
+    return unit_vector(mean)
 
 
 def _head(body: Humanoid) -> int:

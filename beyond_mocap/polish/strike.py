@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from ..motion.humanoid import Limb, heading_from_positions, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
@@ -294,25 +295,20 @@ def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.nda
     coming = _flat(path[moment.frame] - path[max(moment.frame - reach, 0)]) / 0.1
     leaving = _flat(path[min(moment.frame + reach, len(path) - 1)] - path[moment.frame]) / 0.1
     if part.part == "hand" and met_within(moment.words):
-        return _unit(-coming, ahead)
+        return unit_vector(-coming, ahead)
     if part.part != "foot":
         return ahead
     if _STOPPING & moment.words:
         middle = np.mean(body.line(part, at), axis=0)
         wish = -coming if np.linalg.norm(coming) > 1.0 else _flat(path[moment.frame] - middle)
-        return _unit(_unit(wish, ahead) + 0.8 * ahead, ahead)
+        return unit_vector(unit_vector(wish, ahead) + 0.8 * ahead, ahead)
     swing = _flat(_velocity(body, part, at, fps))
-    along = _unit(swing, ahead) if np.linalg.norm(swing) > 1.0 else ahead
-    return _unit(along + 0.5 * _unit(leaving, along), along) if np.linalg.norm(leaving) > 3.0 else along
+    along = unit_vector(swing, ahead) if np.linalg.norm(swing) > 1.0 else ahead
+    return unit_vector(along + 0.5 * unit_vector(leaving, along), along) if np.linalg.norm(leaving) > 3.0 else along
 
 
 def _flat(v: np.ndarray) -> np.ndarray:
     return v * [1.0, 1.0, 0.0]
-
-
-def _unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(v)
-    return v / length if length > 1e-9 else otherwise
 
 
 def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.humanoid import identify
@@ -95,10 +96,10 @@ def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.n
     face = quaternion.multiply(world[:, head], quaternion.inverse(neutral.rotations[head]))
     scale = neutral.leg / 0.88  # an adult's leg of 1.80 m
     eye = places[:, head] + quaternion.rotate(face, np.array([EYE[0], 0.0, EYE[1]]) * scale)
-    ahead = _unit(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
+    ahead = unit_vectors(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
     gaze = smooth(_towards(ahead, eye, target), STEADY * motion.fps)
     gaze[:, 2] = np.minimum(gaze[:, 2], UP * np.linalg.norm(gaze[:, :2], axis=1))
-    return eye, _looking(_unit(gaze))
+    return eye, _looking(unit_vectors(gaze))
 
 
 def smooth(values: np.ndarray, width: float) -> np.ndarray:
@@ -113,17 +114,17 @@ def smooth(values: np.ndarray, width: float) -> np.ndarray:
 
 def _towards(ahead: np.ndarray, eye: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     """Directions (T, 3): `ahead`, turned towards the target as far as eyes turn; a little down where there is none."""
-    down = _unit(ahead - [0.0, 0.0, np.tan(RESTS)])
+    down = unit_vectors(ahead - [0.0, 0.0, np.tan(RESTS)])
     if target is None:
         return down
     known = np.isfinite(target).all(axis=1)
-    wanted = np.where(known[:, None], _unit(np.where(known[:, None], target, eye + ahead) - eye), down)
+    wanted = np.where(known[:, None], unit_vectors(np.where(known[:, None], target, eye + ahead) - eye), down)
     cosine = np.clip(np.sum(ahead * wanted, axis=1), -1.0, 1.0)
     angle = np.arccos(cosine)
     share = np.minimum(1.0, EYES_TURN / np.maximum(angle, 1e-6))
     behind = smooth(np.clip((np.radians(150.0) - angle) / np.radians(40.0), 0.0, 1.0)[:, None], 5.0)
     turned = _between(ahead, wanted, angle, share)
-    return _unit(behind * turned + (1.0 - behind) * down)
+    return unit_vectors(behind * turned + (1.0 - behind) * down)
 
 
 def _between(first: np.ndarray, second: np.ndarray, angle: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -136,13 +137,9 @@ def _between(first: np.ndarray, second: np.ndarray, angle: np.ndarray, share: np
 
 def _looking(gaze: np.ndarray) -> np.ndarray:
     """Rotations (T, 4) of cameras that look along `gaze` (T, 3), upright."""
-    right = _unit(np.cross(gaze, [0.0, 0.0, 1.0]))
+    right = unit_vectors(np.cross(gaze, [0.0, 0.0, 1.0]))
     up = np.cross(right, gaze)
     return quaternion.continuous(quaternion.from_matrix(np.stack([right, up, -gaze], axis=-1)))
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def _ball_places(scene: bpy.types.Scene, ball: bpy.types.Object | None, frames: np.ndarray) -> np.ndarray | None:

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion.path import Path
 from ..drawn_track import points_of
@@ -242,7 +243,7 @@ def _nodes(path: Path, arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places (N, 3) and unit tangents (N, 3) at arc lengths s (N,) m."""
     u = arc.parameter(s)
     pull = path.at(u, 1)
-    return path.at(u), pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1e-9)
+    return path.at(u), unit_vectors(pull)
 
 
 def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:

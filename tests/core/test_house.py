@@ -124,7 +124,7 @@ def core_complaint(path, imported):
     if package in BLENDER:
         return "the core knows no Blender"
     if imported.relative:
-        others = [room, "errors", "base", *ROOMS[room]]
+        others = [room, "errors", "base", *ROOMS.get(room, [])]
         allowed = [CORE] if room == "recipe" else [f"{CORE}.{other}" for other in others]
         return None if any(below(imported.name, prefix) for prefix in allowed) else f"{room} may not import this room"
     if package in sys.stdlib_module_names or package in ARRAYS:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.vectors import unit_vectors
 from ...errors import Cancelled
 from ..batch import courses
 from ..physics import FOOTBALL, Ball
@@ -152,7 +153,7 @@ def _launch(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.n
     place[:, :2] += unknown[:, :2]
     place[:, 2] = np.maximum(place[:, 2], ball.radius)
     velocity = unknown[:, 2:5]
-    flat = velocity[:, :2] / np.maximum(np.linalg.norm(velocity[:, :2], axis=1), 1e-6)[:, None]
+    flat = unit_vectors(velocity[:, :2], least=1e-6)
     top, side = unknown[:, 5], unknown[:, 6]
     spin = np.stack([-flat[:, 1] * top, flat[:, 0] * top, side], axis=1)
     return place, velocity, spin

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from ...base.vectors import unit_vectors
 from ...motion import contacts, quaternion
 from ...motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ...motion.motion import Motion, forward_kinematics
@@ -96,7 +97,7 @@ def _trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.nda
     smooth = gaussian_filter1d(facing, max(0.1 * motion.fps, 0.5), mode="nearest")
     turning = np.gradient(smooth) * motion.fps if len(motion) > 1 else np.zeros(1)
     up = _turned(places[:, top] - places[:, hips], -facing)
-    up = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9)
+    up = unit_vectors(up)
     return np.concatenate([height[:, None], pace, turning[:, None], up], axis=1)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
-from ...motion import quaternion
+from ...base.vectors import cross
 from .correction import ARMS, FEET
 from .crowd_body import Contact, CrowdBody
 
@@ -112,7 +112,7 @@ def given(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: flo
 
 def _arm(calm: Calm, side: int, mine: Contact, rows, shoulder, turns, weight: float) -> np.ndarray:
     """The turns (W, 3) of one arm with its contacts `rows`; shoulder (T, 3) m, turns (T, 3) so far."""
-    row = quaternion.cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
+    row = cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
     long = np.linalg.norm(row, axis=1) > _SHORT_ARM
     rows, row, squares = rows[long], row[long], calm.arms[side].copy()
     frame = mine.frame[rows]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.vectors import unit_vectors
 from ...motion import limb as two_bones
 from ...motion import quaternion
 from ...motion.humanoid import Limb
@@ -63,8 +64,8 @@ def _hinge(thigh: np.ndarray, shin: np.ndarray, line: np.ndarray, toes: np.ndarr
     """(W, 3) unit: the axis about which the knee is bent, by which a positive turn bends it further."""
     bones = np.linalg.norm(thigh, axis=1) * np.linalg.norm(shin, axis=1)
     shows = np.cross(thigh, shin) / bones[:, None]
-    across = two_bones.unit(np.cross(toes, line), np.array([0.0, 1.0, 0.0]))
+    across = unit_vectors(np.cross(toes, line), np.array([0.0, 1.0, 0.0]))
     share = np.clip(np.linalg.norm(shows, axis=1, keepdims=True) / _CLEAR, 0.0, 1.0)
-    mixed = share * two_bones.unit(shows, across) + (1.0 - share) * across
-    down = two_bones.unit(line, across)
-    return two_bones.unit(mixed - np.sum(mixed * down, axis=1, keepdims=True) * down, across)
+    mixed = share * unit_vectors(shows, across) + (1.0 - share) * across
+    down = unit_vectors(line, across)
+    return unit_vectors(mixed - np.sum(mixed * down, axis=1, keepdims=True) * down, across)
