@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.base.vectors import unit_vector
+from beyond_mocap.base.vectors import distance_along, unit_vector
 from beyond_mocap.annotation import Timeline
 from beyond_mocap.evaluation import jerk
 from beyond_mocap.evaluation.path_ride import figures
@@ -297,7 +297,7 @@ def _prints(ax, trial: Trial) -> None:
 
 
 def _cut(line: np.ndarray, length: float) -> np.ndarray:
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    along = distance_along(line)
     ends = np.stack([np.interp(length, along, column) for column in line.T])
     return np.concatenate([line[along < length], ends[None]]) if along[-1] > length else line
 

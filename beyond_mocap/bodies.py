@@ -21,6 +21,7 @@ from .ball.contact import WORDS, striking_surface
 from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.way import Placed, needed, placed, way
+from .base.easing import smoothstep
 from .errors import InputError, told_time
 from .lay_out import faced, footed, smoothed
 from .library.automatic import automatic_words
@@ -271,7 +272,7 @@ class _Body:
         for hit in self.hits:
             outside = np.maximum(hit.start - self.times, self.times - hit.end)
             arms *= np.clip(outside / OWN_HEAD, 0.0, 1.0)
-        share, arms = (x * x * (3.0 - 2.0 * x) for x in (share, arms))
+        share, arms = smoothstep(share), smoothstep(arms)
         return following(body, self.ball, look_of(self.library), share, CHEST * arms)
 
     def _meetings(self) -> list[Meeting]:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.vectors import nearest_axis
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
 from ..beyond_mocap.motion.motion import Motion, forward_kinematics
@@ -163,9 +164,9 @@ class Driven:
         faces +X."""
         legs = self._heads("left upper_leg", "right upper_leg")
         feet = self._heads("left foot", "right foot")
-        up = _nearest_axis(legs.mean(axis=0) - feet.mean(axis=0))
+        up = nearest_axis(legs.mean(axis=0) - feet.mean(axis=0))
         across = legs[0] - legs[1]
-        left = _nearest_axis(across - (across @ up) * up)
+        left = nearest_axis(across - (across @ up) * up)
         return quaternion.from_matrix(np.stack([np.cross(left, up), left, up]))
 
     def _metres(self, vectors: np.ndarray) -> np.ndarray:
@@ -212,11 +213,6 @@ class Driven:
             return max(level, 0.0)  # the armature's origin lies on the floor
         tails = [self._metres(np.array(self.rig.data.bones[self.bone(part)].tail_local))[2] for part in ends]
         return float(np.clip(level - min(tails), 0.0, 0.16 * leg))
-
-
-def _nearest_axis(vector: np.ndarray) -> np.ndarray:
-    axis = int(np.argmax(np.abs(vector)))
-    return np.eye(3)[axis] * np.sign(vector[axis])
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +330,7 @@ def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
     trunk = rest[body.head] - 0.5 * (rest[body.left.upper_leg] + rest[body.right.upper_leg])
     if min(np.linalg.norm(v) for v in (crown, across, trunk)) < 1e-3:
         return skeleton
-    up = _nearest_axis(trunk)
+    up = nearest_axis(trunk)
     ahead = np.cross(across - (across @ up) * up, up)
     lean = np.arctan2(crown @ ahead / np.linalg.norm(ahead), crown @ up)
     if trunk @ up < 0.9 * np.linalg.norm(trunk) or abs(lean) > _MOST_LEAN:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def velocity(values: np.ndarray, fps: float) -> np.ndarray:
+def time_derivative(values: np.ndarray, fps: float) -> np.ndarray:
     """Central differences over time, one-sided at the ends; zero for a single frame.
 
     Args:

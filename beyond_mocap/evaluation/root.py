@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.time_series import time_derivative
 from ..base.vectors import unit_vectors
 from ..motion.track import Track, zero_phase_hann
 
@@ -47,16 +48,9 @@ def sway(pelvis: np.ndarray, fps: float) -> np.ndarray:
     return pelvis_error(pelvis, zero_phase_hann(pelvis, fps, ROOT_WINDOW))
 
 
-def velocity(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Central differences (one-sided at the ends) of positions (T, ...) m: (T, ...) m/s; zero for a single frame."""
-    if len(positions) < 2:
-        return np.zeros_like(positions)
-    return np.gradient(positions, axis=0) * fps
-
-
 def travel_speed(pelvis: np.ndarray, fps: float) -> np.ndarray:
     """Speed (T,) m/s of a pelvis or track (T, 2) behind a 1 s Hann window: how fast the body gets about."""
-    return np.linalg.norm(velocity(zero_phase_hann(pelvis, fps, TRAVEL_WINDOW), fps), axis=-1)
+    return np.linalg.norm(time_derivative(zero_phase_hann(pelvis, fps, TRAVEL_WINDOW), fps), axis=-1)
 
 
 def speed_class(speed: np.ndarray) -> np.ndarray:
@@ -70,7 +64,7 @@ def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
     The path's direction is that of the velocity behind the same window. Its rms guards against buying still feet with a
     surging pelvis.
     """
-    speed = velocity(pelvis, fps)
+    speed = time_derivative(pelvis, fps)
     course = zero_phase_hann(speed, fps, ROOT_WINDOW)
     course = unit_vectors(course)
     along = np.sum(speed * course, axis=-1, keepdims=True)

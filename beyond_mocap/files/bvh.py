@@ -22,6 +22,7 @@ from ..motion import quaternion
 from ..motion.humanoid import Humanoid, heading
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
+from ..motion.structure import below
 from . import bvh_scale, bvh_text
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import document
@@ -89,7 +90,7 @@ def read(path, unit: float | None = None) -> BvhClip:
     scale = bvh_scale.guess(text, unit)
     channels = _Channels(text, scale)
     hips = _top_of_body(text, scale.body)
-    kept = _below(text.parents, hips)
+    kept = below(text.parents, hips)
     root, root_rotations, above = _folded(channels, hips)
     skeleton, drift = _skeleton(channels, kept)
     rotations = np.stack([root_rotations.T] + [channels.rotation(joint) for joint in kept[1:]])
@@ -130,7 +131,7 @@ class BvhRows:
         self.scale = bvh_scale.guess(text, unit)
         channels = _Channels(text, self.scale)
         self.hips = _top_of_body(text, self.scale.body)
-        self.kept = _below(text.parents, self.hips)
+        self.kept = below(text.parents, self.hips)
         self.skeleton = _skeleton(channels, self.kept)[0]
 
     def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -171,17 +172,8 @@ def _top_of_body(text: BvhText, body: Humanoid | None) -> int:
     """The joint that becomes the root: the hips where both legs hang on them, else the file's root."""
     if body is None:
         return 0
-    below = set(_below(text.parents, body.hips))
+    below = set(below(text.parents, body.hips))
     return body.hips if {body.left.upper_leg, body.right.upper_leg} <= below else 0
-
-
-def _below(parents: tuple[int, ...], top: int) -> list[int]:
-    """`top` and every joint that hangs on it, in file order."""
-    below = {top}
-    for joint, parent in enumerate(parents):
-        if parent in below:
-            below.add(joint)
-    return sorted(below)
 
 
 def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[RootAbove, ...]]:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import quintic_step
 from ..errors import InputError
 from . import gait_tables as tables
-from .gait_tables import at_speed, smooth_step
+from .gait_tables import at_speed
 from .neutral import Neutral
 
 # the plan reaches this many seconds beyond both ends, so that stances which cross them are known; less for one who runs
@@ -104,7 +105,7 @@ def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndar
     spot.
     """
     usual = at_speed("frequency", gear) * (1.0 + 0.22 * np.sin(0.5 * direction) ** 2 + 0.5 * np.sin(direction) ** 2)
-    on_the_spot = 1.0 - smooth_step(gear / 1.8)
+    on_the_spot = 1.0 - quintic_step(gear / 1.8)
     return np.hypot(usual, on_the_spot * turn_rate / 1.3)
 
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.easing import quintic_step
 from ..base.vectors import cross, unit_vectors
 from . import quaternion
-from .gait_tables import GRAVITY, smooth_step
+from .gait_tables import GRAVITY
 from .humanoid import Humanoid, identify
 from .motion import Motion, at_frames, concatenate, pose_kinematics, resample
 from .neutral import neutral_stance
@@ -273,13 +274,13 @@ def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up
     root[:, :2] = fall.level(seconds, flight / fps) - middle[:, :2]
     ground = lowest_root(skeleton, rotations, arms=False)
     free = fall.height(np.minimum(seconds, (flight + settling) / fps)) - middle[:, 2]
-    root[:, 2] = _cushioned(free, ground, smooth_step(seconds / 0.15))
+    root[:, 2] = _cushioned(free, ground, quintic_step(seconds / 0.15))
     start = flight + settling
     goal, pose = at_frames(up, shown)
     root[start:, :2] = _carried(root[start - 3 : start, :2], goal[:, :2], fps)
     way = np.arange(len(shown)) / fps
     clear = np.maximum(goal[:, 2] - lowest_root(skeleton, pose, arms=False), 0.0)
-    root[start:, 2] += smooth_step((way - _LYING_STILL) / 0.6) * clear
+    root[start:, 2] += quintic_step((way - _LYING_STILL) / 0.6) * clear
     return root
 
 

@@ -12,16 +12,28 @@ from ..base.vectors import cross, unit_vectors
 from . import quaternion
 
 
-def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray) -> np.ndarray:
+def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray, xp=np) -> np.ndarray:
     """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then it only nears
     it.
 
     distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap
-    straight.
+    straight. xp: array module, numpy or jax.numpy.
     """
     start = longest - soft
-    beyond = np.maximum(distance - start, 0.0)
-    return np.where(distance > start, longest - soft * np.exp(-beyond / soft), distance)
+    beyond = xp.maximum(distance - start, 0.0)
+    return xp.where(distance > start, longest - soft * xp.exp(-beyond / soft), distance)
+
+
+def inner_angle(upper: np.ndarray, lower: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """The angle between two bones at the joint between them, by the law of cosines.
+
+    Args:
+        upper, lower: (...,), lengths of the bones, m.
+        length: (...,), distance between their far ends, m.
+    Returns:
+        (...,), rad, from 0 folded to pi straight.
+    """
+    return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
 
 
 def bend(

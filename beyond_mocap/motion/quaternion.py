@@ -77,6 +77,11 @@ def turned_level(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
 
 
+def turned_about_up(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) turned by `angle` (...,) radians about the world's up axis: (..., 3)."""
+    return np.concatenate([turned_level(v[..., :2], angle), v[..., 2:]], axis=-1)
+
+
 def from_rotation_vector(v: np.ndarray) -> np.ndarray:
     """The exponential map: rotation vectors (..., 3) in radians -> (..., 4)."""
     v = np.asarray(v, dtype=float)

@@ -21,7 +21,7 @@ from .footsteps import lift_off_ground
 from .gestures import LEFT, RIGHT
 from .grip import grip_in
 from .humanoid import identify
-from .keyed import keyed
+from .keyed import keyed_rounded
 from .mirror import mirror
 from .motion import Motion, at_frames, forward_kinematics, place
 from .neutral import Neutral, neutral_stance
@@ -227,7 +227,7 @@ def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
     scale = neutral.leg / tables.LEG
 
     def curve(rows) -> np.ndarray:
-        return _rounded(keyed(rows, times))
+        return keyed_rounded(rows, times, _ROUND * _PLAN)
 
     nothing = np.zeros_like(times)
     body = identify(neutral.skeleton)
@@ -264,10 +264,3 @@ def _foot(rows: np.ndarray, neutral: Neutral, scale: float) -> np.ndarray:
     up = neutral.ankle_height + raised * scale
     up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
     return np.stack([ahead * scale, left * scale, up, np.zeros_like(up), pitch, yaw], axis=-1)
-
-
-def _rounded(rows: np.ndarray) -> np.ndarray:
-    """The same curves (T, C) without corners in their speed."""
-    from scipy.ndimage import gaussian_filter1d
-
-    return gaussian_filter1d(rows, _ROUND * _PLAN, axis=0, mode="nearest")

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import quintic_step_by_powers
 from ..base.vectors import unit_vectors
+from ..motion.quaternion import turned_about_up
 from ..motion.striking import ball_gap, nearest_on
 from ..motion.track import BALL_RADIUS
 
@@ -69,7 +71,8 @@ def best_aim(
     sine of the ball's elevation as seen from the part; ball (3,) m as measured; avoid: (line, radius) that it may not
     lie in; possible: of a move (3,) m of the part, what the body can make of it.
     """
-    aims = [Aim(_turned(direction, angle), along) for angle in _ANGLES for along in _ALONG[: 1 if rise else None]]
+    shares = _ALONG[: 1 if rise else None]
+    aims = [Aim(turned_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
     found = meetings(line, radius, aims, rise, ball, room, avoid)
     least = np.linalg.norm(found.need, axis=1)
     least += _ANGLE_COST * np.abs(np.repeat(_ANGLES, len(aims) // len(_ANGLES)))
@@ -206,10 +209,4 @@ def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.nda
 def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
     """0 .. 1 .. 0, twice continuously differentiable: rising and falling (N,) are the straight ramps, 1 and more
     inside."""
-    x = np.clip(np.minimum(rising, falling), 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-
-
-def _turned(direction: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([c * direction[0] - s * direction[1], s * direction[0] + c * direction[1], direction[2]])
+    return quintic_step_by_powers(np.minimum(rising, falling))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from ..base.vectors import cross_level
 from ..errors import TimedLine
 from ..motion.arctangent import arctan2
 from ..motion.path import Path
@@ -42,8 +43,7 @@ def steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> 
 def curvature(path: Path, at: np.ndarray) -> np.ndarray:
     """(T,) 1/m: how much a path bends over the ground at parameters `at` (T,)."""
     first, second = path.at(at, 1)[:, :2], path.at(at, 2)[:, :2]
-    cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    return np.abs(cross) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
+    return np.abs(cross_level(first, second)) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
 
 
 def share(free: np.ndarray, fps: float) -> np.ndarray:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import smoothstep
 from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
@@ -122,16 +123,16 @@ def target(pins: Sequence, start: float, fps: float, count: int) -> Target:
             continue
         if before is not None and first - before.frames[1] < 2.0 * fade:
             between = (at > before.frames[1]) & (at < first)
-            way = _eased((at[between] - before.frames[1]) / (first - before.frames[1]))
+            way = smoothstep((at[between] - before.frames[1]) / (first - before.frames[1]))
             share[between] = 1.0
             place[between] = before.place + way[:, None] * (stay.place - before.place)
         else:
             coming = (at < first) & (at > first - fade)
-            share[coming], place[coming] = _eased(1.0 - (first - at[coming]) / fade), stay.place
+            share[coming], place[coming] = smoothstep(1.0 - (first - at[coming]) / fade), stay.place
         inside = (at >= first) & (at <= last)
         share[inside], place[inside] = 1.0, stay.place
         leaving = (at > last) & (at < last + fade)
-        share[leaving], place[leaving] = _eased(1.0 - (at[leaving] - last) / fade), stay.place
+        share[leaving], place[leaving] = smoothstep(1.0 - (at[leaving] - last) / fade), stay.place
         stays.append(stay)
     return Target(share, place, tuple(stays))
 
@@ -148,11 +149,6 @@ def look_axis(skeleton: Skeleton, rotations: np.ndarray) -> np.ndarray:
 
 def _head(body: Humanoid) -> int:
     return next(joint for joint in (body.head, body.neck, body.chest) if joint is not None)
-
-
-def _eased(way: np.ndarray) -> np.ndarray:
-    way = np.clip(way, 0.0, 1.0)
-    return way * way * (3.0 - 2.0 * way)
 
 
 class _Work:
@@ -263,7 +259,7 @@ class _Part:
             after = self._off_from(off, own, high, gap, held) if high >= 0 else np.zeros((len(gap), 3))
             before = self._off_from(off, own, low, gap, holds) if low < len(own) else np.zeros((len(gap), 3))
             if high >= 0 and low < len(own):
-                way = _eased((gap - high) / (low - high))[:, None]
+                way = smoothstep((gap - high) / (low - high))[:, None]
                 off[gap] = (after + way * (before - after)) * found.share[gap, None]
             else:
                 off[gap] = (after + before) * found.share[gap, None]
@@ -346,7 +342,7 @@ class _Part:
             self.skeleton, self.root, self.rotations, chain, goal, end_rotation=turn,
             keep_end_rotation=False, soft=_SOFT,
         ).rotations
-        weight = _eased(4.0 * share)
+        weight = smoothstep(4.0 * share)
         for joint in {*_bones(self.skeleton, chain), chain[0]}:
             near = quaternion.signed_like(found[:, joint], self.rotations[:, joint])
             mixed = quaternion.slerp(self.rotations[:, joint], near, weight)
@@ -363,7 +359,7 @@ class _Part:
                 self._turn(neck, _NECK_SHARE * found.share[:, None] * turn)
             self._turn(head, found.share[:, None] * (1.0 - _CHEST_SHARE - _NECK_SHARE * (neck != head)) * turn)
         else:
-            self._turn(head, _eased((found.share - 0.7) / 0.3)[:, None] * turn)
+            self._turn(head, smoothstep((found.share - 0.7) / 0.3)[:, None] * turn)
 
     def _gaze_turn(self, head: int, found: Target, look: np.ndarray) -> np.ndarray:
         """(W, 3) rotation vectors, in the world, from where the head looks to the place, as far as a neck can."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.time_series import gaussian_smooth
 from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
@@ -47,7 +48,7 @@ def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndar
     camera.data.clip_start, camera.data.clip_end, camera.data.sensor_width = units, 400.0 * units, SENSOR
     look = camera.constraints.new("TRACK_TO")
     look.target, look.track_axis, look.up_axis = aim, "TRACK_NEGATIVE_Z", "UP_Y"
-    middle = smooth(seen, GLIDE * frames_per_second(scene))
+    middle = gaussian_smooth(seen, GLIDE * frames_per_second(scene))
     middle = np.clip(middle, *(np.outer([-1.0, 1.0], np.array(size) / 2.0 - [14.0, 14.0])))
     places = np.column_stack([middle, np.full(len(middle), 0.6)])
     away = np.linalg.norm(places - stand, axis=1)
@@ -97,19 +98,9 @@ def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.n
     scale = neutral.leg / 0.88  # an adult's leg of 1.80 m
     eye = places[:, head] + quaternion.rotate(face, np.array([EYE[0], 0.0, EYE[1]]) * scale)
     ahead = unit_vectors(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
-    gaze = smooth(_towards(ahead, eye, target), STEADY * motion.fps)
+    gaze = gaussian_smooth(_towards(ahead, eye, target), STEADY * motion.fps)
     gaze[:, 2] = np.minimum(gaze[:, 2], UP * np.linalg.norm(gaze[:, :2], axis=1))
     return eye, _looking(unit_vectors(gaze))
-
-
-def smooth(values: np.ndarray, width: float) -> np.ndarray:
-    """Values (T, n) through a bell of standard deviation `width` frames, their ends held."""
-    reach = int(3.0 * width)
-    if reach < 1 or len(values) < 2:
-        return values
-    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    held = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    return np.stack([np.convolve(column, bell / bell.sum(), "valid") for column in held.T], axis=1)
 
 
 def _towards(ahead: np.ndarray, eye: np.ndarray, target: np.ndarray | None) -> np.ndarray:
@@ -122,7 +113,7 @@ def _towards(ahead: np.ndarray, eye: np.ndarray, target: np.ndarray | None) -> n
     cosine = np.clip(np.sum(ahead * wanted, axis=1), -1.0, 1.0)
     angle = np.arccos(cosine)
     share = np.minimum(1.0, EYES_TURN / np.maximum(angle, 1e-6))
-    behind = smooth(np.clip((np.radians(150.0) - angle) / np.radians(40.0), 0.0, 1.0)[:, None], 5.0)
+    behind = gaussian_smooth(np.clip((np.radians(150.0) - angle) / np.radians(40.0), 0.0, 1.0)[:, None], 5.0)
     turned = _between(ahead, wanted, angle, share)
     return unit_vectors(behind * turned + (1.0 - behind) * down)
 

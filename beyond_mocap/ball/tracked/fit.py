@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.easing import hermite
 from ...base.vectors import unit_vectors
 from ...errors import Cancelled
 from ..batch import courses
@@ -173,8 +174,7 @@ def _between(places, speeds, since) -> np.ndarray:
     row = np.arange(len(places))[:, None]
     p, q = places[row, cell], places[row, cell + 1]
     m, n = speeds[row, cell] * GRID, speeds[row, cell + 1] * GRID
-    s2, s3 = share**2, share**3
-    return (2 * s3 - 3 * s2 + 1) * p + (s3 - 2 * s2 + share) * m + (3 * s2 - 2 * s3) * q + (s3 - s2) * n
+    return hermite(share, p, m, q, n)
 
 
 def _misses(stretches: Stretches, unknown: np.ndarray, seen: np.ndarray, end: np.ndarray) -> np.ndarray:

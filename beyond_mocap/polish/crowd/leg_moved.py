@@ -36,7 +36,7 @@ def leg_moved(
     own, wanted = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
     eased = [two_bones.soft_distance(length, lengths[0] + lengths[1], SOFT) for length in (own, wanted)]
     reach = np.clip(own + eased[1] - eased[0], _LEAST, lengths[0] + lengths[1])
-    opened = _inside(*lengths, reach) - _inside(*lengths, own)
+    opened = two_bones.inner_angle(*lengths, reach) - two_bones.inner_angle(*lengths, own)
     toes = places[:, limb.toe_or_foot] - ankle if limb.toe is not None else np.zeros(line.shape)
     bend = quaternion.about_axis(_hinge(thigh, shin, line, toes), -opened)
     swing = quaternion.between(thigh + quaternion.rotate(bend, shin), goal)
@@ -53,11 +53,6 @@ def leg_moved(
 def in_parent(skeleton: Skeleton, world: np.ndarray, joint: int, turned: np.ndarray) -> np.ndarray:
     """(W, 4): a world rotation of a joint as one against its parent's."""
     return quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), turned)
-
-
-def _inside(upper: np.ndarray, lower: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """(W,) rad between two bones whose ends are `length` (W,) m apart."""
-    return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
 
 
 def _hinge(thigh: np.ndarray, shin: np.ndarray, line: np.ndarray, toes: np.ndarray) -> np.ndarray:
