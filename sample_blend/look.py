@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from beyond_mocap.base.vectors import unit_vectors
+from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.errors import InputError  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.files.tables import read_ball, read_provenance  # noqa: E402

@@ -17,7 +17,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.base.vectors import unit_vectors
+from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.motion.gait import gait  # noqa: E402

@@ -172,8 +172,8 @@ def _top_of_body(text: BvhText, body: Humanoid | None) -> int:
     """The joint that becomes the root: the hips where both legs hang on them, else the file's root."""
     if body is None:
         return 0
-    below = set(below(text.parents, body.hips))
-    return body.hips if {body.left.upper_leg, body.right.upper_leg} <= below else 0
+    hanging = set(below(text.parents, body.hips))
+    return body.hips if {body.left.upper_leg, body.right.upper_leg} <= hanging else 0
 
 
 def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[RootAbove, ...]]:
