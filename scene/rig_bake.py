@@ -8,7 +8,6 @@ W_j the core's world rotation of a joint and R_j its bone's rotation at rest, th
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.digest import hex_digest
 from ..beyond_mocap.base.vectors import nearest_axis
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
@@ -576,12 +576,12 @@ def is_as_baked(rig: bpy.types.Object) -> bool:
 
 
 def _digest(rig: bpy.types.Object) -> str:
-    digest = hashlib.sha256()
+    parts = []
     for place, curve in sorted(channels.curves(*channels.playing(rig)).items()):
         points = np.empty(2 * len(curve.keyframe_points), np.float32)
         curve.keyframe_points.foreach_get("co", points)
-        digest.update(repr(place).encode() + points.tobytes())
-    return digest.hexdigest()
+        parts += [repr(place), points]
+    return hex_digest(*parts, digits=64)
 
 
 def _keep_own(rig: bpy.types.Object) -> list[str]:

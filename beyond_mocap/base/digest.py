@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
+
+import numpy as np
+
+Part = str | bytes | np.ndarray
 
 
-def hex_digest(*parts: str | bytes, digits: int = 16) -> str:
+def hex_digest(*parts: Part, digits: int = 16) -> str:
     """SHA-256 of all parts, one after the other.
 
     Args:
-        parts: texts (taken as UTF-8) and bytes.
+        parts: texts (taken as UTF-8), bytes, and arrays (taken as their numbers in C order, without shape or type).
         digits: how many hex digits of it, at most 64.
     Returns:
         That many hex digits.
     """
-    return hashlib.sha256(_joined(parts)).hexdigest()[:digits]
+    return _fed(hashlib.sha256(), parts).hexdigest()[:digits]
 
 
-def byte_digest(*parts: str | bytes, size: int = 16) -> bytes:
+def byte_digest(*parts: Part, size: int = 16) -> bytes:
     """BLAKE2b of all parts, one after the other; faster than SHA-256 on large arrays.
 
     Args:
-        parts: texts (taken as UTF-8) and bytes.
+        parts: texts (taken as UTF-8), bytes, and arrays (taken as their numbers in C order, without shape or type).
         size: bytes of the digest, at most 64; another size is another digest, not a longer one.
     Returns:
         That many bytes.
     """
-    return hashlib.blake2b(_joined(parts), digest_size=size).digest()
+    return _fed(hashlib.blake2b(digest_size=size), parts).digest()
 
 
-def _joined(parts: tuple[str | bytes, ...]) -> bytes:
-    return b"".join(part.encode() if isinstance(part, str) else part for part in parts)
+def _fed(hashed, parts: Iterable[Part]):
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            part = np.ascontiguousarray(part).reshape(-1)
+        hashed.update(part.encode() if isinstance(part, str) else part)
+    return hashed

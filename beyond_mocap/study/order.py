@@ -6,13 +6,13 @@ get used to the task come first and do not count.
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.digest import hex_digest
 from ..errors import InputError
 
 TRAINING = "training"
@@ -79,7 +79,7 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
     """
     _check(clips)
     named = _named(clips, seed)
-    mark = hashlib.sha256(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])).encode()).hexdigest()[:8]
+    mark = hex_digest(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])), digits=8)
     taken: set[tuple] = set()
     orders = {}
     for number in range(raters):
