@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from beyond_mocap.base.time_series import interpolate
 from beyond_mocap.base.vectors import distance_along, unit_vector
 from beyond_mocap.annotation import Timeline
 from beyond_mocap.evaluation import jerk
@@ -298,7 +299,7 @@ def _prints(ax, trial: Trial) -> None:
 
 def _cut(line: np.ndarray, length: float) -> np.ndarray:
     along = distance_along(line)
-    ends = np.stack([np.interp(length, along, column) for column in line.T])
+    ends = interpolate(length, along, line)
     return np.concatenate([line[along < length], ends[None]]) if along[-1] > length else line
 
 

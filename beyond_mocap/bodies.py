@@ -22,6 +22,7 @@ from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.way import Placed, needed, placed, way
 from .base.easing import smoothstep
+from .base.time_series import interpolate
 from .errors import InputError, told_time
 from .lay_out import faced, footed, smoothed
 from .library.automatic import automatic_words
@@ -149,7 +150,7 @@ class _Body:
         self.start = float(ball.times[0])
         self.hits = placed(library, orders, self.start)
         self.times = self.start + np.arange(count) / fps
-        self.ball = np.stack([np.interp(self.times, ball.times, column) for column in ball.positions.T], axis=1)
+        self.ball = interpolate(self.times, ball.times, ball.positions)
 
     def made(self, progress, cancelled) -> PlayerMotion:
         report = progress or (lambda fraction, text: None)
@@ -217,7 +218,7 @@ class _Body:
         """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""
         path = way(self.stance, self.hits, times)
         velocity = np.gradient(path.positions, 1.0 / fps, axis=0)
-        ball = np.stack([np.interp(times, self.times, column) for column in self.ball.T], axis=1)
+        ball = interpolate(times, self.times, self.ball)
         track = SampledTrack(
             times=times, positions=path.positions, raw=path.positions, velocity=velocity,
             speed=np.linalg.norm(velocity, axis=1), direction=travel_direction(velocity, fps),

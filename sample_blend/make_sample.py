@@ -17,12 +17,14 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
+from beyond_mocap.base.time_series import interpolate  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.motion.gait import gait  # noqa: E402
 from beyond_mocap.motion.gestures import Gesture, dribble, strike  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402
+from beyond_mocap.motion.runs import equal_runs  # noqa: E402
 from beyond_mocap.motion.moves import celebration, getting_up, header, throw_in  # noqa: E402
 
 FPS = 30.0
@@ -177,9 +179,8 @@ def _by_speed(motion: Motion) -> list[Span]:
     smooth = np.stack([np.convolve(padded[:, a], window / window.sum(), mode="valid") for a in (0, 1)], axis=-1)
     velocity = np.gradient(smooth, 1.0 / motion.fps, axis=0)
     names = np.searchsorted([limit for _, limit in _GAITS], np.linalg.norm(velocity, axis=1), side="right")
-    edges = np.flatnonzero(np.diff(names)) + 1
     spans: list[list] = []
-    for begin, end in zip(np.r_[0, edges], np.r_[edges, len(names)]):
+    for begin, end in equal_runs(names):
         word = _GAITS[names[begin]][0]
         if spans and (end - begin < 0.4 * motion.fps or spans[-1][2] == word):
             spans[-1][1] = end
@@ -324,7 +325,7 @@ def true_paths() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
 def _rounded(rows, times: np.ndarray) -> np.ndarray:
     """A path (N, 2) through waypoints, its corners in space and speed rounded by a Hann window of 1.2 s, twice."""
     table = np.array(rows, dtype=float)
-    path = np.stack([np.interp(times, table[:, 0], table[:, axis]) for axis in (1, 2)], axis=-1)
+    path = interpolate(times, table[:, 0], table[:, 1:3])
     half = 60
     window = np.hanning(2 * half + 3)[1:-1]
     for _ in range(2):

@@ -19,7 +19,7 @@ from ..beyond_mocap.base.digest import hex_digest
 from ..beyond_mocap.base.vectors import nearest_axis
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
-from ..beyond_mocap.motion.motion import Motion, forward_kinematics
+from ..beyond_mocap.motion.motion import Motion, forward_kinematics, local_rotations
 from ..beyond_mocap.motion.skeleton import Skeleton
 from . import action, armature, bone_maps, channels
 from .measure import units_per_metre
@@ -684,7 +684,5 @@ def evaluated(body: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray
     poses = np.array(rows)
     turn = poses[:, :, :3, :3] / np.linalg.norm(poses[:, :, :3, :3], axis=2, keepdims=True)
     world = quaternion.multiply(quaternion.from_matrix(turn), quaternion.inverse(rest))
-    local = world.copy()
-    parents = list(skeleton.parents[1:])
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents]), world[:, 1:])
+    local = local_rotations(skeleton, world)
     return Motion(skeleton, poses[:, 0, :3, 3] / units_per_metre(scene), local, frames_per_second(scene))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from . import batch
 from .aim import CLOSE, aim
 from .physics import Ball, length
@@ -32,7 +33,7 @@ class Arcs:
 
     def at(self, speed: float) -> np.ndarray:
         """(3,) m/s: the launch of that speed, as far as there is one."""
-        return np.array([np.interp(speed, self.speeds, column) for column in self.velocities.T])
+        return interpolate(speed, self.speeds, self.velocities)
 
 
 def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | None = None) -> Arcs:

@@ -32,3 +32,17 @@ def gaussian_smooth(values: np.ndarray, width: float) -> np.ndarray:
     bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     held = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
     return np.stack([np.convolve(column, bell / bell.sum(), "valid") for column in held.T], axis=1)
+
+
+def interpolate(at: np.ndarray, times: np.ndarray, values: np.ndarray, outside: float | None = None) -> np.ndarray:
+    """Values at other times, linearly between those that are known.
+
+    Args:
+        at: (...), s or another clock.
+        times: (N,), rising, on the same clock.
+        values: (N, K), any unit.
+        outside: what stands before the first time and after the last; None holds the values there.
+    Returns:
+        (..., K), that unit.
+    """
+    return np.stack([np.interp(at, times, column, outside, outside) for column in values.T], axis=-1)

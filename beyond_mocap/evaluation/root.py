@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.time_series import time_derivative
+from ..base.time_series import interpolate, time_derivative
 from ..base.vectors import unit_vectors
 from ..motion.track import Track, zero_phase_hann
 
@@ -27,7 +27,7 @@ def track_at(track: Track, at: np.ndarray) -> np.ndarray:
     known = track.measured
     if not known.any():
         return np.full((len(at), 2), np.nan)
-    return np.stack([np.interp(at, track.times[known], track.positions[known, axis]) for axis in (0, 1)], axis=-1)
+    return interpolate(at, track.times[known], track.positions[known])
 
 
 def root_error(pelvis: np.ndarray, track: np.ndarray, fps: float) -> np.ndarray:

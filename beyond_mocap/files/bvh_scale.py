@@ -106,7 +106,7 @@ def _sampled(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
 
 def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
     """ "Y" or "Z" from posed (N, J, 3) and rest (J, 3) positions that were turned as if Y were up."""
-    top = next(j for j in (body.head, body.neck, body.chest) if j is not None)
+    top = body.head_or_neck
     feet = [body.left.foot, body.right.foot]
     votes = {"Y": 0.0, "Z": 0.0}
     for positions, weight in ((posed, 1.0), (rest, 0.5)):

@@ -35,7 +35,7 @@ from ..motion.gait import gait
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics
 from ..motion.phase_blend import Strides, blend, strides
-from ..motion.runs import runs
+from ..motion.runs import equal_runs, runs
 from ..polish.foot_plant import plant
 from .features import Frames
 from .scan import CACHE_FOLDER
@@ -165,7 +165,7 @@ def _elbow_and_lean(motion: Motion) -> np.ndarray:
         if None not in (arm.upper_arm, arm.lower_arm, arm.hand)
     ]
     facing = heading_from_positions(motion.skeleton, places)
-    trunk = places[:, body.chest if body.neck is None else body.neck] - places[:, body.hips]
+    trunk = places[:, body.neck_or_chest] - places[:, body.hips]
     lean = arctan2(quaternion.turned_level(trunk[:, :2], -facing)[:, 0], trunk[:, 2])
     return np.array([np.mean(bends) if bends else 0.0, np.mean(lean)])
 
@@ -261,10 +261,7 @@ def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotat
     """Rows that name the gait of every frame by its speed (T,), with the thresholds by which tracks are annotated."""
     words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
     band = np.searchsorted(gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
-    edges = [0, *(np.flatnonzero(np.diff(band)) + 1), len(speed)]
-    return tuple(
-        ClipAnnotation(int(a), int(b) - 1, None, (words[band[a]], "front")) for a, b in zip(edges[:-1], edges[1:])
-    )
+    return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in equal_runs(band))
 
 
 def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold: bool = False) -> Made:

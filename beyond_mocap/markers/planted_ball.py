@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion, forward_kinematics
@@ -115,4 +116,4 @@ def _flight(position: np.ndarray, velocity: np.ndarray, after: np.ndarray, drag:
         places[step] = position
         pull = fall - drag * np.linalg.norm(velocity) * velocity
         position, velocity = position + _FINE * velocity + 0.5 * _FINE**2 * pull, velocity + _FINE * pull
-    return np.stack([np.interp(after, steps * _FINE, places[:, axis]) for axis in range(3)], axis=1)
+    return interpolate(after, steps * _FINE, places)

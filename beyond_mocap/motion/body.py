@@ -65,17 +65,13 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
 def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
     """The stance with its head as it rests, unless that would have the example's people look up: who kicks or walks
     looks down at the ground ahead, but some suits rest with a bowed head."""
-    carrier = _head_carrier(identify(neutral.skeleton))
+    carrier = identify(neutral.skeleton).head_or_neck
     ahead = quaternion.multiply(neutral.rotations[carrier], quaternion.inverse(rest.rotations[carrier]))
     if quaternion.rotate(ahead, np.array([1.0, 0.0, 0.0]))[2] > 0.0:
         return neutral
     rotations = np.array(neutral.rotations)
     rotations[carrier] = rest.rotations[carrier]
     return replace(neutral, rotations=rotations)
-
-
-def _head_carrier(body: Humanoid) -> int:
-    return next(j for j in (body.head, body.neck, body.chest) if j is not None)
 
 
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
@@ -238,8 +234,8 @@ class _Build:
         body, k = self.body, self.scale
         hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
         shoulder, _ = self._shoulders(hip)
-        carrier = _head_carrier(body)
-        neck = body.neck if body.neck is not None else body.chest
+        carrier = body.head_or_neck
+        neck = body.neck_or_chest
         base = self.at(carrier) if body.head is not None else shoulder + k * np.array([0.03, 0.0, 0.15])
         low = shoulder + k * np.array([-0.012, 0.0, 0.03])
         rings = [(low, 0.066, 0.072)]

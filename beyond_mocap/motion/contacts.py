@@ -15,6 +15,7 @@ from scipy.ndimage import grey_opening, maximum_filter1d
 
 from .humanoid import Humanoid, identify, leg_length
 from .motion import Motion, forward_kinematics
+from .runs import run_numbers, runs
 from .skeleton import Skeleton
 
 _ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once within it
@@ -137,15 +138,14 @@ def _horizontal_speed(places: np.ndarray, fps: float) -> np.ndarray:
 
 def _hysteresis(enter: np.ndarray, leave: np.ndarray) -> np.ndarray:
     """Runs of `leave` (T,) that hold at least one frame of `enter` (T,)."""
-    labels = np.cumsum(np.diff(leave, prepend=False)) * leave
+    labels = run_numbers(leave)
     return leave & np.isin(labels, labels[enter & leave])
 
 
 def _without_short(flags: np.ndarray, frames: float) -> np.ndarray:
     """`flags` (T,) without runs shorter than `frames`; runs that touch an end of the clip stay, they may go on."""
-    edges = np.flatnonzero(np.diff(flags, prepend=~flags[0], append=~flags[-1]))
     out = flags.copy()
-    for start, stop in zip(edges[:-1], edges[1:]):
-        if flags[start] and stop - start < frames and start > 0 and stop < len(flags):
+    for start, stop in runs(flags):
+        if stop - start < frames and start > 0 and stop < len(flags):
             out[start:stop] = False
     return out

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step
+from ..base.time_series import interpolate
 from . import gait_tables as tables
 from .neutral import Neutral
 
@@ -149,7 +150,7 @@ def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank
 
     def free(at, share_at):
         """Ankle (N, 3) and pitch (N,) of the published swing, hung on the hip at seconds `at`."""
-        hip_at = np.stack([np.interp(at, times, hip[:, axis]) for axis in range(3)], axis=-1)
+        hip_at = interpolate(at, times, hip)
         turned = np.interp(at, times, heading)
         forward, up, pitch = _leg_swing(share_at, speed, direction, thigh_shank)
         across = np.stack([forward * np.cos(turned), forward * np.sin(turned), up], axis=-1)

@@ -196,7 +196,7 @@ def _axes(skeleton: Skeleton, rotations: np.ndarray) -> tuple[np.ndarray, np.nda
     """Unit vectors (T, 3) in the world: along the trunk to the neck, to the body's left, and ahead of the chest."""
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
-    top = body.neck if body.neck is not None else body.chest
+    top = body.neck_or_chest
     along = unit_vectors(places[:, top] - places[:, body.hips])
     left = places[:, body.left.upper_leg] - places[:, body.right.upper_leg]
     left = unit_vectors(left - np.sum(left * along, axis=1, keepdims=True) * along)
@@ -206,7 +206,7 @@ def _axes(skeleton: Skeleton, rotations: np.ndarray) -> tuple[np.ndarray, np.nda
 def _to_middle(skeleton: Skeleton, body: Humanoid, rotations: np.ndarray) -> np.ndarray:
     """(T, 3) m from the root to the body's middle; rotations (T, J, 4) local."""
     places, _ = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
-    top = body.neck if body.neck is not None else body.chest
+    top = body.neck_or_chest
     return places[:, body.hips] + _MIDDLE * (places[:, top] - places[:, body.hips])
 
 

@@ -31,7 +31,7 @@ import numpy as np
 from ..base.vectors import unit_vector
 from . import quaternion
 from .humanoid import Humanoid, identify
-from .motion import Motion, pose_kinematics
+from .motion import Motion, local_rotations, pose_kinematics
 from .skeleton import Skeleton
 
 _FLIPS = np.stack([np.diag(signs) for signs in ((-1.0, 1, 1), (1.0, -1, 1), (1.0, 1, -1), (-1.0, -1, -1))])
@@ -55,9 +55,7 @@ def mirror(motion: Motion) -> Motion:
     # M R M keeps the angle; its axis, a pseudovector, keeps its y and turns the others
     turned = world[:, list(body.mirror)] * (1.0, -1.0, 1.0, -1.0)
     world = quaternion.multiply(turned, corrections)
-    local = world.copy()
-    parents = list(motion.skeleton.parents[1:])
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents]), world[:, 1:])
+    local = local_rotations(motion.skeleton, world)
     return Motion(motion.skeleton, motion.root_positions * np.diag(_WORLD), local, motion.fps)
 
 

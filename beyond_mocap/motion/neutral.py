@@ -14,8 +14,9 @@ from ..base.vectors import cross, unit_vectors
 from . import quaternion
 from .arctangent import arctan2
 from .humanoid import Humanoid, Limb, heading_from_positions, identify
-from .motion import Motion, forward_kinematics, pose_kinematics
+from .motion import Motion, forward_kinematics, local_rotations, pose_kinematics
 from .skeleton import Skeleton, frozen_array
+from .structure import below
 
 _UP = np.array([0.0, 0.0, 1.0])
 _DOWN = -_UP
@@ -61,7 +62,7 @@ def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral
     world = np.array(_start(skeleton, body, example))
     slopes = [_sole_slope(skeleton, limb, world, example) for limb in (body.left, body.right)]
     _straighten(skeleton, body, world, slopes)
-    local = _to_local(skeleton, world)
+    local = local_rotations(skeleton, world)
     positions, _ = pose_kinematics(skeleton, np.zeros((1, 3)), local[None])
     return _measure(skeleton, body, world, positions[0])
 
@@ -199,24 +200,8 @@ def _point(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None,
     turn = quaternion.between(direction, wanted)
     if np.dot(direction, wanted) < -0.999:
         turn = quaternion.about_axis(np.array([1.0, 0.0, 0.0]), np.pi)
-    for other in _below(skeleton, joint):
+    for other in below(skeleton.parents, joint):
         world[other] = quaternion.multiply(turn, world[other])
-
-
-def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and everything that hangs on it."""
-    found = {joint}
-    for other, parent in enumerate(skeleton.parents):
-        if parent in found:
-            found.add(other)
-    return sorted(found)
-
-
-def _to_local(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
-    parents = np.array(skeleton.parents)
-    local = world.copy()
-    local[1:] = quaternion.multiply(quaternion.inverse(world[parents[1:]]), world[1:])
-    return local
 
 
 def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.ndarray) -> Neutral:

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.vectors import unit_vectors
 from . import limb, quaternion
 from .humanoid import Humanoid, Limb, identify
-from .motion import Motion, pose_kinematics
+from .motion import Motion, local_rotations, pose_kinematics
 from .neutral import Neutral
 
 # metres below full stretch from where a leg eases: less than what `gait` leaves, so that standing feet are met exactly
@@ -72,9 +72,7 @@ def to_motion(posture: Posture, neutral: Neutral) -> Motion:
     body = identify(skeleton)
     turns = _turns(posture, neutral, body)
     world = quaternion.multiply(turns, neutral.rotations)
-    local = world.copy()
-    parents = np.array(skeleton.parents)
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents[1:]]), world[:, 1:])
+    local = local_rotations(skeleton, world)
     places, _ = pose_kinematics(skeleton, np.zeros((len(posture), 3)), local)
     middle = 0.5 * (places[:, body.left.upper_leg] + places[:, body.right.upper_leg])
     return Motion(skeleton, posture.hips - middle, local, posture.fps)

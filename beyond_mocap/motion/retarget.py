@@ -25,7 +25,7 @@ from . import limb, quaternion
 from .anatomy import Anatomy, head_chain, spine_shares, study
 from .bone_map import Pairs, pair
 from .humanoid import Limb
-from .motion import Motion, forward_kinematics
+from .motion import Motion, forward_kinematics, local_rotations
 from .skeleton import Skeleton
 
 _SOFT = 0.01
@@ -123,7 +123,7 @@ class _Transfer:
         places = _laid(self.target.skeleton, world) + root[:, None]
         for mine, theirs in sides:
             self._reach(places, mine, theirs)
-        return Motion(self.target.skeleton, root, _to_local(self.target.skeleton, self._world()), self.fps)
+        return Motion(self.target.skeleton, root, local_rotations(self.target.skeleton, self._world()), self.fps)
 
     @staticmethod
     def _limbs(anatomy: Anatomy) -> tuple[Limb, Limb]:
@@ -281,9 +281,3 @@ def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
     for joint, parent in enumerate(parents, 1):
         places[:, joint] = places[:, parent] + bones[:, joint - 1]
     return places
-
-
-def _to_local(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
-    local, parents = world.copy(), list(skeleton.parents[1:])
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents]), world[:, 1:])
-    return local

@@ -23,6 +23,7 @@ from ..motion.arctangent import arctan2
 from ..motion.contacts import sole_height
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
+from ..motion.runs import run_numbers
 from ..motion.skeleton import Skeleton
 from .reach import two_bone
 
@@ -232,7 +233,7 @@ def held_shift(
 def held_less(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
     """Weights (T, 2) with those stances held less firmly in which `excess` (T,) m is above 0: a third at 10 cm."""
     stance = weight.max(axis=1) > 0
-    label = np.cumsum(np.diff(stance, prepend=False)) * stance
+    label = run_numbers(stance)
     worst = np.zeros(label.max(initial=0) + 1)
     np.maximum.at(worst, label, np.where(stance, np.maximum(excess, 0.0), 0.0))
     return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2

@@ -51,7 +51,7 @@ def following(
         return motion
     body = identify(motion.skeleton)
     joints, world = forward_kinematics(motion)
-    head = next(joint for joint in (body.head, body.neck, body.chest) if joint is not None)
+    head = body.head_or_neck
     facing = heading_from_positions(motion.skeleton, joints)
     away = _held(places, known) - joints[:, head]
     seen = quaternion.rotate(quaternion.about_up(-facing), away)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from ..base.vectors import distance_along, unit_vectors
 from ..errors import InputError
 from ..motion.arc_length import ArcLength
@@ -208,4 +209,4 @@ def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Even samples (M, 3) of a polyline about `step` metres apart, and metres (M,) along it."""
     along = distance_along(line)
     even = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step)) + 1, 16))
-    return np.stack([np.interp(even, along, column) for column in line.T], axis=1), even
+    return interpolate(even, along, line), even

@@ -143,12 +143,8 @@ def look_axis(skeleton: Skeleton, rotations: np.ndarray) -> np.ndarray:
     places, world = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
     facing = heading_from_positions(skeleton, places)
     ahead = np.column_stack([np.cos(facing), np.sin(facing), np.zeros(len(facing))])
-    mean = quaternion.rotate(quaternion.inverse(world[:, _head(identify(skeleton))]), ahead).mean(axis=0)
+    mean = quaternion.rotate(quaternion.inverse(world[:, identify(skeleton).head_or_neck]), ahead).mean(axis=0)
     return unit_vector(mean)
-
-
-def _head(body: Humanoid) -> int:
-    return next(joint for joint in (body.head, body.neck, body.chest) if joint is not None)
 
 
 class _Work:
@@ -208,7 +204,7 @@ class _Work:
         """The largest miss while a pin holds; that of a pin outside the motion, or of a part that the body has not,
         is infinite."""
         stays = target([pin], start, self.before.fps, len(self.root)).stays
-        chain = _chains(self.body).get(pin.part, (_head(self.body),))
+        chain = _chains(self.body).get(pin.part, (self.body.head_or_neck,))
         if not stays or None in chain:
             return np.inf
         stay = stays[0]
@@ -351,7 +347,7 @@ class _Part:
 
     def gaze(self, found: Target, look: np.ndarray, whole: bool) -> None:
         """Turns the head so that it looks at the place, with the neck and the chest where the whole body is meant."""
-        head, neck, chest = _head(self.body), self.body.neck, self.body.chest
+        head, neck, chest = self.body.head_or_neck, self.body.neck, self.body.chest
         turn = self._gaze_turn(head, found, look)
         if whole:
             self._turn(chest, _CHEST_SHARE * found.share[:, None] * turn)

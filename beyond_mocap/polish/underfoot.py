@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step_by_powers
+from ..base.time_series import interpolate
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path
 from ..motion.runs import runs
@@ -73,7 +74,7 @@ def path_surface(path: Path, arc: ArcLength, passed: np.ndarray) -> Surface:
 
     def look(s: np.ndarray) -> np.ndarray:
         inside = s % whole if path.closed and whole > 0.0 else np.clip(s, 0.0, whole)
-        return np.stack([np.interp(inside, at, column) for column in table.T], axis=1)
+        return interpolate(inside, at, table)
 
     def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         s = passed[frames].copy()

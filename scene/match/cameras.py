@@ -89,10 +89,7 @@ def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.n
     from ...beyond_mocap.motion.neutral import neutral_stance  # brings scipy, which is slow to import
 
     skeleton = motion.skeleton
-    body, neutral = identify(skeleton), neutral_stance(skeleton, motion)
-    head = next((joint for joint in (body.head, body.neck, body.chest) if joint is not None), None)
-    if head is None:
-        raise InputError("skeleton", "no head, neck or chest", "a person")
+    head, neutral = identify(skeleton).head_or_neck, neutral_stance(skeleton, motion)
     places, world = forward_kinematics(motion)
     face = quaternion.multiply(world[:, head], quaternion.inverse(neutral.rotations[head]))
     scale = neutral.leg / 0.88  # an adult's leg of 1.80 m

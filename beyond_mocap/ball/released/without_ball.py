@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.time_series import interpolate
 from .first_guess import fastest
 from .hand import Hand
 
@@ -196,4 +197,4 @@ def _filled(points: np.ndarray) -> np.ndarray:
     if known.all():
         return points
     at = np.arange(len(points))
-    return np.stack([np.interp(at, at[known], points[known, c]) for c in range(3)], axis=-1)
+    return interpolate(at, at[known], points[known])

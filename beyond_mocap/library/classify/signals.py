@@ -76,7 +76,7 @@ def signals(motion: Motion) -> Signals:
         return np.concatenate([turned_about_up(away, turn), turned_about_up(pace, turn)], axis=-1) / leg
 
     sides = [_points_of(body, limb) for limb in (body.left, body.right)]
-    head = body.head if body.head is not None else body.neck if body.neck is not None else body.chest
+    head = body.head_or_neck
     strikes = _strikes(places, moving, body, head, facing)
     return Signals(motion.fps, len(motion), at, points([body.chest, head]),
                    np.stack([points(one) for one in sides], axis=1),
@@ -92,7 +92,7 @@ def _points_of(body: Humanoid, limb) -> list[int]:
 
 def _trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.ndarray:
     """(T, 8) of `Signals.trunk`."""
-    hips, top = body.hips, body.neck if body.neck is not None else body.chest
+    hips, top = body.hips, body.neck_or_chest
     height = (places[:, hips, 2] - contacts.ground_height(motion)) / leg
     pace = turned_about_up(moving[:, hips], -facing)
     pace = gaussian_filter1d(pace, max(0.05 * motion.fps, 0.5), axis=0, mode="nearest")

@@ -72,7 +72,7 @@ class _Same:
 def _capsules(same: _Same) -> tuple[Capsule, ...]:
     body, size = identify(same.skeleton), stature(same.skeleton) / _TALL
     radius = {part: size * value for part, value in RADII.items()}
-    top = body.neck if body.neck is not None else body.chest
+    top = body.neck_or_chest
     found = [Capsule(body.left.upper_leg, body.right.upper_leg, radius["hips"])]
     if top != body.hips:
         found.append(Capsule(body.hips, top, radius["spine"]))
