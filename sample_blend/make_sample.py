@@ -17,7 +17,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.base.time_series import interpolate  # noqa: E402
+from beyond_mocap.base.time_series import hann_smooth, interpolate  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
@@ -207,9 +207,7 @@ def _profile(rows) -> np.ndarray:
 
 
 def _eased(values: np.ndarray) -> np.ndarray:
-    half = int(0.3 * FPS)
-    window = np.hanning(2 * half + 3)[1:-1]
-    return np.convolve(np.pad(values, half, mode="edge"), window / window.sum(), mode="valid")
+    return hann_smooth(values, int(0.3 * FPS))
 
 
 def _breeze(seconds: float, seed: int) -> np.ndarray:
@@ -326,11 +324,8 @@ def _rounded(rows, times: np.ndarray) -> np.ndarray:
     """A path (N, 2) through waypoints, its corners in space and speed rounded by a Hann window of 1.2 s, twice."""
     table = np.array(rows, dtype=float)
     path = interpolate(times, table[:, 0], table[:, 1:3])
-    half = 60
-    window = np.hanning(2 * half + 3)[1:-1]
     for _ in range(2):
-        padded = np.pad(path, ((half, half), (0, 0)), mode="edge")
-        path = np.stack([np.convolve(padded[:, a], window / window.sum(), mode="valid") for a in (0, 1)], axis=-1)
+        path = np.stack([hann_smooth(column, 60) for column in path.T], axis=-1)
     return path
 
 

@@ -34,6 +34,19 @@ def gaussian_smooth(values: np.ndarray, width: float) -> np.ndarray:
     return np.stack([np.convolve(column, bell / bell.sum(), "valid") for column in held.T], axis=1)
 
 
+def hann_smooth(values: np.ndarray, reach: int) -> np.ndarray:
+    """Values averaged by a Hann window, their ends held.
+
+    Args:
+        values: (T,), any unit.
+        reach: frames of the window to either side.
+    Returns:
+        (T,), that unit.
+    """
+    window = np.hanning(2 * reach + 3)[1:-1]
+    return np.convolve(np.pad(values, reach, mode="edge"), window / window.sum(), mode="valid")
+
+
 def interpolate(at: np.ndarray, times: np.ndarray, values: np.ndarray, outside: float | None = None) -> np.ndarray:
     """Values at other times, linearly between those that are known.
 

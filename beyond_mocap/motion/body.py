@@ -80,7 +80,7 @@ def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.n
 
     Linear blend skinning, as Blender's armature modifier does without volume preservation.
     """
-    origin = _rest_places(skeleton)
+    origin = skeleton.rest_positions
     out = np.zeros((*places.shape[:-2], len(body.vertices), 3))
     for column in range(2):
         joint = body.joints[:, column]
@@ -89,18 +89,9 @@ def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.n
     return out
 
 
-def _rest_places(skeleton: Skeleton) -> np.ndarray:
-    places = np.array(skeleton.offsets)
-    places[0] = 0.0
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            places[joint] = places[parent] + skeleton.offsets[joint]
-    return places
-
-
 def _to_rest(neutral: Neutral, vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """The rest position (V, 3) of vertices (V, 3) of the neutral stance: blend skinning turned round."""
-    origin = _rest_places(neutral.skeleton)
+    origin = neutral.skeleton.rest_positions
     turn = quaternion.to_matrix(neutral.rotations)
     shift = neutral.positions - np.einsum("jab,jb->ja", turn, origin)
     matrix = np.einsum("vc,vcab->vab", weights, turn[joints])

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.time_series import interpolate
+from ..base.time_series import hann_smooth, interpolate
 from . import gait_tables as tables
 from .adult import adult_skeleton
-from .course import Course, GaitStyle, plan, smoothed
+from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, travel
 from .gait_tables import at_speed
 from .gait_trunk import arms, trunk
@@ -208,7 +208,7 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
         need = np.maximum(need, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))
     width = max(int(0.06 / (times[1] - times[0])), 1)
-    return smoothed(_running_max(need, width), width)
+    return hann_smooth(_running_max(need, width), width)
 
 
 def _running_max(values: np.ndarray, width: int) -> np.ndarray:

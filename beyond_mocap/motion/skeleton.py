@@ -85,6 +85,15 @@ class Skeleton:
         )
 
     @property
+    def rest_positions(self) -> np.ndarray:
+        """Where the joints are while none is turned, (J, 3) m from the root."""
+        places = np.zeros((len(self), 3))
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                places[joint] = places[parent] + self.offsets[joint]
+        return places
+
+    @property
     def fingerprint(self) -> str:
         """A short hash of names, parents and offsets to a tenth of a millimetre."""
         parents, offsets = np.array(self.parents, np.int64), np.round(self.offsets * 1e4).astype(np.int64)

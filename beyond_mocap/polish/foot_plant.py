@@ -17,6 +17,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
+from ..base.time_series import hann_smooth
 from ..base.vectors import cross
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
@@ -305,10 +306,7 @@ def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: fl
 
 def spread_over(need: np.ndarray, reach: int) -> np.ndarray:
     """A smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
-    window = np.hanning(2 * reach + 3)[1:-1]
-    widened = maximum_filter1d(need, 2 * reach + 1, mode="nearest")
-    padded = np.pad(widened, reach, mode="edge")
-    return np.convolve(padded, window / window.sum(), mode="valid")
+    return hann_smooth(maximum_filter1d(need, 2 * reach + 1, mode="nearest"), reach)
 
 
 def lacking(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:

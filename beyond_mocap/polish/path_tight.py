@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from ..base.time_series import hann_smooth
 from ..base.vectors import cross_level
 from ..errors import TimedLine
 from ..motion.arctangent import arctan2
@@ -50,8 +51,7 @@ def share(free: np.ndarray, fps: float) -> np.ndarray:
     """(T,) from 0 to 1: how far within the stretches `free` (T,) bool a frame is, smoothly from their borders on."""
     wide = int(round(_FADE * fps))
     inner = minimum_filter1d(free.astype(float), 2 * wide + 1, mode="nearest")
-    window = np.hanning(2 * wide + 3)[1:-1]
-    return np.convolve(np.pad(inner, wide, mode="edge"), window / window.sum(), mode="valid")
+    return hann_smooth(inner, wide)
 
 
 def told(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:

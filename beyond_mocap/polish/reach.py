@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..motion import limb, quaternion
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
+from ..motion.structure import path
 
 # below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
 CLEAR_BEND = 0.06
@@ -105,22 +106,13 @@ def bent_limb(
 def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
     upper, middle, end = joints
     for high, low in ((upper, middle), (middle, end)):
-        if high == low or high not in _ancestors(skeleton, low):
+        if high == low or high not in path(skeleton.parents, low):
             raise InputError("limb", f"{skeleton.names[low]} does not hang below {skeleton.names[high]}", "a chain")
-
-
-def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and those above it, from below."""
-    chain = []
-    while joint >= 0:
-        chain.append(joint)
-        joint = skeleton.parents[joint]
-    return chain
 
 
 def _between(skeleton: Skeleton, high: int, low: int) -> list[int]:
     """Joints from `high` (included) down to `low` (not included)."""
-    chain = _ancestors(skeleton, low)
+    chain = path(skeleton.parents, low)
     return chain[1 : chain.index(high) + 1][::-1]
 
 
