@@ -11,7 +11,7 @@ from . import batch
 from .aim import CLOSE, aim
 from .physics import Ball, length
 
-_TIMES = 28
+_TIMES = 28  # flight times tried, evenly spaced in their logarithm
 _ELEVATIONS = np.radians(np.arange(0.0, 76.0, 5.0))  # above the line to the target
 _SLACK = 1.03  # on a speed, for what lies between elevations
 _LONGEST = 2.0  # times the flight of the slowest launch where there is no air: sqrt(2 far / gravity)

@@ -26,7 +26,7 @@ WORDS = {"foot": "foot", "head": "head", "chest": "chest", "hand": "throw"}
 JOINT_RADIUS = 0.06
 """Metres around a joint that strikes, where it is none of PARTS."""
 
-_SECONDS = 1.0 / 120.0
+_SECONDS = 1.0 / 120.0  # to either side, over which a part's speed is measured
 
 
 @dataclass(frozen=True)

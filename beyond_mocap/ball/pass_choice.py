@@ -31,7 +31,7 @@ from .strike_moments import StrikeMoments, launched_from
 TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Radians by which a body may face beside where its motion sends the ball by itself."""
 
-EIGHTH = 0.25 * np.pi
+EIGHTH = 0.25 * np.pi  # rad: an eighth of a whole turn
 MOST_OPTIONS, MOST_OF_A_HIT, MOST_TIMES = 8, 2, 4
 CHANCE, AGAIN = 0.4, 0.6
 """m/s by which chance tells hit motions apart that are as good, and what each use before by the same player costs."""

@@ -50,8 +50,8 @@ TRUNK_TO = {"head": 1.35, "chest": 0.0}
 UPRIGHT = 1.7
 """Metres up to which a ball stays clear of the body of who strikes it, by what he strikes with, else UPRIGHT."""
 
-A_MOMENT = 1e-3
-_STEPS = 30
+A_MOMENT = 1e-3  # s before a ball arrives at which its speed is read
+_STEPS = 30  # pieces into which a flight is cut
 
 
 def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarray) -> np.ndarray:

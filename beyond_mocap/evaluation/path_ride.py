@@ -16,7 +16,7 @@ from ..motion.motion import Motion, forward_kinematics
 from ..motion.track import zero_phase_hann
 from . import feet, jerk, root
 
-MISSED = 0.005
+MISSED = 0.005  # m beside its target from which a limb counts as not having reached it
 _DENSE = 0.01  # metres between the places of the path that a pelvis is compared with
 _MOVING = 0.3  # m/s below which a body stands, and no speed is kept
 

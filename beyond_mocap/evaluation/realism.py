@@ -15,8 +15,8 @@ from ..motion.humanoid import Humanoid, heading_from_positions
 from ..motion.skeleton import Skeleton
 from .root import nearest_known, speed_class
 
-VELOCITY_SECONDS = 0.12
-_ROWS_AT_ONCE = 512
+VELOCITY_SECONDS = 0.12  # weighs m/s against metres, as `library.features.HORIZON`
+_ROWS_AT_ONCE = 512  # of distances, which bounds the memory
 
 
 def local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:

@@ -13,10 +13,10 @@ from ..base.time_series import interpolate, time_derivative
 from ..base.vectors import unit_vectors
 from ..motion.track import Track, zero_phase_hann
 
-ROOT_WINDOW = 1.5
-TRAVEL_WINDOW = 1.0
-STANDING = 0.5
-SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)
+ROOT_WINDOW = 1.5  # s
+TRAVEL_WINDOW = 1.0  # s
+STANDING = 0.5  # m/s: slower counts as standing
+SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `speed_class`
 
 
 def track_at(track: Track, at: np.ndarray) -> np.ndarray:

@@ -28,10 +28,10 @@ from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import document
 from .whole import beside
 
-_STILL_METRES = 1e-3
-_STILL_ROTATION = np.cos(np.radians(0.1) / 2)
-_LARGEST_METRES = 1e6
-_NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]
+_STILL_METRES = 1e-3  # what moves less is written as still
+_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a turn by a tenth of a degree
+_LARGEST_METRES = 1e6  # larger numbers are a wrong unit or a broken file
+_NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
 
 
 @dataclass(frozen=True)

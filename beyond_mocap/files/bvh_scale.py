@@ -16,11 +16,11 @@ from .bvh_text import POSITIONS, BvhText
 # a file axis -> our axis and the sign of a turn about it; a file with Y up is laid back by a quarter turn about X
 TURNS = {"Y": {"X": (0, 1.0), "Y": (2, 1.0), "Z": (1, -1.0)}, "Z": {"X": (0, 1.0), "Y": (1, 1.0), "Z": (2, 1.0)}}
 _HIP_HEIGHT = (0.75, 1.15)  # metres, adults standing
-_LEG_LENGTH = 0.88
+_LEG_LENGTH = 0.88  # m, an adult's of 1.80 m
 # centimetres, metres, inches, CMU's (1 inch / 0.45 in hundredths of it), millimetres, feet, decimetres
 _USUAL_UNITS = (0.01, 1.0, 0.0254, 0.05644, 0.001, 0.3048, 0.1)
-_UPRIGHT = np.cos(np.radians(35.0))
-_SAMPLES = 64
+_UPRIGHT = np.cos(np.radians(35.0))  # height of a unit vector from the feet to the head of a body that stands
+_SAMPLES = 64  # frames that are looked at
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from ..motion.motion import at_frames, pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 
-HORIZON = 0.12
-ENERGY = 0.98
-SMOOTH_SECONDS = 0.7
+HORIZON = 0.12  # s: weighs m/s and m/s^2 against metres
+ENERGY = 0.98  # share of the variance that the principal components keep
+SMOOTH_SECONDS = 0.7  # Hann window that takes the sway out of the root's path
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,17 +44,17 @@ MADE_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # how names of blends, of kicks and of taken balls begin, below it
 BLENDED, KICKED, TAKEN = "blend_", "kick_", "receive_"
 KICK, TAKE = frozenset({"kick"}), frozenset({"receive", "foot"})
-FPS = 60.0
-FASTEST = 9.4
+FPS = 60.0  # of synthetic clips
+FASTEST = 9.4  # m/s
 # made running begins here, m/s: slower it is left to blends; and taking a ball on the run
 _RUNS_FROM, TAKES_FROM = 2.4, 1.7
 # how far from its own speed a clip is played, and the seconds that have to reach a speed for it not to be a gap
 _WARP = (0.875, 1.125)
-_ENOUGH_SECONDS = 1.5
-_GRID = 1.03
+_ENOUGH_SECONDS = 1.5  # of recording at a speed, above which nothing is added there
+_GRID = 1.03  # ratio of neighbouring speeds
 # speeds of blends and of touches lie so far apart
 _BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
-_PAIRS = 3
+_PAIRS = 3  # of recordings mixed into each gap at most
 _STEADY = 0.15
 _GAITS = ("walking", "jogging", "running", "sprinting")
 # m/s of gaits that no recording shows

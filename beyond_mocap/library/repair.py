@@ -39,9 +39,9 @@ _POP_SECONDS = 0.04  # longer than a pop
 _SLIDES, _SLIDES_SHARE = 0.13, 0.065
 # stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
 _LOW_SECONDS, _DRIFT = 1.5, 0.13
-_FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2
+_FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2  # how slowly the floor's height and the sliding may change
 _FLOOR_MOST = 0.02  # metres of drift that are left alone: no floor is that even, and soles lie a little differently
-_KEEP_SPEED = 0.005
+_KEEP_SPEED = 0.005  # weight of no change of speed against a foot that stands
 _SINKS = 0.10  # metres that a suit's pelvis may be too high above its feet
 _BALL = 0.7  # of the way from ankle to the foot's tip
 

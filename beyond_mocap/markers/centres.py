@@ -22,7 +22,7 @@ from ..motion import quaternion
 from .frames import mean_rotation, rigid_fit
 from .template import LANDMARK_PLACES, PLACES, TIPS
 
-MARKER_RADIUS = 0.007
+MARKER_RADIUS = 0.007  # m
 HALF_WIDTHS = {"knee": 0.052, "ankle": 0.036, "elbow": 0.036}
 """Half the breadth of a joint in metres, of an adult of 1.80 m; a marker's radius comes on top."""
 SIGMAS = {"both": 0.006, "one side": 0.012, "hip": 0.007, "shoulder": 0.015, "alone": 0.02, "trunk": 0.02}

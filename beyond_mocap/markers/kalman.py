@@ -22,7 +22,7 @@ from ..motion import quaternion
 from ..motion.motion import Motion
 from .butterworth import CUTOFF, Filtered, check_numbers, unfit
 
-_ORDER = 3
+_ORDER = 3  # of the difference that is noise: the jerk
 _LEAST_WORTH = 1e-4  # an unseen frame's: the system stays solvable where few are seen
 
 

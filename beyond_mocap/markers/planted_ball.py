@@ -16,7 +16,7 @@ from ..motion import quaternion
 from ..motion.motion import Motion, forward_kinematics
 from .planted_body import adult_share
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # m/s^2
 _GRIP = (0.012, 0.105, -0.036)  # of a left hand in a T-pose: between the fingers, on the palm's side
 _MARKER = (0.25, 0.15, -0.95)  # where the marker sits on a held ball, as seen from its centre
 _FINE = 1e-3  # s between places from which the velocity at release is read, and steps through air

@@ -28,7 +28,7 @@ from .skeleton import Skeleton, frozen_array
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = np.array([0.0, 1.0, 0.0])
-_FRAMES = 400
+_FRAMES = 400  # of an example that are looked at
 _FEW = 3  # fewer frames are a pose that is shown, no recording: a foot that looks flat in it is taken to be flat
 # frames count by the cosine of the trunk's lean to this power: 10 degrees 0.74, 20 degrees 0.29, 45 degrees 0.001
 _UPRIGHT = 20

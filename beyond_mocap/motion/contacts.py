@@ -20,7 +20,7 @@ from .skeleton import Skeleton
 
 _ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once within it
 _SWING_SECONDS = 1.2
-_DIFFERENCE_SECONDS = 1.0 / 60.0
+_DIFFERENCE_SECONDS = 1.0 / 60.0  # to either side, over which a foot's speed is measured
 _LOW = (0.045, 0.06)  # metres above the envelope: to enter, to leave
 _SLOW = (0.15, 0.25)  # metres per second above the envelope: to enter, to leave, where the foot hardly moves
 _SLOW_SHARE = (0.04, 0.08)  # of the swing's speed: to enter, to leave
@@ -28,7 +28,7 @@ _HELD_UP = 0.10  # metres above the other foot's envelope: this foot does not st
 _UPRIGHT = 0.45  # of the leg's length: hips above the foot
 _ANKLE = 0.087  # of the leg's length
 _SHORTEST = 0.04  # seconds of contact
-_SHORTEST_GAP = 0.05
+_SHORTEST_GAP = 0.05  # s; shorter gaps within a stance are closed
 _AT_ZERO = (-0.02, 0.065)  # metres: what toe joints may be over a floor at height 0
 
 

@@ -27,8 +27,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from ..base.easing import quintic_step
 
 LEG = 0.873
-GRAVITY = 9.81
-FASTEST = 9.5
+GRAVITY = 9.81  # m/s^2
+FASTEST = 9.5  # m/s, the tables' last speed
 # walking turns into running here (N: spontaneous change at 1.9 to 2.3 m/s)
 _CHANGE = (1.95, 2.35)
 

@@ -33,7 +33,7 @@ LEANING = np.radians(25.0)
 _MEASURED = 0.05  # seconds over which speeds at the recording's end are taken
 _FASTEST_TURN = 6.0  # radians per second; faster ones are the end of a filter
 _MIDDLE = 0.25  # of the way from hips to neck: the body's middle, which falls freely
-_LONGEST_FALL = 1.5
+_LONGEST_FALL = 1.5  # s
 _SETTLING, _LYING_STILL = 0.4, 0.15  # seconds from touching the ground to turning, and from there to getting up
 _STARTING = 0.4  # seconds in which the way up gathers speed
 _FRICTION = 0.13  # seconds in which a sliding body loses two thirds of its speed
@@ -41,7 +41,7 @@ _CUSHION = 0.05  # metres over which the ground takes the fall up
 _RATES = (11.0, 11.0, 7.0)  # per second: in the air, landing, turning over and getting up
 _HASTE = 1.25  # a player gets up faster than who shows it in a studio
 _LEAD = 0.4  # seconds before the hips rise at which a way of getting up is begun
-_RISEN = 0.04
+_RISEN = 0.04  # m of the hips above where they lay, from which a way up begins
 _SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # metres per second squared of a marker taken for another, near the end
 
 

@@ -40,7 +40,7 @@ _PULL = 1e-3  # of D_j against the bones: decides what bones leave open, and mov
 _SYMMETRIC = 0.1  # squared misfit of the rest pose with its mirror image, over its bones' squared lengths
 _GEOMETRY_WEIGHT = 4.0
 _CHANGE = 3.0  # by how much another D than the parent's has to be better
-_FRAMES = 256
+_FRAMES = 256  # of a motion that are looked at
 
 
 def mirror(motion: Motion) -> Motion:

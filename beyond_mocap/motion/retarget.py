@@ -28,12 +28,12 @@ from .humanoid import Limb
 from .motion import Motion, forward_kinematics, local_rotations
 from .skeleton import Skeleton
 
-_SOFT = 0.01
+_SOFT = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
 _CARRIED_BY = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower_arm", "toe": "foot"}
 # two rigs are the same, axes and all, when their bones point the same way in their rest pose within this angle
 _SAME_RIG = np.cos(np.radians(12.0))
-_TRUNK_ROUNDS = 3
+_TRUNK_ROUNDS = 3  # of turning the trunk and seeing what is left
 _UP = np.array([0.0, 0.0, 1.0])
 
 

@@ -28,10 +28,10 @@ from .neutral import Neutral, neutral_stance
 from .posture import Posture, to_motion
 from .skeleton import Skeleton
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # m/s^2
 BEFORE, AFTER = 1.6, 1.2
 """Seconds of a hard throw before and after release; slower ones take longer."""
-SLOWEST, FASTEST = 3.0, 45.0
+SLOWEST, FASTEST = 3.0, 45.0  # m/s at release
 _PLAN = 480.0  # frames a second at which a throw is planned
 _ROUND = 0.007  # s over which corners of the tables are rounded
 _EARLIEST, _LATEST = -0.022, 0.022  # s around the table's release within which the ball may leave

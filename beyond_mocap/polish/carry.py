@@ -32,8 +32,8 @@ more."""
 MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}
 """Radians that the whole limb turns about its hip or shoulder at most."""
 
-SOFT = 0.003
-_DAMPING = 1e-3
+SOFT = 0.003  # m below full length from where a limb eases
+_DAMPING = 1e-3  # keeps the bend of a spine small where it moves the part little
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,7 @@ in the air: a leg that is nearly straight pops at the knee. A leg that was strai
 LEAST_EASE, LEAST_SPARE = 0.003, 0.002
 """The same of legs that were straight in the recording."""
 
-_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004
+_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004  # rounds of holding stances less firmly; m of sliding that need none
 _BEHIND = 3  # frames at 30 per second by which a rise or drop is spread
 
 

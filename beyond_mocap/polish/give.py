@@ -15,7 +15,7 @@ from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from .foot_plant import firmness
 
-GIVE = 0.1
+GIVE = 0.1  # weight of a standing foot's movement
 STIFF = (2.0, 0.2)
 STAY = (0.02, 5e-4)
 """Weights of the third difference and of the whole, for metres of the root and for radians of facing."""

@@ -18,13 +18,13 @@ BALL_SECONDS = 0.3
 """Seconds before and after a key moment over which the ball's shift grows and fades."""
 
 _SLACK = 0.06  # metres that the ball may be above or below where the part would strike it squarely
-_ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])
+_ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])  # about the vertical, tried
 _ALONG = (0.5, 0.2, 0.8)
 _ANGLE_COST = 0.08  # metres of moved foot that a radian off the part's own direction is worth,
 _ALONG_COST = 0.1  # that the other end of the foot is,
 _INSIDE_COST = 15.0  # a metre of ball within the other leg,
 _MISS_COST = 3.0  # and a metre that the part cannot be moved
-_GRAVITY = 9.81
+_GRAVITY = 9.81  # m/s^2
 _ON_GROUND = 0.02  # metres above its radius
 
 Line = tuple[np.ndarray, np.ndarray]

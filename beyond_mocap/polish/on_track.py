@@ -14,7 +14,7 @@ from ..motion.arctangent import arctan2
 from ..motion.runs import runs
 from ..motion.track import zero_phase_hann
 
-TURN_WEIGHT = 12.0
+TURN_WEIGHT = 12.0  # of the recording's own turning per frame, against the direction of travel
 OFF_THE_FEET = 40.0
 """How many times firmer the recording's own turning is followed by who flies, lies or kneels and so cannot turn at
 will."""
@@ -31,7 +31,7 @@ FAINT, AIM = 1e-4, 0.004
 HOLD = 1e6
 """Weight of a facing that is given: so much more than all else that it stays."""
 
-ROOT_WINDOW = 1.5
+ROOT_WINDOW = 1.5  # s, the window within which the root keeps to the track
 
 
 def facing(

@@ -25,7 +25,7 @@ CLEAR = 0.25
 
 _FULL, _POWER, _MOST = 0.5, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
 _STIFF, _TIGHT = 0.1, 0.03  # seconds: of the heading's smoothness, and beyond which a gap is crossed in a straight line
-_STILL = 0.01
+_STILL = 0.01  # m/s: a path passed slower has no heading
 _COMES, _SURELY = 1.0, 0.6  # seconds; m/s above which speed alone counts
 
 

@@ -37,8 +37,8 @@ MOST_YAW, MOST_PITCH = np.radians(100.0), np.radians(55.0)
 STRETCH = 0.985
 """Share of a limb's length up to which it reaches by itself."""
 
-_SOFT, _SOFT_LACK = 0.004, 0.02
-_CHEST_SHARE, _NECK_SHARE = 0.15, 0.35
+_SOFT, _SOFT_LACK = 0.004, 0.02  # m over which limbs ease at full length, and over which the body begins to go along
+_CHEST_SHARE, _NECK_SHARE = 0.15, 0.35  # of a look's turn; the head has the rest
 _GLIDE = 2.0  # frames in which a limb that leaves a pin takes up the body's speed
 _MOVED = 0.02  # m that the pelvis is moved where its feet are wholly held by reaching
 _NEAR = 0.01  # m by which a foot may be moved and still counts as standing

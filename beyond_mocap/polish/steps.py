@@ -175,7 +175,7 @@ class _Foot:
         new.points[at] = new._between(self.points, at)
         new.middle[at] = new.points[at].mean(axis=1)
         own = self.yaw[[before, behind]] - self.heading[[before, behind]]
-        change = (own[1] - own[0] + np.pi) % (2.0 * np.pi) - np.pi
+        change = quaternion.wrapped(own[1] - own[0])
         new.yaw[end:] += own[0] + change - own[1]
         new.yaw[at] = self.heading[at] + own[0] + through * change
         return new

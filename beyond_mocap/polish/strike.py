@@ -36,10 +36,10 @@ is."""
 OUT_OF_REACH = 0.15
 """Metres of gap that would be left, above which the body does not try, and plays as recorded."""
 
-MOST_DROP = 0.04
-_LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12
+MOST_DROP = 0.04  # m
+_LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body goes over
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
-_IN_THE_AIR = 0.2
+_IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
 _STOPPING = {"receive", "trap", "catch", "catchb"}
 _HIGH = {"high", "volley", "bicycle"}

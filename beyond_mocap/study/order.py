@@ -19,8 +19,8 @@ TRAINING = "training"
 """In place of a system: this clip comes first and does not count."""
 MOST_RATERS, MOST_CLIPS = 1000, 500
 _LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, no words; nothing that looks like something else
-_LONG = 4
-_TRIES = 200
+_LONG = 4  # letters of a clip's name
+_TRIES = 200  # random orders tried until one is new
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from .flights import flown
 from .path import BallPiece, SolvedPath
 from .samples import Samples, read_samples
 
-PITCH = (105.0, 68.0)
+PITCH = (105.0, 68.0)  # m, the standard pitch
 _GAP = 1.5  # s without a sample, over which nothing is solved
 _SHORTEST, _FEWEST = 0.3, 5  # s that are solved where there are longer stretches; samples that can be
 _TOGETHER = 0.06  # s in which samples err together: they count as one

@@ -15,14 +15,14 @@ from ...base.time_series import interpolate
 from ...errors import InputError
 from .data import Track
 
-HZ = 25.0
+HZ = 25.0  # samples a second of a track from a drawn line
 FASTEST = 12.0
 """Metres per second beyond which nobody runs."""
 
 SHORTEST = 0.2
 """Metres that a drawn line has at least."""
 
-LONGEST_SECONDS = 3600.0
+LONGEST_SECONDS = 3600.0  # a slower track is a mistake, and would take the memory
 
 
 def along(

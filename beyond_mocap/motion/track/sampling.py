@@ -21,8 +21,8 @@ LONG_GAP = 1.0
 MOVING_SPEED = 0.5
 """m/s; below it a direction of travel is mostly noise."""
 
-_TURN_SECONDS = 0.5
-_LONGEST = 6 * 3600.0
+_TURN_SECONDS = 0.5  # in which one who stood turns before setting off
+_LONGEST = 6 * 3600.0  # s
 
 
 def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> SampledTrack:

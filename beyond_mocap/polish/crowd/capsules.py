@@ -32,7 +32,7 @@ RADII = {
 FAR = 2.5
 """Metres between the middles of two bodies' hips from which on they cannot touch."""
 
-_TALL = 1.80
+_TALL = 1.80  # m, the body for which radii are given
 
 
 @dataclass(frozen=True)

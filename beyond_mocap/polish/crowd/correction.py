@@ -28,7 +28,7 @@ CURVES = 12
 UNIT = 1e-4
 """Metres and radians that a kept 1 stands for."""
 
-KNOT_SECONDS = 0.1
+KNOT_SECONDS = 0.1  # between the knots of a correction
 _NOTHING = 5e-4  # m and rad below which a curve changes nothing that anybody sees
 
 

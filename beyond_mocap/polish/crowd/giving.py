@@ -32,7 +32,7 @@ BASE = 30.0
 
 _SHORT_ARM = 0.08  # m from the shoulder's axis below which turning an arm brings nothing away
 _UPRIGHT = 0.35  # least share of a push that goes over the ground
-_HELD = 1e6
+_HELD = 1e6  # weight that holds a value: far above all others
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,8 +29,8 @@ STEADY = 30.0
 """How much firmer who touches the ball keeps his way."""
 
 _TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s over which directions are smoothed at first
-_ROUNDS, _STEP = 24, 0.5
-_HELD = 1e6
+_ROUNDS, _STEP = 24, 0.5  # directions turn as bodies part, so shifts go half of the way each round
+_HELD = 1e6  # weight that holds a value: far above all others
 
 
 def spaced(

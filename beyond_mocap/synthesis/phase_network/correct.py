@@ -17,7 +17,7 @@ _SKEW = np.zeros((3, 9))  # a vector -> the matrix of the cross product with it
 _SKEW[[0, 1, 2], [7, 2, 3]], _SKEW[[0, 1, 2], [5, 6, 1]] = 1.0, -1.0
 _EYE = np.eye(3)
 _STRAIGHT = 0.03  # weight of the given hinge against the sine of the bend that the limb shows itself
-_TINY = 1e-12
+_TINY = 1e-12  # m^2: roots keep a finite derivative at zero
 
 
 def toward(predicted, wanted, share):

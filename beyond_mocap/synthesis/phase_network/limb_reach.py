@@ -14,7 +14,7 @@ from .limits import JointLimits
 
 _STRETCH = 0.995  # share of a limb's length beyond which the body goes along
 _MOST = 0.05  # metres that it goes in one frame
-_ROUNDS = 4
+_ROUNDS = 4  # of moving the body towards what limbs do not reach
 
 
 def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:

@@ -26,9 +26,9 @@ from ...motion.skeleton import Skeleton, frozen_array
 
 FREE = 4.0
 """Radians: offsets never get so long, so a joint with this range is free."""
-_MARGIN = np.radians(10.0)
+_MARGIN = np.radians(10.0)  # beyond what the data show, on either side
 _SHARE = 0.08  # of the range, on either side
-_ROUNDS = 8
+_ROUNDS = 8  # steps to a mean rotation and to the middle of a range
 _CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
 _BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
 _OFF = 1e-9  # radians
