@@ -8,8 +8,7 @@ import pytest
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify, leg_length
-from beyond_mocap.motion.motion import place, pose_kinematics
-from beyond_mocap.motion.motion import local_rotations
+from beyond_mocap.motion.motion import local_rotations, place, pose_kinematics
 from beyond_mocap.motion.neutral import neutral_stance
 from beyond_mocap.polish.foot_plant import MOST_DROP, plant, shift
 from beyond_mocap.polish.reach import two_bone
