@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from .annotation import Timeline, automatic_gaits
 from .annotation.gaze import wanted_offset
@@ -22,6 +21,8 @@ from .ball.contact import WORDS, striking_surface
 from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.way import Placed, needed, placed, way
+from .base.easing import smoothstep
+from .base.time_series import interpolate
 from .errors import InputError, told_time
 from .lay_out import faced, footed, smoothed
 from .library.automatic import automatic_words
@@ -34,7 +35,7 @@ from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
 from .plan import Plan
 from .polish.gaze import CHEST, following
-from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
+from .polish.on_track import STANDS, follow_turning, root_with_sway
 from .polish.strike import Touch
 from .polish.strike_at import Meeting, Met, met_at
 from .synthesis.footage import Footage, fetch
@@ -150,7 +151,7 @@ class _Body:
         self.start = float(ball.times[0])
         self.hits = placed(library, orders, self.start)
         self.times = self.start + np.arange(count) / fps
-        self.ball = np.stack([np.interp(self.times, ball.times, column) for column in ball.positions.T], axis=1)
+        self.ball = interpolate(self.times, ball.times, ball.positions)
 
     def made(self, progress, cancelled) -> PlayerMotion:
         report = progress or (lambda fraction, text: None)
@@ -218,7 +219,7 @@ class _Body:
         """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""
         path = way(self.stance, self.hits, times)
         velocity = np.gradient(path.positions, 1.0 / fps, axis=0)
-        ball = np.stack([np.interp(times, self.times, column) for column in self.ball.T], axis=1)
+        ball = interpolate(times, self.times, self.ball)
         track = SampledTrack(
             times=times, positions=path.positions, raw=path.positions, velocity=velocity,
             speed=np.linalg.norm(velocity, axis=1), direction=travel_direction(velocity, fps),
@@ -249,7 +250,7 @@ class _Body:
         goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
         given = np.isfinite(kept)
         goal, trust = np.where(given, kept, goal), np.where(given, 1e6, trust)
-        return _followed(goal, trust, shown.turn)
+        return follow_turning(goal, trust, shown.turn)
 
     def _touches(self) -> list[Touch]:
         """The hit motions as stretches in which no steps are added."""
@@ -273,7 +274,7 @@ class _Body:
         for hit in self.hits:
             outside = np.maximum(hit.start - self.times, self.times - hit.end)
             arms *= np.clip(outside / OWN_HEAD, 0.0, 1.0)
-        share, arms = (x * x * (3.0 - 2.0 * x) for x in (share, arms))
+        share, arms = smoothstep(share), smoothstep(arms)
         return following(body, self.ball, look_of(self.library), share, CHEST * arms)
 
     def _meetings(self) -> list[Meeting]:
@@ -299,19 +300,6 @@ class _Body:
             if gap > 0.005:
                 told.append(f"{order.time:.2f} s: the {order.part} is {100.0 * gap:.1f} cm off the ball")
         return tuple(told)
-
-
-def _followed(goal: np.ndarray, trust: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(T,) rad: least squares of sum trust (a - goal)^2 + TURN_WEIGHT (a' - turn)^2, goals without jumps of whole
-    turns."""
-    diagonal, right = trust.copy(), trust * goal
-    diagonal[1:] += TURN_WEIGHT
-    diagonal[:-1] += TURN_WEIGHT
-    right[1:] += TURN_WEIGHT * turn[1:]
-    right[:-1] -= TURN_WEIGHT * turn[1:]
-    band = np.zeros((2, len(goal)))
-    band[0], band[1, :-1] = diagonal, -TURN_WEIGHT
-    return solveh_banded(band, right, lower=True) if len(goal) > 1 else goal
 
 
 def _with_sources(take: Take, library: Library, shown: Footage) -> Take:

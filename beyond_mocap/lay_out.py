@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .annotation.gaze import wanted_offset
+from .base.vectors import unit_vectors
 from .library.library import Library
 from .motion import quaternion
 from .motion.humanoid import identify
@@ -131,7 +132,7 @@ def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
     top = body.neck if body.neck is not None else body.chest
     places, _ = pose_kinematics(library.skeleton, np.zeros((len(pose), 3)), pose)
     torso = places[:, top] - places[:, body.hips]
-    return torso / np.maximum(np.linalg.norm(torso, axis=1, keepdims=True), 1e-9)
+    return unit_vectors(torso)
 
 
 def faced(pose: np.ndarray, angle: np.ndarray) -> np.ndarray:

@@ -21,16 +21,17 @@ from ..motion import quaternion
 from ..motion.humanoid import Humanoid, heading
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
+from ..motion.structure import below
 from . import bvh_scale, bvh_text
 from .bvh_form import BvhForm, RootAbove
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import document
 from .whole import beside
 
-_STILL_METRES = 1e-3
-_STILL_ROTATION = np.cos(np.radians(0.1) / 2)
-_LARGEST_METRES = 1e6
-_NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]
+_STILL_METRES = 1e-3  # what moves less is written as still
+_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a turn by a tenth of a degree
+_LARGEST_METRES = 1e6  # larger numbers are a wrong unit or a broken file
+_NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def read(path, unit: float | None = None) -> BvhClip:
     scale = bvh_scale.guess(text, unit)
     channels = _Channels(text, scale)
     hips = _top_of_body(text, scale.body)
-    kept = _below(text.parents, hips)
+    kept = below(text.parents, hips)
     root, root_rotations, above = _folded(channels, hips)
     skeleton, drift = _skeleton(channels, kept)
     rotations = np.stack([root_rotations.T] + [channels.rotation(joint) for joint in kept[1:]])
@@ -97,7 +98,7 @@ class BvhRows:
         self.scale = bvh_scale.guess(text, unit)
         channels = _Channels(text, self.scale)
         self.hips = _top_of_body(text, self.scale.body)
-        self.kept = _below(text.parents, self.hips)
+        self.kept = below(text.parents, self.hips)
         self.skeleton = _skeleton(channels, self.kept)[0]
 
     def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -138,17 +139,8 @@ def _top_of_body(text: BvhText, body: Humanoid | None) -> int:
     """The joint that becomes the root: the hips where both legs hang on them, else the file's root."""
     if body is None:
         return 0
-    below = set(_below(text.parents, body.hips))
-    return body.hips if {body.left.upper_leg, body.right.upper_leg} <= below else 0
-
-
-def _below(parents: tuple[int, ...], top: int) -> list[int]:
-    """`top` and every joint that hangs on it, in file order."""
-    below = {top}
-    for joint, parent in enumerate(parents):
-        if parent in below:
-            below.add(joint)
-    return sorted(below)
+    hanging = set(below(text.parents, body.hips))
+    return body.hips if {body.left.upper_leg, body.right.upper_leg} <= hanging else 0
 
 
 def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[RootAbove, ...]]:

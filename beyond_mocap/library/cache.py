@@ -7,7 +7,6 @@ processes that build at once do no harm: the later one wins with the same conten
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import tempfile
@@ -17,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import ClipAnnotation
+from ..base.digest import byte_digest
 from ..errors import InputError
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
@@ -36,14 +36,14 @@ _FRAME_ARRAYS = (
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
     """A hash of names and contents of all files that a build reads, the options, and this file's VERSION."""
-    digest = hashlib.blake2b(json.dumps([VERSION, str(np.__version__), options], sort_keys=True).encode())
+    parts = [json.dumps([VERSION, str(np.__version__), options], sort_keys=True)]
     for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
-        digest.update(os.fsencode(os.path.relpath(path, folder)) + b"\0")
+        parts.append(os.fsencode(os.path.relpath(path, folder)) + b"\0")
         try:
-            digest.update(hashlib.blake2b(Path(path).read_bytes()).digest())
+            parts.append(byte_digest(Path(path).read_bytes(), size=64))
         except OSError:
-            digest.update(b"unreadable")
-    return digest.hexdigest()[:32]
+            parts.append(b"unreadable")
+    return byte_digest(*parts, size=64).hex()[:32]
 
 
 def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
@@ -62,7 +62,7 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
 
 def own_folder(base: Path, folder: Path) -> Path:
     """The folder below `base` in which the library of `folder` is kept apart from all others."""
-    return base / hashlib.blake2b(str(folder.absolute()).encode()).hexdigest()[:16]
+    return base / byte_digest(str(folder.absolute()), size=64).hex()[:16]
 
 
 def save(place: Path, key: str, library, name: str = "library") -> bool:

@@ -26,7 +26,7 @@ from ..motion import contacts, quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
-from ..motion.runs import runs
+from ..motion.runs import equal_runs, runs
 from ..motion.striking import surfaces
 from .library import Library
 from .proposal import Proposal
@@ -93,7 +93,7 @@ class _Seen:
         body = identify(motion.skeleton)
         places, world = forward_kinematics(motion)
         path = _velocity(places[:, body.hips, :2], motion.fps, _GAIT_SECONDS / 4.0)
-        trunk = places[:, body.neck if body.neck is not None else body.chest] - places[:, body.hips]
+        trunk = places[:, body.neck_or_chest] - places[:, body.hips]
         upright = trunk[:, 2] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9)
         facing = np.unwrap(heading_from_positions(motion.skeleton, places))
         floor = contacts.ground_height(motion)
@@ -125,9 +125,8 @@ def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
     quarter = without_short_runs(np.round(off / (np.pi / 2.0)).astype(int) % 4, int(_SHORTEST * fps))
     way = np.where(np.array([words[g] == "standing" for g in gait]), -1, quarter)
     kind = without_short_runs(gait * 5 + way + 1, int(_SHORTEST * fps))
-    edges = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
     out = []
-    for start, stop in zip(edges, edges[1:]):
+    for start, stop in equal_runs(kind):
         number, facing = divmod(int(kind[start]), 5)
         said = (words[number],) if facing == 0 else (words[number], _WAYS[facing - 1])
         speed = float(seen.speed[start:stop].mean())

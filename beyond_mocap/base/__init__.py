@@ -1,0 +1,1 @@
+"""The base: errors, small numerics and the settings table that every room uses."""
