@@ -33,6 +33,7 @@ from .motion.motion import Motion
 from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
 from .plan import Plan
+from .resolve_plan import resolve_plan
 from .polish.gaze import CHEST, following
 from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
 from .polish.strike import Touch
@@ -164,7 +165,8 @@ class _Body:
         index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
         raw = fetch(self.library, edit, index, self.fps)
         track, path = self._track(self.times, self.fps)
-        plan = self._plan(track)
+        asked = self._plan(track)
+        plan = resolve_plan(asked, self.library)
         report(0.75, "Laying out")
         shown = smoothed(self.library, plan, raw)
         angle = self._angle(track, path.facing, shown)
@@ -182,7 +184,7 @@ class _Body:
             words=words_shown(self.library, raw), contacts=taken.contacts, seams=raw.seams, timeline=Timeline(),
             keys=(), ball=BallPath(self.times, self.ball, np.ones(len(self.times), bool)), method="path",
             seed=self.settings.seed, correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped,
-            plan=plan, edit=edit,
+            plan=asked, edit=edit,
         )
         report(1.0, "Done")
         return PlayerMotion(

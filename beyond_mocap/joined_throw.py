@@ -40,17 +40,20 @@ from .motion.retarget import Retargeter
 from .motion.skeleton import Skeleton
 from .motion.track import Track, zero_phase_hann
 from .lay_out import aimed, faced, footed, leaning, smoothed, touches
-from .own_size import in_library_size, size_of
+from .known_touches import solve_touches
 from .plan import Plan
 from .polish.carry import Body, Resting, leg, limb_carried
 from .polish.meeting import eased
 from .polish.stepped_over import stepped_over
 from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
+from .resolve_plan import resolve_plan
 from .synthesis.balance import balanced
 from .synthesis.footage import fetch
 from .synthesis.path_search import PathSearch
-from .synthesis.wanted import wanted
-from .synthesize import key_result, with_made_gaits
+from .synthesis.resolved_plan import ResolvedPlan
+from .synthesis.search_library import search_library
+from .synthesis.wanted import build_order
+from .synthesize import key_result
 
 FADE = 0.5
 """Seconds in which a throw goes over into what surrounds it, at either end."""
@@ -208,15 +211,15 @@ def run_up_and_recovery(
             "throw", f"from {begin:.2f} to {finish:.2f} s", f"within the track, {times[0]:.2f} to {times[-1]:.2f} s",
             "choose another time, or a longer track",
         )
-    plain, told = _led(plan, throw, release, at, action)
-    size = size_of(plan, library.skeleton)
+    led, told = _led(solve_touches(plan), throw, release, at, action)
+    plain = resolve_plan(led, library, touches_solved=True)
+    size = plain.size
     bones = library.skeleton.scaled(size)
     same = throw.skeleton.same_bones(bones, 1e-5)
     own = throw if same else Retargeter(throw, bones, keeps_travel=True).carry(throw)
     own = Motion(library.skeleton, own.root_positions / size, own.rotations, own.fps)
-    plain = in_library_size(plain, size)
     report = progress or (lambda done, text: None)
-    more = with_clip(with_made_gaits(library, plain, report), own, release, action)
+    more = with_clip(search_library(library, plain, report), own, release, action)
     with threadpool_limits(limits=1):
         found = _Way(more, plain, own, at - release, report, cancelled, between).gone()
     motion = Motion(bones, found.root * size, found.rotations, plan.fps)
@@ -228,18 +231,18 @@ def run_up_and_recovery(
 class _Way:
     """A player on his way through a throw, which is the last clip of the library and begins at second `begin`."""
 
-    def __init__(self, library: Library, plan: Plan, throw: Motion, begin: float, report, cancelled, between):
+    def __init__(self, library: Library, plan: ResolvedPlan, throw: Motion, begin: float, report, cancelled, between):
         self.library, self.plan, self.throw, self.begin, self.between = library, plan, throw, begin, between
         self.report, self.cancelled = report, cancelled
 
     def gone(self) -> _Gone:
         """The body laid on the track, feet planted; in the throw it faces as the throw does."""
         library, plan = self.library, self.plan
-        order = wanted(library, plan)
+        order = build_order(library, plan)
         keys = tuple(replace(key, rates=(1.0,)) if OWN_WORD in key.asked.words else key for key in order.keys)
         order = replace(order, keys=keys)
         edit = PathSearch(
-            library, order, balanced(plan.alpha), lambda done, text: self.report(0.8 * done, text), self.cancelled
+            library, order, balanced(plan.asked.alpha), lambda done, text: self.report(0.8 * done, text), self.cancelled
         ).run()
         self.report(0.8, "Laying out")
         track = plan.sampled(plan.fps)
@@ -250,7 +253,7 @@ class _Way:
         shown = smoothed(library, plan, footage)
         angle = self._facing(track, shown)
         ground = root_with_sway(track.positions, shown.sway, angle)
-        ground = pulled_to_track(ground, track.raw, plan.fps, plan.root_window)
+        ground = pulled_to_track(ground, track.raw, plan.fps, plan.asked.root_window)
         pose = leaning(library, plan, track, shown, faced(shown.pose, angle))
         root = np.column_stack([ground, shown.height])
         planted, _ = footed(library, plan, track, root, pose, shown.standing, strikes)

@@ -17,8 +17,7 @@ from .motion.humanoid import identify
 from .motion.motion import pose_kinematics
 from .motion.striking import striking_part
 from .motion.track import SampledTrack
-from .own_size import real_ball, size_of
-from .plan import Plan
+from .own_size import real_ball
 from .polish.banking import banked, missing_lean
 from .polish.cross_fade import faded_rotations, faded_values, share
 from .polish.face_ball import turned_to_ball
@@ -32,6 +31,7 @@ from .polish.strike import Struck, Touch, strike
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, overlap
 from .synthesis.locomotion import travelled_distance
+from .synthesis.resolved_plan import ResolvedPlan
 from .synthesis.wanted import needed
 from .take import KeyResult
 
@@ -40,10 +40,10 @@ OTHERWISE = 0.4
 back."""
 
 
-def smoothed(library: Library, plan: Plan, footage: Footage) -> Footage:
+def smoothed(library: Library, plan: ResolvedPlan, footage: Footage) -> Footage:
     """The footage without jumps at its seams: faded over by what both recordings show or, by Faustino's methods, spread
     as he does. A fade is half as long as his window."""
-    reach = 0.5 * plan.seam_window * plan.fps
+    reach = 0.5 * plan.asked.seam_window * plan.fps
     if plan.method != "path":
         return _spread(footage, reach)
     over = overlap(library, footage, 0.5 * reach)
@@ -66,14 +66,14 @@ def _spread(footage: Footage, reach: float) -> Footage:
 
 
 def on_track(
-    library: Library, plan: Plan, track: SampledTrack, footage: Footage, strikes: list[Touch]
+    library: Library, plan: ResolvedPlan, track: SampledTrack, footage: Footage, strikes: list[Touch]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Facing (T,) radians and root (T, 2) m at the track's place at every time; facing the ball at `strikes`."""
     firm = firmness(footage.standing, footage.height, plan.fps)
     angle = facing(track.direction, track.speed, footage.velocity, footage.turn, firm=firm, aim=aimed(track))
     angle = angle + towards_ball(library, track, footage, angle, strikes)
     root = root_with_sway(track.positions, footage.sway, angle)
-    return angle, pulled_to_track(root, track.raw, plan.fps, plan.root_window)
+    return angle, pulled_to_track(root, track.raw, plan.fps, plan.asked.root_window)
 
 
 def aimed(track: SampledTrack) -> np.ndarray:
@@ -141,14 +141,14 @@ def faced(pose: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return out
 
 
-def leaning(library: Library, plan: Plan, track: SampledTrack, footage: Footage, pose: np.ndarray) -> np.ndarray:
+def leaning(library: Library, plan: ResolvedPlan, track: SampledTrack, footage: Footage, pose: np.ndarray) -> np.ndarray:
     """Local rotations (T, J, 4) of a body that leans into the track's curves as far as its footage does not."""
     lean = missing_lean(track.speed, track.direction, footage.velocity, footage.turn, footage.seams, plan.fps)
     return banked(library.skeleton, pose, track.direction, lean)
 
 
 def footed(
-    library: Library, plan: Plan, track: SampledTrack, root, pose, standing: np.ndarray, strikes: list[Touch],
+    library: Library, plan: ResolvedPlan, track: SampledTrack, root, pose, standing: np.ndarray, strikes: list[Touch],
     share=0.0, stepped: np.ndarray | None = None,
 ) -> tuple[Planted, Steps]:
     """A body laid on its track with its feet held where they stand, or stepping where they would be dragged.
@@ -166,17 +166,17 @@ def footed(
     return plant(library.skeleton, root, pose, taken.standing, plan.fps, moves=taken.moves), taken
 
 
-def given(library: Library, plan: Plan, track: SampledTrack, root, pose, standing: np.ndarray, free=1.0):
+def given(library: Library, plan: ResolvedPlan, track: SampledTrack, root, pose, standing: np.ndarray, free=1.0):
     """Root (T, 3) m and local rotations (T, J, 4) of a body laid on its track that gives where its feet would slide,
     where it is `free` (T,) to: 1, or nothing at 0."""
     move, turn = give(library.skeleton, root, pose, standing, plan.fps)
-    pulled = pulled_to_track(root[:, :2] + move, track.raw, plan.fps, plan.root_window)
+    pulled = pulled_to_track(root[:, :2] + move, track.raw, plan.fps, plan.asked.root_window)
     free = np.broadcast_to(free, len(root))
     ground = root[:, :2] + free[:, None] * (pulled - root[:, :2])
     return np.concatenate([ground, root[:, 2:]], axis=1), faced(pose, free * turn)
 
 
-def touches(library: Library, plan: Plan, edit: EditList, keys: tuple[KeyResult, ...]) -> list[Touch]:
+def touches(library: Library, plan: ResolvedPlan, edit: EditList, keys: tuple[KeyResult, ...]) -> list[Touch]:
     """Where the body may meet the ball: every key moment that is played, and every one for which the library has no
     clip at all, so that something else is shown: there the asked part of that comes to the ball if it is near enough
     (a runner's head to a header)."""
@@ -194,12 +194,12 @@ def touches(library: Library, plan: Plan, edit: EditList, keys: tuple[KeyResult,
     return found
 
 
-def met(library, plan: Plan, track: SampledTrack, standing: np.ndarray, planted: Planted, found: list[Touch]) -> Struck:
+def met(library, plan: ResolvedPlan, track: SampledTrack, standing: np.ndarray, planted: Planted, found: list[Touch]) -> Struck:
     """The motion and the ball with the striking part of the body on the ball at every touch that was found; standing
     (T, 2, 2) bool."""
     known = plan.track.ball_height_known
     height = np.interp(track.times, plan.track.times, known.astype(float)) > 0.5
-    size = size_of(plan, library.skeleton)
+    size = plan.size
     skeleton, root, ball = library.skeleton, planted.root, track.ball
     if size != 1.0:  # the ball is as large for a tall player as for a short one
         skeleton, root, ball = skeleton.scaled(size), root * size, real_ball(ball, size)

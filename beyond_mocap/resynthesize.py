@@ -14,20 +14,19 @@ continuous.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .errors import InputError, told_time
-from .known_touches import in_force
 from .lay_out import aimed, faced, footed, leaning, met, smoothed, touches, towards_ball
 from .library.library import Library
 from .motion import quaternion
 from .motion.motion import Motion
 from .motion.track import SampledTrack
 from .motion.track.sampling import MOVING_SPEED
-from .own_size import in_library_size, size_of, taken_in_library_size
+from .own_size import taken_in_library_size
 from .plan import Plan
 from .polish.hand_over import handed_over, old_share
 from .polish.meeting import eased
@@ -36,17 +35,18 @@ from .polish.foot_plant import Planted
 from .polish.smoothing import reaches
 from .polish.steps import Steps
 from .polish.strike import Touch
+from .resolve_plan import resolve_plan
 from .synthesis.balance import balanced
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch, shown
 from .synthesis.offer import SLOT
 from .synthesis.path_search import Between, PathSearch
+from .synthesis.resolved_plan import ResolvedPlan
+from .synthesis.search_library import search_library
 from .synthesis.touched import Stretch, asked_anew, joined, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.used import Used, used_in
-from .synthesis.wanted import Wanted, wanted
-from .synthesize import (
-    Progress, finished, key_result, sources_shown, synthesize, with_made_gaits, words_shown,
-)
+from .synthesis.wanted import Wanted, build_order
+from .synthesize import Progress, finished, key_result, sources_shown, synthesize, words_shown
 from .take import BallPath, KeyResult, Take
 
 HAND_OVER = 0.5
@@ -94,18 +94,18 @@ def resynthesize(
     report = progress or (lambda fraction, text: None)
     if anew is not None:
         _check(plan, before, anew)
+    asking = {"cancelled": cancelled, "hurry": hurry}
     with threadpool_limits(limits=1):
         comparable = _comparable(plan, before)
-        taken = _edited(library, plan, before, report, cancelled, hurry, anew) if comparable else None
+        taken = _edited(library, plan, before, report, **asking, anew=anew) if comparable else None
     used = anew.used if anew is not None else ()
-    return synthesize(library, plan, progress, cancelled, hurry, used) if taken is None else taken
+    return synthesize(library, plan, progress, **asking, used=used) if taken is None else taken
 
 
 def shown_footage(library: Library, take: Take, start: float, end: float) -> tuple[Used, ...]:
     """The footage that a take of method "path" shows from second `start` to second `end`, for `Anew`; nothing where the
     take was made from another library."""
-    take = taken_in_library_size(take, size_of(take.plan, library.skeleton))
-    library = _library_of_both(library, take.plan, take, lambda fraction, text: None)
+    library = search_library(library, resolve_plan(take.plan, library, course=take.solved))
     if take.edit is None or not _made_from(library, take, len(take.edit)):
         return ()
     first, last = (int(round((second - take.start_time) * library.fps)) for second in (start, end))
@@ -131,15 +131,18 @@ def _comparable(plan: Plan, before: Take) -> bool:
 
 
 def _edited(
-    library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
+    library: Library, asked: Plan, before: Take, report: Progress, *, cancelled, hurry, anew: Anew | None
 ) -> Take | None:
     """The take, or None where it has to be made as a whole; what is made anew is made in the library's size."""
-    size = size_of(plan, library.skeleton)
-    old = in_force(before.plan, before.solved)
-    known = in_force(plan, before.solved if _same_ball(plan, before.plan) else None)
-    small = (in_library_size(which, size) for which in (known, old))
-    found = _updated(library, *small, taken_in_library_size(before, size), report, cancelled, hurry, anew)
-    return None if found is None else finished(found[0], plan, known, library, *found[1:], before)
+    then = resolve_plan(before.plan, library, course=before.solved)
+    same_ball = _same_ball(asked, before.plan)
+    plan = resolve_plan(asked, library, course=before.solved if same_ball else None)
+    small = taken_in_library_size(before, plan.size)
+    found = _updated(library, plan, then, small, report, cancelled=cancelled, hurry=hurry, anew=anew)
+    if found is None:
+        return None
+    take, order, hurried = found
+    return finished(take, plan, library, order, hurried=hurried, before=before)
 
 
 def _same_ball(plan: Plan, old: Plan) -> bool:
@@ -150,13 +153,14 @@ def _same_ball(plan: Plan, old: Plan) -> bool:
 
 
 def _updated(
-    library: Library, plan: Plan, then: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
+    library: Library, plan: ResolvedPlan, then: ResolvedPlan, before: Take, report: Progress, *, cancelled, hurry,
+    anew: Anew | None,
 ):
-    """The take without pins, made by `plan` where `before` was made by `then`, both in force; its order and the frame
+    """The take without pins, made by `plan` where `before` was made by `then`; its order and the frame
     from which on it was searched in a hurry; None where it has to be made as a whole."""
     clock = [time.perf_counter()]
-    library = _library_of_both(library, plan, before, report)
-    old, new = wanted(library, then), wanted(library, plan)
+    library = _library_of_both(library, (plan, then), report)
+    old, new = build_order(library, then), build_order(library, plan)
     if not _made_from(library, before, len(old)):
         return None
     again = to_search(library, before.edit, old, new, SLOT)
@@ -172,7 +176,7 @@ def _updated(
         def tell(fraction, text, number=number):
             report(0.8 * (number + fraction) / len(again), text)
 
-        search = PathSearch(library, new, balanced(plan.alpha), tell, cancelled, hurry, Between(edit, first, end), used)
+        search = PathSearch(library, new, balanced(plan.asked.alpha), tell, cancelled, hurry, Between(edit, first, end), used)
         edit = search.run()
         hurried += [search.hurried] if search.hurried is not None else []
     clock.append(time.perf_counter())
@@ -188,10 +192,10 @@ def _updated(
     return replace(update.take(), seconds=seconds), new, min(hurried, default=None)
 
 
-def _library_of_both(library: Library, plan: Plan, before: Take, report: Progress) -> Library:
-    """The library with made clips where the new plan or the old take needs them."""
-    for which in (plan, before.plan):
-        suited = with_made_gaits(library, which, report)
+def _library_of_both(library: Library, plans: Iterable[ResolvedPlan], report: Progress) -> Library:
+    """The library with made clips where the first plan or else the second needs them."""
+    for which in plans:
+        suited = search_library(library, which, report)
         if len(suited.clips) > len(library.clips):
             break
     return suited
@@ -221,7 +225,7 @@ def _outside(keys, order: Wanted, again: list[Stretch]):
 class _Update:
     """A take in the making: the old one's arrays, with one stretch after the other made anew."""
 
-    def __init__(self, library: Library, plan: Plan, before: Take, track: SampledTrack, edit: EditList, order: Wanted):
+    def __init__(self, library: Library, plan: ResolvedPlan, before: Take, track: SampledTrack, edit: EditList, order: Wanted):
         self.library, self.plan, self.before = library, plan, before
         self.track, self.edit, self.order = track, edit, order
         self.index = _index(len(track), library, plan.fps, len(edit))
@@ -256,7 +260,7 @@ class _Update:
         return stretches(touched, int(round((2 * HAND_OVER + 0.3) * self.plan.fps)))
 
     def _spread(self, seams: np.ndarray) -> set[tuple[int, float]]:
-        longest = 0.5 * self.plan.seam_window * self.plan.fps
+        longest = 0.5 * self.plan.asked.seam_window * self.plan.fps
         return set(zip(seams.tolist(), reaches(seams, len(self.index), longest).tolist()))
 
     def make(self, stretch: Stretch) -> None:
@@ -304,7 +308,7 @@ class _Update:
             correction=self.correction,
             ik_miss=self.miss,
             stepped=self.stepped,
-            plan=self.plan,
+            plan=self.plan.asked,
             edit=self.edit,
         )
 
@@ -393,7 +397,7 @@ class _Window:
             near = eased(1.0 - np.abs(at - edge) / fade, np.ones(len(at)))[:, None]
             root += np.where(stays[:, None], 0.0, near * (old - laid)[edge])
         root = np.where(stays[:, None], old, root)
-        pulled = pulled_to_track(root, self.track.raw, plan.fps, plan.root_window)
+        pulled = pulled_to_track(root, self.track.raw, plan.fps, plan.asked.root_window)
         return pulled + self.share[:, None] * (old - pulled)
 
     def met(self, planted: Planted, standing: np.ndarray) -> tuple[Planted, np.ndarray]:

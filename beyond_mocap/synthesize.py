@@ -22,19 +22,19 @@ from .annotation import LOCOMOTION_WORDS, avoided_per_frame, spoken
 from .errors import InputError, TimedLine, told_time
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
-from .known_touches import in_force, untouched, with_course
+from .known_touches import untouched, with_course
 from .lay_out import as_far, chained, faced, footed, leaning, met, on_track, smoothed, touches
-from .library.chosen import with_chosen_gaits
 from .library.library import Library
 from .motion.motion import Motion, at_frames
 from .motion.runs import runs
-from .motion.track import SampledTrack, sample
-from .own_size import in_library_size, in_own_size, size_of
+from .motion.track import SampledTrack
+from .own_size import in_own_size
 from .plan import METHODS, Plan
 from .polish.foot_plant import Planted
 from .polish.pins import look_axis, pinned
 from .polish.steps import Steps
 from .polish.strike import Touch
+from .resolve_plan import resolve_plan
 from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
@@ -43,8 +43,10 @@ from .synthesis.edit_list import EditList
 from .synthesis.footage import Footage, Shown, fetch
 from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
+from .synthesis.resolved_plan import ResolvedPlan
+from .synthesis.search_library import search_library
 from .synthesis.used import Used
-from .synthesis.wanted import Wanted, wanted
+from .synthesis.wanted import Wanted, build_order
 from .take import BallPath, KeyResult, PinResult, Take
 
 NEAR_KEY = 1.5
@@ -96,39 +98,35 @@ def synthesize(
 
 def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
     begun = time.perf_counter()
-    known = in_force(asked)
-    solving = {} if known.solved is None else {"solve": time.perf_counter() - begun}
-    plan = in_library_size(known, size_of(asked, library.skeleton))
-    recordings, library = library, with_made_gaits(library, plan, report)
+    plan = resolve_plan(asked, library)
+    solving = {} if plan.course is None else {"solve": time.perf_counter() - begun}
+    recordings, library = library, search_library(library, plan, report)
     begun = time.perf_counter()
-    order = wanted(library, plan)
+    order = build_order(library, plan)
     found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry, used)
     seconds = {"search": time.perf_counter() - begun}
     take, laid = _laid_out(library, plan, order, found, report)
-    return finished(
-        replace(take, seconds={**seconds, **laid, **solving}), asked, known, recordings, order, found.hurried
-    )
+    take = replace(take, seconds={**seconds, **laid, **solving})
+    return finished(take, plan, recordings, order, hurried=found.hurried)
 
 
-def constructed(library: Library, known: Plan, edit: EditList, progress: Progress | None = None) -> Take:
+def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: Progress | None = None) -> Take:
     """The take of method "path" that shows `edit`: all that `synthesize` does behind its search.
 
-    known: the plan with its key moments and its ball as they are in force (`known_touches.in_force`). edit: at the
-    library's rate, from the track's first time on; its clips are those of `library`, which has made ones
+    edit: at the library's rate, from the track's first time on; its clips are those of `library`, which has made ones
     (`Library.extended`) where it shows them. What gave way is not told in its warnings: it may be a part of a longer
     take, of which `evaluation.evaluate` tells it. The same arguments and numpy give the same bits.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        plan = in_library_size(known, size_of(known, library.skeleton))
-        order = wanted(library, plan)
+        order = build_order(library, plan)
         take, seconds = _laid_out(library, plan, order, Found(edit), progress or (lambda fraction, text: None))
-        return finished(replace(take, seconds=seconds), known, known, library, order, None, judged=False)
+        return finished(replace(take, seconds=seconds), plan, library, order, judged=False)
 
 
 def _laid_out(
-    library: Library, plan: Plan, order: Wanted, found: Found, report: Progress
+    library: Library, plan: ResolvedPlan, order: Wanted, found: Found, report: Progress
 ) -> tuple[Take, dict[str, float]]:
     """What was found, fetched and laid on the ground, in the library's size; and what that took, in seconds."""
     clock = [time.perf_counter()]
@@ -152,39 +150,22 @@ def _laid_out(
     return take, dict(zip(("construct", "polish"), np.diff(clock).tolist()))
 
 
-def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
-    """The library that a plan is made from: with made clips, where recordings lack what its track asks for, and with
-    the chosen gaits."""
-    if plan.method == "path" and plan.made and _lacks(library, plan):
-        report(0.0, "Making what the recordings lack")
-        library = library.extended
-    return with_chosen_gaits(library, dict(plan.gaits))
-
-
-def _lacks(library: Library, plan: Plan) -> bool:
-    """Whether the recordings lack speeds that the track asks for, or touches as fast as its key moments."""
-    track = sample(plan.track, library.fps, plan.track_window)
-    moments = np.array([key.in_force for key in plan.timeline.keys])
-    takes = np.array(["receive" in key.words for key in plan.timeline.keys], bool)
-    return library.lacks(track.speed, np.interp(moments, track.times, track.speed), takes)
-
-
 def _search(
-    library: Library, plan: Plan, order: Wanted, report: Progress, cancelled, hurry, used: tuple[Used, ...]
+    library: Library, plan: ResolvedPlan, order: Wanted, report: Progress, cancelled, hurry, used: tuple[Used, ...]
 ) -> Found:
     if plan.method == "path":
-        search = PathSearch(library, order, balanced(plan.alpha), report, cancelled, hurry, used=used)
+        search = PathSearch(library, order, balanced(plan.asked.alpha), report, cancelled, hurry, used=used)
         return Found(search.run(), hurried=search.hurried)
     stops = [stop for stop in (cancelled, hurry) if stop]
-    search = BlockSearch(library, order, plan.alpha, report, lambda: any(stop() for stop in stops))
+    search = BlockSearch(library, order, plan.asked.alpha, report, lambda: any(stop() for stop in stops))
     blocks = search.run()
     if plan.method == "blocks":
         return Found(straight_edit(search, blocks))
-    return Found(*warped_edit(search, match_distance(search, blocks, plan.delta), plan.catch_up))
+    return Found(*warped_edit(search, match_distance(search, blocks, plan.asked.delta), plan.asked.catch_up))
 
 
 def _polished(
-    library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index, strikes: list[Touch]
+    library: Library, plan: ResolvedPlan, track: SampledTrack, footage: Footage, found: Found, index, strikes: list[Touch]
 ) -> tuple[Planted, Steps]:
     """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand or stepping where they would
     slide."""
@@ -206,7 +187,7 @@ def _polished(
 
 
 def _take(
-    library: Library, plan: Plan, order: Wanted, track: SampledTrack, edit: EditList, footage: Footage,
+    library: Library, plan: ResolvedPlan, order: Wanted, track: SampledTrack, edit: EditList, footage: Footage,
     keys: tuple[KeyResult, ...], planted: Planted, taken: Steps,
 ) -> Take:
     clips = library.clips
@@ -230,11 +211,11 @@ def _take(
         keys=keys,
         ball=ball,
         method=plan.method,
-        seed=plan.seed,
+        seed=plan.asked.seed,
         correction=planted.correction,
         ik_miss=planted.miss,
         stepped=taken.stepped,
-        plan=plan,
+        plan=plan.asked,
         edit=edit,
     )
 
@@ -252,17 +233,17 @@ def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
 
 
 def finished(
-    take: Take, asked: Plan, plan: Plan, recordings: Library, order: Wanted, hurried: int | None,
+    take: Take, plan: ResolvedPlan, recordings: Library, order: Wanted, *, hurried: int | None = None,
     before: Take | None = None, judged: bool = True,
 ) -> Take:
-    """A take out of the library's size in the player's, with its pins, its ball and its warnings. plan: `asked` as it
-    is in force; before: the finished take that it is an edit of; judged: as `with_warnings` has it."""
-    take = with_pins(in_own_size(take, size_of(asked, recordings.skeleton), asked, before), recordings)
+    """A take out of the library's size in the player's, with its pins, its ball and its warnings. before: the finished
+    take that it is an edit of; hurried, judged: as `with_warnings` has them."""
+    take = with_pins(in_own_size(take, plan.size, plan.asked, before), recordings)
     begun = time.perf_counter()
     take = with_course(take, plan)
-    if plan.solved is not None:
+    if plan.course is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - begun})
-    return with_warnings(take, recordings, order, hurried, untouched(take, plan), judged)
+    return with_warnings(take, recordings, order, hurried, more=untouched(take, plan), judged=judged)
 
 
 def with_pins(take: Take, recordings: Library) -> Take:
@@ -291,7 +272,8 @@ def look_of(library: Library) -> np.ndarray:
 
 
 def with_warnings(
-    take: Take, recordings: Library, order: Wanted, hurried: int | None, more: Sequence[str] = (), judged: bool = True
+    take: Take, recordings: Library, order: Wanted, hurried: int | None, *, more: Sequence[str] = (),
+    judged: bool = True,
 ) -> Take:
     """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
     library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
@@ -355,7 +337,7 @@ def _pins_missed(take: Take) -> list[str]:
     return told
 
 
-def key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
+def key_result(library: Library, plan: ResolvedPlan, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
     """How key moment `number` came out: where its clip's key frame is played, or what stands in for it."""
     key = order.keys[number]
     at = key.frame * plan.fps / library.fps

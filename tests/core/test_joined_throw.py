@@ -15,8 +15,8 @@ from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading
 from beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics, place
 from beyond_mocap.motion.throws import throw
-from beyond_mocap.motion.track import Track
-from beyond_mocap.plan import Plan
+from beyond_mocap.motion.track import BALL_RADIUS, Track
+from beyond_mocap.plan import Plan, SolvedCourse, Touched
 
 LIBRARY = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
 FPS, AT = 30.0, 6.0
@@ -97,6 +97,16 @@ def test_what_lies_within_the_throw_gives_way(library):
     assert [line for line in way.warnings if "not played" in line] == [
         "6.2 s: 'kick low' lies within the throw, it is not played"
     ]
+
+
+def test_a_key_moment_within_the_throw_by_its_solved_touch_gives_way_too(library):
+    motion, release, plan = on_library(library, 0.0)
+    asked = AT + motion.duration - release + 0.1  # behind the throw, its touch within
+    ball = np.tile([0.4, 0.0, BALL_RADIUS], (len(TIMES), 1))
+    course = SolvedCourse(TIMES, ball, np.zeros(len(TIMES), bool), (Touched(asked - 0.3, True, "foot", "kick"),))
+    plan = replace(plan, timeline=Timeline((), (KeyMoment(asked, ("kick", "low")),)), solved=course, solve_touches=True)
+    way = joined_throw.run_up_and_recovery(library, plan, motion, release, AT)
+    assert any("'kick low' lies within the throw" in line for line in way.warnings)
 
 
 def test_other_bones_and_sizes_keep_the_exact_throw(library, made):
