@@ -5,8 +5,8 @@
     take = synthesize(library, Plan(track=track, timeline=read_timeline("player.txt", 30.0)))
 
 The plan is put into frames (`synthesis.wanted`), a search picks what is shown (`synthesis.path_search`, or
-`synthesis.blocks` with `synthesis.locomotion`), the frames are fetched (`synthesis.footage`) and laid on the ground
-(`lay_out`).
+`synthesis.blocks` with `synthesis.locomotion`), the frames are fetched (`synthesis.footage`) and laid on the track
+(`synthesis.construct`).
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .annotation import LOCOMOTION_WORDS, avoided_per_frame, spoken
+from .annotation import LOCOMOTION_WORDS, avoided_per_frame
 from .errors import InputError, TimedLine, told_time
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
 from .known_touches import untouched, with_course
-from .lay_out import as_far, chained, faced, footed, leaning, met, on_track, smoothed, touches
 from .library.library import Library
 from .motion.motion import Motion, at_frames
 from .motion.runs import runs
 from .motion.track import SampledTrack
 from .own_size import in_own_size
 from .plan import METHODS, Plan
-from .polish.foot_plant import Planted
 from .polish.pins import look_axis, pinned
-from .polish.steps import Steps
-from .polish.strike import Touch
 from .resolve_plan import resolve_plan
 from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
+from .synthesis.construct.construction import Construction
+from .synthesis.construct.key_moments import find_touches, key_results
+from .synthesis.construct.thesis_methods import lay_out_blocks
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.dragged import left_out
 from .synthesis.edit_list import EditList
-from .synthesis.footage import Footage, Shown, fetch
+from .synthesis.footage import fetch, output_index
 from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
+from .synthesis.provenance import read_provenance
 from .synthesis.resolved_plan import ResolvedPlan
 from .synthesis.search_library import search_library
 from .synthesis.used import Used
 from .synthesis.wanted import Wanted, build_order
-from .take import BallPath, KeyResult, PinResult, Take
+from .take import BallPath, PinResult, Take
 
 NEAR_KEY = 1.5
 """Seconds around a key moment in which its own words may be shown, whoever avoids them."""
@@ -133,18 +133,27 @@ def _laid_out(
     report(0.8, "Constructing")
     track = order.track if plan.fps == library.fps else plan.sampled(plan.fps)
     edit = exact_keys(library, found.edit, order)
-    index = np.minimum(np.arange(len(track.times)) * (library.fps / plan.fps), len(edit) - 1)
-    footage = fetch(library, edit, index, plan.fps)
-    keys = tuple(key_result(library, plan, order, edit, footage, number) for number in range(len(order.keys)))
+    index = output_index(len(track.times), library, plan.fps, len(edit))
+    source = fetch(library, edit, index, plan.fps)
+    keys = key_results(library, plan.fps, order, edit, source)
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
-    strikes = touches(library, plan, edit, keys)
-    planted, taken = _polished(library, plan, track, footage, found, index, strikes)
     if plan.method == "path":
-        struck = met(library, plan, track, taken.standing, planted, strikes)
-        planted = replace(planted, root=struck.root, rotations=struck.rotations)
-        track = replace(track, ball=struck.ball)
-    take = _take(library, plan, order, track, edit, footage, keys, planted, taken)
+        touches = find_touches(library, plan.fps, edit, keys)
+        construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
+        planted, taken = construction.lay_out()
+        planted, ball = construction.meet_ball(planted, taken)
+        track = replace(track, ball=ball)
+    else:
+        far = found.travelled
+        travelled = None if far is None else np.interp(index, np.arange(len(far)), far)
+        planted, taken = lay_out_blocks(library, plan, track, source, travelled)
+    take = Take(
+        **read_provenance(library, source), motion=Motion(library.skeleton, planted.root, planted.rotations, plan.fps),
+        start_time=float(track.times[0]), contacts=taken.contacts, timeline=order.timeline, keys=keys,
+        ball=_ball_path(track), method=plan.method, seed=plan.asked.seed, correction=planted.correction,
+        ik_miss=planted.miss, stepped=taken.stepped, plan=plan.asked, edit=edit,
+    )
     clock.append(time.perf_counter())
     report(1.0, "Done")
     return take, dict(zip(("construct", "polish"), np.diff(clock).tolist()))
@@ -164,72 +173,10 @@ def _search(
     return Found(*warped_edit(search, match_distance(search, blocks, plan.asked.delta), plan.asked.catch_up))
 
 
-def _polished(
-    library: Library, plan: ResolvedPlan, track: SampledTrack, footage: Footage, found: Found, index, strikes: list[Touch]
-) -> tuple[Planted, Steps]:
-    """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand or stepping where they would
-    slide."""
-    smooth = smoothed(library, plan, footage)
-    if plan.method == "blocks":
-        angle, ground = chained(library, footage, smooth, track)
-    elif plan.method == "distance":
-        travelled = np.interp(index, np.arange(len(found.travelled)), found.travelled)
-        angle, ground = as_far(track, smooth, travelled)
-    else:
-        angle, ground = on_track(library, plan, track, smooth, strikes)
-    pose = faced(smooth.pose, angle)
-    root = np.concatenate([ground, smooth.height[:, None]], axis=1)
-    if plan.method == "path":
-        pose = leaning(library, plan, track, smooth, pose)
-        return footed(library, plan, track, root, pose, footage.standing, strikes)
-    none = np.zeros((len(root), 2))
-    return Planted(root, pose, none, none), Steps.none(pose, footage.standing)
-
-
-def _take(
-    library: Library, plan: ResolvedPlan, order: Wanted, track: SampledTrack, edit: EditList, footage: Footage,
-    keys: tuple[KeyResult, ...], planted: Planted, taken: Steps,
-) -> Take:
-    clips = library.clips
-    sources = sources_shown(library, footage)
-    names = tuple(dict.fromkeys(sources))
-    number = {name: i for i, name in enumerate(names)}
-    ball = None
-    if np.any(np.isfinite(track.ball[:, :2])):
-        ball = BallPath(track.times, track.ball, track.ball_measured)
-    return Take(
-        motion=Motion(library.skeleton, planted.root, planted.rotations, plan.fps),
-        start_time=float(track.times[0]),
-        clips=names,
-        clip=np.array([number[source] for source in sources]),
-        clip_frame=footage.clip_frame,
-        mirrored=np.array([clips[clip].mirrored for clip in footage.clip]),
-        words=words_shown(library, footage),
-        contacts=taken.contacts,
-        seams=footage.seams,
-        timeline=order.timeline,
-        keys=keys,
-        ball=ball,
-        method=plan.method,
-        seed=plan.asked.seed,
-        correction=planted.correction,
-        ik_miss=planted.miss,
-        stepped=taken.stepped,
-        plan=plan.asked,
-        edit=edit,
-    )
-
-
-def sources_shown(library: Library, shown: Shown) -> tuple[str, ...]:
-    """The files, below the library, that hold every shown frame: recordings, or what was made behind their end."""
-    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
-    return tuple(library.clips[clip].source_at(frame) for clip, frame in frames)
-
-
-def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
-    """The words that every shown frame's clip carries there."""
-    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
-    return tuple(spoken(library.clips[clip].words_at(frame)) for clip, frame in frames)
+def _ball_path(track: SampledTrack) -> BallPath | None:
+    if not np.any(np.isfinite(track.ball[:, :2])):
+        return None
+    return BallPath(track.times, track.ball, track.ball_measured)
 
 
 def finished(
@@ -335,24 +282,6 @@ def _pins_missed(take: Take) -> list[str]:
         elif result.pin.part != "gaze" and result.miss > PIN_MISSED:
             told.append(TimedLine(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
     return told
-
-
-def key_result(library: Library, plan: ResolvedPlan, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
-    """How key moment `number` came out: where its clip's key frame is played, or what stands in for it."""
-    key = order.keys[number]
-    at = key.frame * plan.fps / library.fps
-    near = int(np.clip(round(at), 0, len(played.clip) - 1))
-    clip, shown = int(played.clip[near]), float(played.clip_frame[near])
-    placed = next((p for p in edit.keys if p.wanted == number and p.key.clip == clip), None)
-    words = spoken(placed.key.words if placed else library.clips[clip].words_at(shown))
-    if placed is not None:
-        inside = np.flatnonzero(played.piece == played.piece[near])
-        if len(inside) > 1 and np.all(np.diff(played.clip_frame[inside]) > 0):
-            at = float(np.interp(placed.key.frame, played.clip_frame[inside], inside))
-        shown = placed.key.frame
-    source = library.clips[clip]
-    instead = words if key.used_instead and not key.choices else key.used_instead
-    return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
 
 
 def _gave_way(library: Library, plan: Plan, take: Take) -> list[str]:

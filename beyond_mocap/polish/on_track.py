@@ -53,7 +53,6 @@ def facing(
     firmer than usual the recording's own turning is followed (`firmness`). aim: (T,) radians that a body which stands
     slowly turns to.
     """
-    count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
     offset = arctan2(velocity[:, 1], velocity[:, 0])
     goal = direction - offset
@@ -61,7 +60,22 @@ def facing(
     goal, trust = _with_aim(goal, trust, speed, aim, turn)
     if kept is not None:
         goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
-    goal = _unwrapped(goal, turn)
+    return follow_turns(_unwrapped(goal, turn), trust, turn, firm)
+
+
+def follow_turns(goal: np.ndarray, trust: np.ndarray, turn: np.ndarray, firm: np.ndarray | float = 1.0) -> np.ndarray:
+    """Solve the angles that lie near their goals and turn as a recording does.
+
+    Args:
+        goal: (T,) rad, without jumps of whole turns.
+        trust: (T,) weight of each goal.
+        turn: (T,) rad that the recording turned since the frame before.
+        firm: (T,) times TURN_WEIGHT that its turning weighs.
+
+    Returns:
+        (T,) rad, least squares of sum trust (a - goal)^2 + firm TURN_WEIGHT (a' - turn)^2.
+    """
+    count = len(goal)
     weight = TURN_WEIGHT * np.broadcast_to(firm, count)[1:]
     diagonal = trust.copy()
     diagonal[1:] += weight
