@@ -33,14 +33,14 @@ from .motion.track.sampling import travel_direction
 from .plan import Plan
 from .resolve_plan import resolve_plan
 from .polish.gaze import CHEST, following
-from .polish.on_track import STANDS, follow_turns
+from .polish.on_track import STANDS, follow_turning
 from .polish.strike import Touch
 from .polish.strike_at import Meeting, Met, met_at
 from .synthesis.construct.construction import Construction
 from .synthesis.footage import Footage, fetch
+from .synthesis.frame_sources import provenance_fields
 from .synthesis.path_costs import Alike
 from .synthesis.path_search import PathSearch
-from .synthesis.provenance import read_provenance
 from .synthesis.wanted import Wanted, WantedKey
 from .synthesize import look_of
 from .take import BallPath, Take
@@ -177,7 +177,7 @@ class _Body:
         struck = met_at(body, taken.standing.any(axis=2), self._meetings())
         ball = BallPath(self.times, self.ball, np.ones(len(self.times), bool))
         take = Take(
-            **read_provenance(self.library, source), motion=struck.motion, start_time=self.start,
+            **provenance_fields(self.library, source), motion=struck.motion, start_time=self.start,
             contacts=taken.contacts, timeline=Timeline(), keys=(), ball=ball, method="path", seed=self.settings.seed,
             correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=asked, edit=edit,
         )
@@ -243,7 +243,7 @@ class _Body:
         goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
         given = np.isfinite(kept)
         goal, trust = np.where(given, kept, goal), np.where(given, 1e6, trust)
-        return follow_turns(goal, trust, source.turn)
+        return follow_turning(goal, trust, source.turn)
 
     def _touches(self) -> list[Touch]:
         """The hit motions as stretches in which no steps are added."""

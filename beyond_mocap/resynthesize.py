@@ -34,9 +34,9 @@ from .synthesis.construct.key_moments import find_touches, key_results
 from .synthesis.construct.old_motion import OldMotion
 from .synthesis.edit_list import EditList
 from .synthesis.footage import Shown, fetch, output_index, shown
+from .synthesis.frame_sources import sources_shown, words_shown
 from .synthesis.offer import SLOT
 from .synthesis.path_search import Between, PathSearch
-from .synthesis.provenance import sources_shown, words_shown
 from .synthesis.resolved_plan import ResolvedPlan
 from .synthesis.search_library import search_library
 from .synthesis.touched import Stretch, asked_anew, joined, kept_keys, lies_elsewhere, stretches, to_search

@@ -26,10 +26,11 @@ from .known_touches import untouched, with_course
 from .library.library import Library
 from .motion.motion import Motion, at_frames
 from .motion.runs import runs
-from .motion.track import SampledTrack
 from .own_size import in_own_size
 from .plan import METHODS, Plan
+from .polish.foot_plant import Planted
 from .polish.pins import look_axis, pinned
+from .polish.steps import Steps
 from .resolve_plan import resolve_plan
 from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
@@ -40,9 +41,9 @@ from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.dragged import left_out
 from .synthesis.edit_list import EditList
 from .synthesis.footage import fetch, output_index
+from .synthesis.frame_sources import provenance_fields
 from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
-from .synthesis.provenance import read_provenance
 from .synthesis.resolved_plan import ResolvedPlan
 from .synthesis.search_library import search_library
 from .synthesis.used import Used
@@ -70,6 +71,10 @@ class Found:
     travelled: np.ndarray | None = None
     hurried: int | None = None
 
+    def travelled_at(self, index: np.ndarray) -> np.ndarray | None:
+        """(N,) metres travelled at fractional frames `index` (N,) of the edit list."""
+        return None if self.travelled is None else np.interp(index, np.arange(len(self.travelled)), self.travelled)
+
 
 def synthesize(
     library: Library,
@@ -78,6 +83,7 @@ def synthesize(
     cancelled: Callable[[], bool] | None = None,
     hurry: Callable[[], bool] | None = None,
     used: tuple[Used, ...] = (),
+    narrow: bool = False,
 ) -> Take:
     """A player's motion for `plan` out of `library`.
 
@@ -85,25 +91,27 @@ def synthesize(
     plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so,
     method "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on;
     before anything is found, and by the other methods, that is Cancelled too. used: footage that another solution is to
-    do without where it can (method "path"; the others differ by their seed). The same library, plan and numpy give the
-    same bits: linear algebra is held to one thread, since more add up in another order.
+    do without where it can (method "path"; the others differ by their seed). narrow: whether method "path" searches
+    quickly from the start. The same library, plan and numpy give the same bits: linear algebra is held to one thread,
+    since more add up in another order.
     """
     if plan.method not in METHODS:
         raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled, hurry, used)
+        asking = {"cancelled": cancelled, "hurry": hurry, "used": used, "narrow": narrow}
+        return _synthesize(library, plan, progress or (lambda fraction, text: None), **asking)
 
 
-def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
+def _synthesize(library: Library, asked: Plan, report: Progress, **asking) -> Take:
     begun = time.perf_counter()
     plan = resolve_plan(asked, library)
     solving = {} if plan.course is None else {"solve": time.perf_counter() - begun}
     recordings, library = library, search_library(library, plan, report)
     begun = time.perf_counter()
     order = build_order(library, plan)
-    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry, used)
+    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), **asking)
     seconds = {"search": time.perf_counter() - begun}
     take, laid = _laid_out(library, plan, order, found, report)
     take = replace(take, seconds={**seconds, **laid, **solving})
@@ -138,21 +146,14 @@ def _laid_out(
     keys = key_results(library, plan.fps, order, edit, source)
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
-    if plan.method == "path":
-        touches = find_touches(library, plan.fps, edit, keys)
-        construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
-        planted, taken = construction.lay_out()
-        planted, ball = construction.meet_ball(planted, taken)
-        track = replace(track, ball=ball)
-    else:
-        far = found.travelled
-        travelled = None if far is None else np.interp(index, np.arange(len(far)), far)
-        planted, taken = lay_out_blocks(library, plan, track, source, travelled)
+    touches = find_touches(library, plan.fps, edit, keys)
+    construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
+    planted, taken, ball = _body(construction, found.travelled_at(index))
+    motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     take = Take(
-        **read_provenance(library, source), motion=Motion(library.skeleton, planted.root, planted.rotations, plan.fps),
-        start_time=float(track.times[0]), contacts=taken.contacts, timeline=order.timeline, keys=keys,
-        ball=_ball_path(track), method=plan.method, seed=plan.asked.seed, correction=planted.correction,
-        ik_miss=planted.miss, stepped=taken.stepped, plan=plan.asked, edit=edit,
+        **provenance_fields(library, source), motion=motion, start_time=float(track.times[0]), contacts=taken.contacts,
+        timeline=order.timeline, keys=keys, ball=ball, method=plan.method, seed=plan.asked.seed,
+        correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=plan.asked, edit=edit,
     )
     clock.append(time.perf_counter())
     report(1.0, "Done")
@@ -160,10 +161,11 @@ def _laid_out(
 
 
 def _search(
-    library: Library, plan: ResolvedPlan, order: Wanted, report: Progress, cancelled, hurry, used: tuple[Used, ...]
+    library: Library, plan: ResolvedPlan, order: Wanted, report: Progress, *, cancelled, hurry, used, narrow
 ) -> Found:
     if plan.method == "path":
-        search = PathSearch(library, order, balanced(plan.asked.alpha), report, cancelled, hurry, used=used)
+        more = {"hurry": hurry, "used": used, "narrow": narrow}
+        search = PathSearch(library, order, balanced(plan.asked.alpha), report, cancelled, **more)
         return Found(search.run(), hurried=search.hurried)
     stops = [stop for stop in (cancelled, hurry) if stop]
     search = BlockSearch(library, order, plan.asked.alpha, report, lambda: any(stop() for stop in stops))
@@ -173,10 +175,16 @@ def _search(
     return Found(*warped_edit(search, match_distance(search, blocks, plan.asked.delta), plan.asked.catch_up))
 
 
-def _ball_path(track: SampledTrack) -> BallPath | None:
-    if not np.any(np.isfinite(track.ball[:, :2])):
-        return None
-    return BallPath(track.times, track.ball, track.ball_measured)
+def _body(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps, BallPath | None]:
+    """The body, its steps and the ball; travelled: (T,) m by method "distance"."""
+    track, ball = construction.track, construction.track.ball
+    if construction.plan.method == "path":
+        planted, taken = construction.lay_out()
+        planted, ball = construction.meet_ball(planted, taken)
+    else:
+        planted, taken = lay_out_blocks(construction, travelled)
+    known = np.any(np.isfinite(ball[:, :2]))
+    return planted, taken, BallPath(track.times, ball, track.ball_measured) if known else None
 
 
 def finished(

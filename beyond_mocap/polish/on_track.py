@@ -60,10 +60,10 @@ def facing(
     goal, trust = _with_aim(goal, trust, speed, aim, turn)
     if kept is not None:
         goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
-    return follow_turns(_unwrapped(goal, turn), trust, turn, firm)
+    return follow_turning(_unwrapped(goal, turn), trust, turn, firm)
 
 
-def follow_turns(goal: np.ndarray, trust: np.ndarray, turn: np.ndarray, firm: np.ndarray | float = 1.0) -> np.ndarray:
+def follow_turning(goal: np.ndarray, trust: np.ndarray, turn: np.ndarray, firm: np.ndarray | float = 1.0) -> np.ndarray:
     """Solve the angles that lie near their goals and turn as a recording does.
 
     Args:

@@ -18,23 +18,18 @@ from ...polish.steps import Steps
 from ..footage import Footage
 from ..locomotion import travelled_distance
 from ..resolved_plan import ResolvedPlan
-from .construction import apply_heading
+from .construction import Construction, apply_heading
 
 
-def lay_out_blocks(
-    library: Library, plan: ResolvedPlan, track: SampledTrack, source: Footage, travelled: np.ndarray | None
-) -> tuple[Planted, Steps]:
-    """Lay source frames on the ground as the thesis does: nothing is planted.
+def lay_out_blocks(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps]:
+    """Lay T source frames on the ground as the thesis does: nothing is planted.
 
-    Args:
-        library, plan: the clips, and what is asked.
-        track: T frames at the output's rate.
-        source: T frames as fetched.
-        travelled: (T,) m by method "distance", None by "blocks".
+    travelled: (T,) m by method "distance", None by "blocks".
     """
-    smooth = _spread_transitions(plan, source)
+    track, source = construction.track, construction.source
+    smooth = _spread_transitions(construction.plan, source)
     if travelled is None:
-        heading, ground = root_by_integration(library, source, smooth, track)
+        heading, ground = root_by_integration(construction.library, source, smooth, track)
     else:
         heading, ground = root_at_distance(track, smooth, travelled)
     pose, none = apply_heading(smooth.pose, heading), np.zeros((len(ground), 2))

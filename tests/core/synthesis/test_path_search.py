@@ -134,3 +134,12 @@ def test_clips_shorter_than_a_slot_are_told(tmp_path, clip_file, track_of):
     library = build(tmp_path)
     with pytest.raises(InputError, match="no clip of more than 8 frames"):
         found(library, build_order(library, resolve_plan(Plan(track=track_of()), library)))
+
+
+def test_a_narrow_search_is_one_hurried_from_its_second_slot_on(library, order):
+    asked, questions = order((2.0, "kick right")), iter(range(10**6))
+    narrow = PathSearch(library, asked, narrow=True)
+    hurried = PathSearch(library, asked, hurry=lambda: next(questions) > 1)
+    one, other = narrow.run(), hurried.run()
+    assert narrow.hurried == hurried.hurried == narrow.edges[1]
+    assert np.array_equal(one.frame, other.frame) and narrow.width == hurried.width

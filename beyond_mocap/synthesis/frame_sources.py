@@ -11,7 +11,7 @@ from ..library.library import Library
 from .footage import Shown
 
 
-def read_provenance(library: Library, shown: Shown) -> dict[str, Any]:
+def provenance_fields(library: Library, shown: Shown) -> dict[str, Any]:
     """The fields of a `Take` that say what its frames show: clips, clip, clip_frame, mirrored, words and seams."""
     sources = sources_shown(library, shown)
     names = tuple(dict.fromkeys(sources))
