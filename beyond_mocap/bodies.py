@@ -2,14 +2,14 @@
 between.
 
 The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
-`ball.way` says where he goes and faces; feet are held or step (`lay_out.footed`); his head follows the ball
+`ball.way` says where he goes and faces; feet are held or step (`synthesis.construct`); his head follows the ball
 (`polish.gaze`), and the striking part is brought to it (`polish.strike_at`). The ball is never moved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from .ball.way import Placed, needed, placed, way
 from .base.easing import smoothstep
 from .base.time_series import interpolate
 from .errors import InputError, told_time
-from .lay_out import faced, footed, smoothed
 from .library.automatic import automatic_words
 from .library.keys import Key
 from .library.library import Library
@@ -34,15 +33,18 @@ from .motion.motion import Motion
 from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
 from .plan import Plan
+from .resolve_plan import resolve_plan
 from .polish.gaze import CHEST, following
-from .polish.on_track import STANDS, follow_turning, root_with_sway
+from .polish.on_track import STANDS, follow_turning
 from .polish.strike import Touch
 from .polish.strike_at import Meeting, Met, met_at
+from .synthesis.construct.construction import Construction
 from .synthesis.footage import Footage, fetch
+from .synthesis.frame_sources import provenance_fields
 from .synthesis.path_costs import Alike
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, WantedKey
-from .synthesize import look_of, sources_shown, words_shown
+from .synthesize import look_of
 from .motion.track.ball_path import BallPath
 from .take import Take
 
@@ -70,7 +72,7 @@ class BodySettings:
     weights: BoneWeights = BoneWeights()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PlayerMotion:
     """One player of a passing scene. take: his motion with contacts, provenance and all, as `synthesize` gives it. gaps
     (K,) m between part and ball at each order's strike, NaN where he misses; moved (K,) m that the part was moved for
@@ -164,32 +166,26 @@ class _Body:
             alike=measure,
         ).run()
         index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
-        raw = fetch(self.library, edit, index, self.fps)
+        source = fetch(self.library, edit, index, self.fps)
         track, path = self._track(self.times, self.fps)
-        plan = self._plan(track)
+        asked = self._plan(track)
+        plan = resolve_plan(asked, self.library)
         report(0.75, "Laying out")
-        shown = smoothed(self.library, plan, raw)
-        angle = self._angle(track, path.facing, shown)
-        ground = root_with_sway(path.positions, shown.sway, angle)
-        root = np.column_stack([ground, shown.height])
-        planted, taken = footed(
-            self.library, plan, track, root, faced(shown.pose, angle), shown.standing, self._touches(),
-        )
+        planted, taken = Construction(
+            library=self.library, plan=plan, track=track, source=source, touches=self._touches(),
+            heading=self._heading(track, path.facing, source), planned=True,
+        ).lay_out()
         body = Motion(self.library.skeleton, planted.root, planted.rotations, self.fps)
         body = self._watching(body)
         struck = met_at(body, taken.standing.any(axis=2), self._meetings())
+        ball = BallPath(self.times, self.ball, np.ones(len(self.times), bool))
         take = Take(
-            motion=struck.motion, start_time=self.start, clips=(), clip=raw.clip, clip_frame=raw.clip_frame,
-            mirrored=np.array([self.library.clips[clip].mirrored for clip in raw.clip]),
-            words=words_shown(self.library, raw), contacts=taken.contacts, seams=raw.seams, timeline=Timeline(),
-            keys=(), ball=BallPath(self.times, self.ball, np.ones(len(self.times), bool)), method="path",
-            seed=self.settings.seed, correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped,
-            plan=plan, edit=edit,
+            **provenance_fields(self.library, source), motion=struck.motion, start_time=self.start,
+            contacts=taken.contacts, timeline=Timeline(), keys=(), ball=ball, method="path", seed=self.settings.seed,
+            correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=asked, edit=edit,
         )
         report(1.0, "Done")
-        return PlayerMotion(
-            _with_sources(take, self.library, raw), struck.gap, struck.moved, self._warnings(struck, track)
-        )
+        return PlayerMotion(take=take, gaps=struck.gap, moved=struck.moved, warnings=self._warnings(struck, track))
 
     def _wanted(self, times: np.ndarray) -> Wanted:
         """What the search is asked for, at the library's rate."""
@@ -234,15 +230,15 @@ class _Body:
             seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False,
         )
 
-    def _angle(self, track: SampledTrack, kept: np.ndarray, shown: Footage) -> np.ndarray:
+    def _heading(self, track: SampledTrack, kept: np.ndarray, source: Footage) -> np.ndarray:
         """(T,) rad: as recorded in his hit motions, and between them the compromise of `on_track.facing`, turning the
         short way round."""
         known = np.flatnonzero(np.isfinite(kept))
         rough = np.interp(np.arange(len(kept)), known, kept[known])
-        own_speed = np.linalg.norm(shown.velocity, axis=1)
+        own_speed = np.linalg.norm(source.velocity, axis=1)
         moving = [np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0) for speed in (track.speed, own_speed)]
         going = moving[0] ** 2 * moving[1] ** 2
-        travel = track.direction - arctan2(shown.velocity[:, 1], shown.velocity[:, 0])
+        travel = track.direction - arctan2(source.velocity[:, 1], source.velocity[:, 0])
         watch = track.direction + wanted_offset(track)
         weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
         goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)
@@ -250,7 +246,7 @@ class _Body:
         goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
         given = np.isfinite(kept)
         goal, trust = np.where(given, kept, goal), np.where(given, 1e6, trust)
-        return follow_turning(goal, trust, shown.turn)
+        return follow_turning(goal, trust, source.turn)
 
     def _touches(self) -> list[Touch]:
         """The hit motions as stretches in which no steps are added."""
@@ -300,10 +296,3 @@ class _Body:
             if gap > 0.005:
                 told.append(f"{order.time:.2f} s: the {order.part} is {100.0 * gap:.1f} cm off the ball")
         return tuple(told)
-
-
-def _with_sources(take: Take, library: Library, shown: Footage) -> Take:
-    sources = sources_shown(library, shown)
-    names = tuple(dict.fromkeys(sources))
-    number = {name: i for i, name in enumerate(names)}
-    return replace(take, clips=names, clip=np.array([number[source] for source in sources]))

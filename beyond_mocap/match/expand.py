@@ -23,6 +23,7 @@ from ..polish.hand_over import handed_over
 from ..polish.meeting import eased
 from ..synthesis.edit_list import EditList, at_times
 from ..synthesis.footage import shown
+from ..resolve_plan import resolve_plan
 from ..synthesize import constructed
 from ..motion.track.ball_path import BallPath
 from ..take import Take
@@ -125,7 +126,8 @@ class _Layout:
         first, end = max(0, low - around), min(self.count, high + around)
         plan = cut_plan(self.plan, self._time(first), self._time(end - 1))
         shown_here = self._shown(plan, first * FPS / self.fps)
-        take = constructed(self.library, plan, shown_here)
+        resolved = resolve_plan(plan, self.library, touches_solved=True)
+        take = constructed(self.library, resolved, shown_here)
         return _Window(low, high, first, take, self._standing(shown_here, take))
 
     def _shown(self, plan: Plan, at: float) -> EditList:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
 from ..files.tables import format_csv, parse_column, parse_flags, read_rows
 from ..files.whole import atomic_write
 from ..motion.skeleton import frozen_array
