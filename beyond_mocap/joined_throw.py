@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .annotation import ClipAnnotation, KeyMoment, Span, Timeline
+from .annotation import ClipAnnotation, KeyMoment, Span, Timeline, labels
 from .ball.way import hermite
 from .errors import InputError, TimedLine, told_time
 from .evaluation.jerk import jerk, uncut_windows, windowed
@@ -70,7 +70,9 @@ EDGE = 0.1
 OWN_WORD = "generated"
 """The word that only the generated clip carries."""
 
-ACTIONS = {"throw": ("throwb",), "kick": ("kick",)}
+ACTIONS = {action: labels.list_labels(action=action, is_root=True)[:1] for action in labels.ACTIONS}
+"""What a network does -> the label of the key moment in which it does it."""
+
 _CLIP = "generated throw"
 _STEPS_BELOW = 2.0  # m/s; who runs takes no small steps
 _WAITS = 0.5  # m/s that no joint of a body is as fast as which only stands

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from .annotation.ball_contact import striking_part
 from .annotation.gaze import wanted_offset
 from .library.library import Library
 from .motion import quaternion
 from .motion.humanoid import identify
 from .motion.motion import pose_kinematics
-from .motion.striking import striking_part
 from .motion.track import SampledTrack
 from .own_size import real_ball, size_of
 from .plan import Plan

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .annotation import LOCOMOTION_WORDS, avoided_per_frame, spoken
+from .annotation.ball_contact import takes_with_foot
 from .errors import InputError, TimedLine, told_time
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
@@ -165,7 +166,7 @@ def _lacks(library: Library, plan: Plan) -> bool:
     """Whether the recordings lack speeds that the track asks for, or touches as fast as its key moments."""
     track = sample(plan.track, library.fps, plan.track_window)
     moments = np.array([key.in_force for key in plan.timeline.keys])
-    takes = np.array(["receive" in key.words for key in plan.timeline.keys], bool)
+    takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)
     return library.lacks(track.speed, np.interp(moments, track.times, track.speed), takes)
 
 

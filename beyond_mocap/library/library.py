@@ -16,6 +16,8 @@ from typing import Callable, Iterable
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds, swap_sides
+from ..annotation.gaits import STANDING
+from ..annotation.vocabulary import DIRECTIONS
 from ..errors import Cancelled, InputError
 from ..files import bvh
 from ..motion.landing import ends_in_flight
@@ -248,7 +250,7 @@ def build(
 
 def _made(library: Library) -> Library:
     """What the recordings lack (`library.made`), described like them."""
-    speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != "standing"}
+    speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != STANDING}
     clips = []
     for made in made_clips(library.clips, library.frames, library.fps, speeds, library.keys):
         clip = Clip(made.name, False, made.motion, made.rows, made.standing)
@@ -450,7 +452,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
         if times:
             words = max(times, key=lambda w: (times[w], w))
             found.append(Gait(word, words, metres[word][words] / max(times[words], 1e-9)))
-    if not any(gait.word != "standing" for gait in found):
+    if not any(gait.word != STANDING for gait in found):
         raise InputError(
             library.folder, "no locomotion clip", "clips annotated walking, jogging, running or sprinting",
             "annotate which clips are locomotion",
@@ -466,7 +468,7 @@ def gait_word(row: ClipAnnotation) -> str | None:
     return words[0] if alone else None
 
 
-_DIRECTIONS = frozenset({"front", "back", "left", "right"})
+_DIRECTIONS = frozenset(DIRECTIONS)
 
 
 def _check(cancelled) -> None:

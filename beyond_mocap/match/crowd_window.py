@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..annotation.ball_contact import surfaces
 from ..library.library import FPS, Library
 from ..motion.motion import Motion
-from ..motion.striking import surfaces
 from ..polish.crowd.correction import CURVES, Correction, applied
 from ..polish.crowd.spacing import keeping
 from ..take import Take

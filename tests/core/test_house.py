@@ -38,7 +38,7 @@ ROOMS = {
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "synthesis.phase_network": ["motion", "polish.reach"],
-    "polish": ["motion"],
+    "polish": ["motion", "annotation"],
     "ball": ["motion", "annotation", "library", "polish", "markers.trial", "markers.frames"],
     "stream": ["motion", "files", "ball"],
     "evaluation": ["motion", "annotation", "plan", "take", "ball", "library", "markers", "synthesis.phase_network"],
