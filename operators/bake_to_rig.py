@@ -12,7 +12,7 @@ from ..scene.measure import frames_per_second
 from ..scene.ride import riders
 from ..scene.rigs import bake_record
 from ..scene.rigs.driven import Driven, check
-from ..scene.rigs.fit import Wishes
+from ..scene.rigs.fit import BakeOptions
 from ..scene.rigs.source import source_of
 from ..scene.settings import active_player
 from .verb import Verb
@@ -167,10 +167,10 @@ def standing_of(scene: bpy.types.Scene, player):
     return standing
 
 
-def wishes_of(settings) -> Wishes:
+def wishes_of(settings) -> BakeOptions:
     """How the panel says to bake."""
     keeps = {"AUTO": None, "KEEP": True, "SCALE": False}[settings.steps]
-    return Wishes(settings.root, keeps, settings.ik == "BAKE", settings.plants)
+    return BakeOptions(settings.root, keeps, settings.ik == "BAKE", settings.plants)
 
 
 def table_for(settings, target: bpy.types.Object) -> dict[str, str]:

@@ -15,11 +15,10 @@ import numpy as np
 from . import channels
 from .ride import riders
 from .rigs.bake_record import BEFORE, MARK, keep_own, note, remembered
-from .rigs.curves import bone_curves, setting_curves
+from .rigs.bone_curves import bone_curves, setting_curves, wanted
 from .rigs.driven import Driven
-from .rigs.fit import Fit, Slide, Wishes
+from .rigs.fit import BakeOptions, Fit, Slide
 from .rigs.source import Source
-from .rigs.wanted import wanted
 
 _OFF = 1e-3  # metres that are told
 
@@ -49,22 +48,17 @@ class Fitted:
     told: list[str]
 
 
-def bake(rig: bpy.types.Object, table: dict[str, str], source: Source, scene: bpy.types.Scene, wishes: Wishes) -> Baked:
-    """Lay `source` onto the rig as a new action, which the rig plays from then on."""
-    return lay(fitted(rig, table, source, scene, wishes))
-
-
 def fitted(
-    rig: bpy.types.Object, table: dict[str, str], source: Source, scene: bpy.types.Scene, wishes: Wishes
+    rig: bpy.types.Object, table: dict[str, str], source: Source, scene: bpy.types.Scene, options: BakeOptions
 ) -> Fitted:
     """`source` on the rig's bones. InputError where the map or the rig does not serve."""
-    driven = Driven(rig, table, scene, wishes.bakes_ik)
-    fit = Fit(driven, source, wishes)
+    driven = Driven(rig, table, scene, options.bakes_ik)
+    fit = Fit(driven, source, options)
     frames = source.start + np.arange(len(source.motion))
-    turns, places, told = wanted(driven, fit.motion, frames, wishes.root)
+    turns, places, told = wanted(driven, fit.motion, frames, options.root)
     basis, heads = driven.controls.basis(turns, places)
-    curves = bone_curves(rig, basis) | setting_curves(driven, wishes.bakes_ik)
-    return Fitted(source.name, driven, fit, frames, curves, heads, [*_told(driven, wishes), *told, *fit.told])
+    curves = bone_curves(rig, basis) | setting_curves(driven, options.bakes_ik)
+    return Fitted(source.name, driven, fit, frames, curves, heads, [*_told(driven, options), *told, *fit.told])
 
 
 def lay(one: Fitted) -> Baked:
@@ -82,13 +76,13 @@ def lay(one: Fitted) -> Baked:
     return Baked(made, one.frames, one.fit.scale, one.fit.slides, told)
 
 
-def _told(driven: Driven, wishes: Wishes) -> list[str]:
+def _told(driven: Driven, options: BakeOptions) -> list[str]:
     """What the user has to know about this rig."""
     lines = []
     if driven.controls.switches:
         names = sorted({switch.name for switch in driven.controls.switches})
         lines.append(f"set to FK on {len(driven.controls.switches)} bones: {', '.join(names)}")
-    if driven.overrides and not wishes.bakes_ik:
+    if driven.overrides and not options.bakes_ik:
         names = ", ".join(f"{one.bone} ({one.kind})" for one in driven.overrides[:4])
         lines.append(f"{len(driven.overrides)} constraints switched off (influence 0): {names}")
     if driven.followers:

@@ -11,7 +11,7 @@ import numpy as np
 from ...beyond_mocap.errors import BeyondMocapError, InputError
 from .. import channels
 from ..measure import frames_per_second, units_per_metre
-from ..rigs.wanted import is_carried
+from ..rigs.bone_curves import is_carried
 from . import rig_look, rig_parts
 from .carrier import carrier_of
 from .rig_source import Played, playing_strips

@@ -205,7 +205,8 @@ def _controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: Playe
     free = [bone.name for bone in rig.data.bones
             if (bone.name in top or bone.parent is not None and bone.parent.name in above)
             and not len(rig.pose.bones[bone.name].constraints)]
-    names = [*played.bones, *parts.controls.values(), *parts.follows, *([parts.root] if parts.root else []), *free]
+    own = [*parts.controls.values(), *parts.follows, *([parts.root] if parts.root else [])]
+    names = [*sorted(played.bones), *own, *free]
     names = [name for name in dict.fromkeys(names) if name in rig.data.bones and name not in driven]
     side.frame_set(int(played.frames[0]))
     if not played.switches:

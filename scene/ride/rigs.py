@@ -19,7 +19,7 @@ from .. import armature, channels
 from ..action import PLACED
 from ..measure import frames_per_second, units_per_metre
 from ..rigs.posing import CHANNELS
-from ..rigs.wanted import is_carried
+from ..rigs.bone_curves import is_carried
 from ..set_aside import play_as_before, put_aside, stance_of, stand
 from . import keys, rig_parts
 from .carrier import MARK, Carrier, Read

@@ -6,8 +6,9 @@ each of its location channels.
 
 from __future__ import annotations
 
+import re
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -15,20 +16,40 @@ import numpy as np
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from .control_study import RIDES, STATIC, TRIALS, nearest_carrier, place_spread, split_poses, turn_spread
-from .overrides import Override, list_switches
 from .posing import PosedRig
 
 _TURN = 0.7
+_TO_FK, _FROM_FK = re.compile(r"(?i)ik.*fk"), re.compile(r"(?i)fk.*ik")
+_FOLLOW = re.compile(r"(?i)follow")
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A number on a pose bone that has to stand at `value` for the controls to count."""
+
+    bone: str
+    name: str
+    value: float
+    before: float
+
+
+@dataclass(frozen=True)
+class Override:
+    """A constraint that would hold a driven bone against its channels."""
+
+    bone: str
+    constraint: str
+    kind: str
 
 
 @dataclass
 class _Ride:
     """What one control rides on: the carrier's index (-1: the armature itself) and the constant part, seen in it."""
 
-    turn_of: int = STATIC
-    turn: np.ndarray = field(default_factory=lambda: np.eye(3))
-    place_of: int = STATIC
-    place: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    turn_of: int
+    turn: np.ndarray
+    place_of: int
+    place: np.ndarray
     axes_of: int = STATIC
     axes: np.ndarray | None = None
 
@@ -162,3 +183,37 @@ def _nearest_turn(matrix: np.ndarray) -> np.ndarray:
     """The rotation (3, 3) nearest to a matrix."""
     u, _, v = np.linalg.svd(matrix)
     return u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
+
+
+def list_switches(rig: bpy.types.Object) -> list[Switch]:
+    """Numbers on pose bones that choose between IK and FK, or let a bone follow by halves."""
+    found = []
+    for bone in rig.pose.bones:
+        for name, value in bone.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                continue
+            if _TO_FK.search(name) or _FROM_FK.search(name):
+                whole = type(value)(1 if _TO_FK.search(name) else 0)
+            elif _FOLLOW.search(name) and 0.0 < value < 1.0:
+                whole = 1.0
+            else:
+                continue
+            found.append(Switch(bone.name, name, whole, value))
+    return found
+
+
+def list_overrides(rig: bpy.types.Object, bones: list[str]) -> list[Override]:
+    """Constraints that hold driven bones: those on them, and inverse kinematics below that reach up to them."""
+    driven, found = set(bones), []
+    for bone in rig.pose.bones:
+        for constraint in bone.constraints:
+            if constraint.mute or constraint.influence == 0.0:
+                continue
+            held = {bone.name}
+            if constraint.type in {"IK", "SPLINE_IK"}:
+                chain = [bone, *bone.parent_recursive]
+                length = constraint.chain_count
+                held = {one.name for one in (chain[:length] if length else chain)}
+            if held & driven:
+                found.append(Override(bone.name, constraint.name, constraint.type))
+    return found

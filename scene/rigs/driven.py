@@ -11,10 +11,8 @@ from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.skeleton import Skeleton
 from .. import armature, bone_maps, channels
-from .controls import Controls
+from .controls import Controls, list_overrides
 from .followers import list_targets
-from .overrides import list_overrides
-from .upright import upright_turn
 
 
 def check(rig: bpy.types.Object | None, source: bpy.types.Object | None = None) -> None:
@@ -111,3 +109,21 @@ class Driven:
             return max(level, 0.0)  # the armature's origin lies on the floor
         tails = [self.metres(np.array(self.rig.data.bones[self.bone(part)].tail_local))[2] for part in ends]
         return float(np.clip(level - min(tails), 0.0, 0.16 * leg))
+
+
+def upright_turn(heads: dict[str, np.ndarray]) -> np.ndarray:
+    """The turn (4,), by quarter turns, that lets a body stand along Z and face +X.
+
+    heads: part -> its place (3,) at rest, in the armature's space; thighs and feet are needed.
+    """
+    legs = [heads["left upper_leg"], heads["right upper_leg"]]
+    up = nearest_axis(np.mean(legs, axis=0) - 0.5 * (heads["left foot"] + heads["right foot"]))
+    across = legs[0] - legs[1]
+    left = nearest_axis(across - (across @ up) * up)
+    return quaternion.from_matrix(np.stack([np.cross(left, up), left, up]))
+
+
+def nearest_axis(vector: np.ndarray) -> np.ndarray:
+    """The axis (3,), with its sign, along which a vector (3,) goes furthest."""
+    axis = int(np.argmax(np.abs(vector)))
+    return np.eye(3)[axis] * np.sign(vector[axis])

@@ -9,9 +9,8 @@ import numpy as np
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
 from .. import armature
-from .driven import Driven
+from .driven import Driven, nearest_axis
 from .source import Source
-from .upright import nearest_axis
 
 LEGS_ALIKE = (0.8, 1.25)
 _FLOOR = (-0.01, 0.05)  # heights of standing toe joints, metres, whose soles are on the scene's own ground
@@ -20,7 +19,7 @@ _MISS = 0.005  # metres that are told
 
 
 @dataclass(frozen=True)
-class Wishes:
+class BakeOptions:
     """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are
     alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again. exact: the motion
     is on the driven skeleton already and is played as it is."""
@@ -43,12 +42,12 @@ class Slide:
 class Fit:
     """A source's motion on the driven skeleton, feet planted."""
 
-    def __init__(self, driven: Driven, source: Source, wishes: Wishes):
+    def __init__(self, driven: Driven, source: Source, options: BakeOptions):
         from ...beyond_mocap.motion import contacts  # these bring scipy, which is slow to import
         from ...beyond_mocap.motion.retarget import Retargeter
         from ...beyond_mocap.polish.foot_plant import plant
 
-        if wishes.exact:
+        if options.exact:
             self.scale, self.slides, self.motion, self.told = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
             return
         motion, skeleton = source.motion, _looking_ahead(driven.skeleton, source.motion.skeleton)
@@ -61,16 +60,16 @@ class Fit:
         motion = _raised(motion, -ground)
         carrier = Retargeter(motion, skeleton, standing=flat)
         self.scale = carrier.target.leg / carrier.source.leg
-        keeps = LEGS_ALIKE[0] <= self.scale <= LEGS_ALIKE[1] if wishes.keeps_travel is None else wishes.keeps_travel
+        keeps = LEGS_ALIKE[0] <= self.scale <= LEGS_ALIKE[1] if options.keeps_travel is None else options.keeps_travel
         carrier.keeps_travel = keeps
         carried = carrier.carry(motion)
         level = _stand_spread(motion, points) < 0.05
         planted = plant(skeleton, carried.root_positions, carried.rotations, points, motion.fps, levels=level)
-        fitted = Motion(skeleton, planted.root, planted.rotations, motion.fps) if wishes.plants else carried
+        fitted = Motion(skeleton, planted.root, planted.rotations, motion.fps) if options.plants else carried
         self.slides = tuple(slide(m, flat) for m in (source.motion, carried, fitted))
         self.lift = driven.sole - contacts.sole_height(skeleton)
         self.motion = _raised(fitted, floor + self.lift)
-        self.told = self._lines(driven, planted.miss if wishes.plants else None, points, keeps)
+        self.told = self._lines(driven, planted.miss if options.plants else None, points, keeps)
 
     def _lines(self, driven: Driven, miss: np.ndarray | None, points: np.ndarray, keeps: bool) -> list[str]:
         lines = [

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import bpy
 
-from .overrides import Override
+from .controls import Override
 
 _NAMED = (
     (re.compile(r"(?i)^(.*:)?(ik_foot|foot_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "foot"),

@@ -37,7 +37,7 @@ class PosedRig:
             bone = self.rig.pose.bones[name]
             bone.rotation_quaternion = turn
             bone.location = (0.0, 0.0, 0.0) if places is None else places[number]
-        self._update()
+        _update(self.rig, self.layer)
         shown = self.rig.evaluated_get(self.layer.depsgraph)
         return np.array([shown.pose.bones[name].matrix for name in bones])
 
@@ -55,7 +55,7 @@ class PosedRig:
 
     def _remember(self) -> None:
         data, bones = self.rig.animation_data, self.rig.pose.bones
-        self._playing = (data.action, data.action_slot, data.use_nla) if data else None
+        self._playing = (data.use_nla, data.action, data.action_slot) if data else None
         self._position = self.rig.data.pose_position
         self._modes = {name: bones[name].rotation_mode for name in self.controls}
         self._values = {
@@ -84,15 +84,13 @@ class PosedRig:
         if self._position != self.rig.data.pose_position:
             self.rig.data.pose_position = self._position
         if self._playing is not None:
-            self._play_again(*self._playing)
-        self._update(bpy.context.view_layer)
+            data = self.rig.animation_data
+            data.use_nla, data.action, slot = self._playing
+            if data.action is not None and slot is not None:
+                data.action_slot = slot
+        _update(self.rig, bpy.context.view_layer)
 
-    def _play_again(self, action: bpy.types.Action | None, slot, use_nla: bool) -> None:
-        data = self.rig.animation_data
-        data.use_nla, data.action = use_nla, action
-        if action is not None and slot is not None:
-            data.action_slot = slot
 
-    def _update(self, layer: bpy.types.ViewLayer | None = None) -> None:
-        self.rig.update_tag(refresh={"OBJECT", "DATA", "TIME"})
-        (layer or self.layer).update()
+def _update(rig: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
+    rig.update_tag(refresh={"OBJECT", "DATA", "TIME"})
+    layer.update()

@@ -14,7 +14,7 @@ from ..ride.carrier import carrier_of
 from ..ride.rigs import is_plain
 from ..rigs import bake_record
 from ..rigs.driven import Driven, check
-from ..rigs.fit import Wishes
+from ..rigs.fit import BakeOptions
 from ..rigs.source import Source
 from .settings import MARK
 
@@ -72,7 +72,7 @@ def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], m
     """Let a rig play a motion of its driven skeleton; `take_away` takes it away again.
     Returns lines about it."""
     source = Source(motion, start, name)
-    fitted = rig_bake.fitted(body, table, source, scene, Wishes(exact=True))
+    fitted = rig_bake.fitted(body, table, source, scene, BakeOptions(exact=True))
     played = channels.playing(body)[0]
     if played is not None and not played.get(MARK):
         played.pop(bake_record.MARK, None)  # an earlier bake is the rig's own motion, which is not to go

@@ -135,7 +135,8 @@ def test_axes_of_engines_come_back_too(rooms, body, tmp_path, format, engine):
 def baked(rooms, rig, body, **wishes):
     source = rooms["rigs.source"].source_of(body, bpy.context.scene)
     table = rooms["bone_maps"].suggest(rig)
-    return rooms["rig_bake"].bake(rig, table, source, bpy.context.scene, rooms["rigs.fit"].Wishes(**wishes))
+    options = rooms["rigs.fit"].BakeOptions(**wishes)
+    return rooms["rig_bake"].lay(rooms["rig_bake"].fitted(rig, table, source, bpy.context.scene, options))
 
 
 @pytest.mark.parametrize("format", SUFFIXES)

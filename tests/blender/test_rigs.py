@@ -61,7 +61,8 @@ def bake(rooms, rig, body, **wishes):
     scene = bpy.context.scene
     table = rooms["bone_maps"].suggest(rig)
     source = rooms["rigs.source"].source_of(body, scene)
-    return table, rooms["rig_bake"].bake(rig, table, source, scene, rooms["rigs.fit"].Wishes(**wishes))
+    options = rooms["rigs.fit"].BakeOptions(**wishes)
+    return table, rooms["rig_bake"].lay(rooms["rig_bake"].fitted(rig, table, source, scene, options))
 
 
 def directions(rig, table, frames=range(START, START + 60, 6)):
