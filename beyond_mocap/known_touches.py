@@ -159,7 +159,7 @@ def untouched(take: Take, plan: Plan) -> list[str]:
     return missing + [
         TimedLine(
             f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
-            f"'{' '.join(_CARRYING.intersection(span.words))}': it is too short, or no foot "
+            f"'{' '.join(sorted(_CARRYING.intersection(span.words)))}': it is too short, or no foot "
             "comes near", (span.start, span.end),
         ) for span in plan.timeline.spans
         if _CARRYING.intersection(span.words) and not ((touched >= span.start) & (touched <= span.end)).any()
