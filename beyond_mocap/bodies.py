@@ -17,7 +17,7 @@ from .annotation import Timeline, automatic_gaits
 from .annotation.gaze import wanted_offset
 from .annotation.timeline import KeyMoment
 from .ball.alike import alike
-from .ball.contact import WORDS, striking_surface
+from .ball.contact import striking_surface
 from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.way import Placed, needed, placed, way
@@ -30,6 +30,7 @@ from .library.library import Library
 from .motion import quaternion
 from .motion.arctangent import arctan2
 from .motion.motion import Motion
+from .motion.striking import BODY_PARTS
 from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
 from .plan import Plan
@@ -57,6 +58,7 @@ FASTER = 1.15
 OWN_HEAD = 0.3
 """Seconds around a header in which the head moves as recorded; it goes over within as many more."""
 
+_PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # "hand" itself is no label
 _WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip's own turning
 
 
@@ -207,7 +209,7 @@ class _Body:
         order = hit.order
         clip = self.library.clips[order.clip]
         frames = range(int(hit.first), int(hit.last) + 1)
-        words = frozenset({WORDS.get(order.part, "kick"), order.side} - {""}).union(*map(clip.words_at, frames))
+        words = frozenset({_PART_LABELS.get(order.part, "kick"), order.side} - {""}).union(*map(clip.words_at, frames))
         key = Key(order.clip, float(order.strike_frame), hit.first, hit.last, words)
         return WantedKey(KeyMoment(order.time, tuple(sorted(words))), frame, (key,), None, True, (1.0,))
 

@@ -14,9 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from .annotation import KeyMoment, Timeline
+from .annotation.ball_contact import striking_part, surfaces
+from .annotation.labels import list_labels
+from .ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from .ball.tracked.solve import SolvedBall, SolvedTouch
 from .errors import InputError, TimedLine
-from .motion.striking import striking_part, surfaces
 from .motion.track import BALL_RADIUS
 from .plan import Plan, SolvedCourse, Touched
 from .polish.dribble import dribble
@@ -28,14 +30,14 @@ from .take import DribbleTouch, KeyResult, Take
 FURTHEST = 0.4
 """Seconds from a key moment within which its touch is looked for."""
 
-DRIBBLE = "dribble"
 _WITHIN = 1.5  # metres from the player within which a touch by nobody known may be his
 _NOT_MINE, _OTHER_PART, _OTHER_KIND = 0.15, 0.25, 0.15  # seconds that these are worth
 _UNSEEN = 0.1  # seconds from the nearest measured sample beyond which the ball counts as filled in
 _STEP = 0.004  # seconds between the points of a course
-_SENDING = {"kick", "pass", "volley", "bicycle", "throw", "throwb", "header"}
-_TAKING = {"receive", "trap", "catch", "catchb"}
-_SENT, _TAKEN = {"kick", "header", "throw-in", "dribble"}, {"receive", "chest", "hand", "save"}
+_SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
+_CARRYING = frozenset(list_labels(ball="carries"))
+_SENT = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
+_TAKEN = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
 
 
 def solve_touches(plan: Plan, known: SolvedCourse | None = None) -> Plan:
@@ -90,7 +92,7 @@ def _touched(touch: SolvedTouch, player: str, plan: Plan) -> Touched:
         place = [np.interp(touch.time, plan.track.times, plan.track.positions[:, axis]) for axis in (0, 1)]
         mine = None if np.linalg.norm(touch.position[:2] - place) <= _WITHIN else False
     heights = plan.track.ball_height_known[np.abs(plan.track.times - touch.time).argmin()]
-    part = touch.part if heights or touch.kind == "throw-in" else ""
+    part = touch.part if heights or touch.kind == THROW_IN else ""
     return Touched(touch.time, mine, part, touch.kind)
 
 
@@ -157,10 +159,11 @@ def untouched(take: Take, plan: ResolvedPlan) -> list[str]:
     touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribbled])
     return missing + [
         TimedLine(
-            f"{span.start:g}-{span.end:g} s: no foot touches the ball in this '{DRIBBLE}': it is too short, or no foot "
+            f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
+            f"'{' '.join(sorted(_CARRYING.intersection(span.words)))}': it is too short, or no foot "
             "comes near", (span.start, span.end),
         ) for span in plan.timeline.spans
-        if DRIBBLE in span.words and not ((touched >= span.start) & (touched <= span.end)).any()
+        if _CARRYING.intersection(span.words) and not ((touched >= span.start) & (touched <= span.end)).any()
     ]  # fmt: skip
 
 
@@ -180,7 +183,7 @@ def with_course(take: Take, plan: ResolvedPlan) -> Take:
         path = led(path, pair, met[list(pair)], _around(pair, held[:number] + held[number + 1 :], turns, fps))
     stretches = [
         ((span.start - take.start_time) * fps, (span.end - take.start_time) * fps)
-        for span in plan.timeline.spans if DRIBBLE in span.words
+        for span in plan.timeline.spans if _CARRYING.intersection(span.words)
     ]  # fmt: skip
     standing = take.contacts if take.stepped is None else take.contacts | take.stepped
     done = dribble(

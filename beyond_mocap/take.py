@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .annotation import KeyMoment, Timeline
+from .annotation.ball_contact import meeting_words
 from .motion.motion import Motion
-from .motion.striking import meeting_words
 from .motion.track.ball_path import BallPath
 from .plan import Pin, Plan, SolvedCourse
 from .synthesis.edit_list import EditList

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from .annotation import ClipAnnotation
-from .ball.physics import BASEBALL, FOOTBALL, Ball
+from .annotation.labels import list_labels
+from .ball.physics import BASEBALL, FOOTBALL
 from .ball.wall import meets_wall
 from .errors import BeyondMocapError, Cancelled, InputError
 from .files import bvh
@@ -63,8 +64,8 @@ class Action:
 
 
 ACTIONS = {
-    "throw": Action(frozenset({"throwb", "throw", "pitch", "serve"}), (0, 1), (1.6, 3.0), (1.2, 2.0), 4.0, BASEBALL),
-    "kick": Action(frozenset({"kick"}), (2, 3), (1.2, 3.0), (0.8, 2.0), 11.0, FOOTBALL),
+    "throw": Action(frozenset(list_labels(action="throw")), (0, 1), (1.6, 3.0), (1.2, 2.0), 4.0, BASEBALL),
+    "kick": Action(frozenset(list_labels(action="kick")), (2, 3), (1.2, 3.0), (0.8, 2.0), 11.0, FOOTBALL),
 }
 """The walls: Fredriksson's stood about 4 m away (§8.2); a penalty is shot from 11 m."""
 

@@ -10,6 +10,10 @@ from ..beyond_mocap.errors import InputError
 from ..scene import bake, bone_maps, channels, rig, rig_bake, rig_copy, session
 from ..scene.measure import frames_per_second
 from ..scene.ride import riders
+from ..scene.rigs import bake_record
+from ..scene.rigs.driven import Driven, check
+from ..scene.rigs.fit import BakeOptions
+from ..scene.rigs.source import source_of
 from ..scene.settings import active_player
 from .verb import Verb
 
@@ -51,7 +55,7 @@ on the ground. What the rig played before is kept as an action"""
         scene, settings = context.scene, context.scene.beyond_mocap
         wishes, work = wishes_of(settings.rig), []
         for body, player, target, table in self.pairs(context):
-            source = rig_bake.source_of(body, scene, standing_of(scene, player))
+            source = source_of(body, scene, standing_of(scene, player))
             work.append((rig_bake.fitted(target, table, source, scene, wishes), target, table))
         lines = []
         for fitted, target, table in work:
@@ -71,7 +75,7 @@ on the ground. What the rig played before is kept as an action"""
             return self.pairs_of_players(context)
         body, player = source_body(settings), active_player(settings) if chosen.source is None else None
         if self.targets == "CHOSEN":
-            rig_bake.check(chosen.target, body)
+            check(chosen.target, body)
             if not chosen.bones:
                 rig.fill(chosen)
             return [(body, player, chosen.target, rig.table_of(chosen))]
@@ -79,7 +83,7 @@ on the ground. What the rig played before is kept as an action"""
         if not rigs:
             raise InputError("bake to rig", "no armature is selected beside the source", "rigs", "select them")
         for one in rigs:
-            rig_bake.check(one, body)
+            check(one, body)
         return [(body, player, one, table_for(chosen, one)) for one in rigs]
 
     def pairs_of_players(self, context) -> list:
@@ -90,12 +94,12 @@ on the ground. What the rig played before is kept as an action"""
             raise InputError("bake to rig", "no ticked player has a body", "players with a result", "synthesize first")
         lacking = [player for player in players if player.rig is None]
         if lacking:
-            rig_bake.check(settings.rig.target)
+            check(settings.rig.target)
         for player in players:
-            rig_bake.check(player.rig or settings.rig.target, player.body)
-            rig_bake.source_of(player.body, context.scene)
+            check(player.rig or settings.rig.target, player.body)
+            source_of(player.body, context.scene)
         for target in {player.rig or settings.rig.target for player in players} if lacking else ():
-            rig_bake.Driven(target, table_for(settings.rig, target), context.scene)  # before anything is copied
+            Driven(target, table_for(settings.rig, target), context.scene)  # before anything is copied
         free = settings.rig.target if all(player.rig != settings.rig.target for player in players) else None
         for player in lacking:
             player.rig = free or rig_copy.copied(settings.rig.target, f"{player.name} rig")
@@ -116,11 +120,11 @@ class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
         cls.poll_message_set("The chosen rig plays nothing that was baked here")
         target = context.scene.beyond_mocap.rig.target
         playing = channels.playing(target)[0] if target is not None else None
-        return playing is not None and bool(playing.get(rig_bake.MARK))
+        return playing is not None and bool(playing.get(bake_record.MARK))
 
     def do(self, context):
         """Off with it."""
-        rig_bake.remove(context.scene.beyond_mocap.rig.target)
+        bake_record.remove(context.scene.beyond_mocap.rig.target)
 
 
 class BEYOND_MOCAP_OT_reduce_keys(Verb, bpy.types.Operator):
@@ -163,10 +167,10 @@ def standing_of(scene: bpy.types.Scene, player):
     return standing
 
 
-def wishes_of(settings) -> rig_bake.Wishes:
+def wishes_of(settings) -> BakeOptions:
     """How the panel says to bake."""
     keeps = {"AUTO": None, "KEEP": True, "SCALE": False}[settings.steps]
-    return rig_bake.Wishes(settings.root, keeps, settings.ik == "BAKE", settings.plants)
+    return BakeOptions(settings.root, keeps, settings.ik == "BAKE", settings.plants)
 
 
 def table_for(settings, target: bpy.types.Object) -> dict[str, str]:

@@ -9,7 +9,8 @@ from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.errors import InputError
-from ..scene import bone_maps, rig, rig_bake
+from ..scene import bone_maps, rig
+from ..scene.rigs.driven import check
 from .verb import Verb
 
 
@@ -104,5 +105,5 @@ class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
 
     def do(self, context):
         """Choose it; its bones are mapped at once."""
-        rig_bake.check(context.object)
+        check(context.object)
         context.scene.beyond_mocap.rig.target = context.object

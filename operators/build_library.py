@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty
 
+from ..beyond_mocap.annotation.labels import find_label
 from ..beyond_mocap.errors import InputError
 from ..scene import clips, foreign, preferences, session, watch
 from ..scene.settings import absolute
@@ -163,5 +164,5 @@ def summary(built: "Library") -> str:
     lines = [f"{len(originals)} clips, {built.minutes:.1f} minutes, {len(built.skeleton)} joints"]
     lines += [f"{gait.word}: {gait.speed:.1f} m/s" for gait in built.gaits]
     for word, count in keys.most_common():
-        lines.append(f"{word.replace('_', ' ')}: {count} {'moment' if count == 1 else 'moments'}")
+        lines.append(f"{find_label(word).title}: {count} {'moment' if count == 1 else 'moments'}")
     return "\n".join(lines)

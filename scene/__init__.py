@@ -21,7 +21,8 @@
   file
 - `background`  long work in a thread; `queue`, `orders` which player is made next, and of what
 - `freshness`   what is out of date; `hand_keys` what of a result is the user's; `variants`, `stretch` other solutions
-- `rig`, `bone_maps`, `rig_controls`, `rig_bake`, `rig_copy`   a motion onto somebody's own rig, by a map of its bones
+- `rig`, `bone_maps`, `rig_bake`, `rig_copy`   a motion onto somebody's own rig, by a map of its bones; `rigs` what that
+  takes
 - `key_reduction`   keys that curves do not need are left out
 - `ride`        path editing: armatures whose motion rides a curve
 - `passes`      the ball and who keeps it going: hit analysis, passing scenes, who carries the ball, the solved ball

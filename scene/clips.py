@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..beyond_mocap.annotation.labels import find_label
+
 if TYPE_CHECKING:
     from ..beyond_mocap.library.listing import Listed
 
@@ -117,7 +119,7 @@ def fill(manager: bpy.types.WindowManager) -> None:
     for clip in sorted(chosen, key=_KEYS[listing.order]):
         row = listing.shown.add()
         row.name, row.path, row.words = Path(clip.path).stem, clip.path, " ".join(clip.words)
-        row.brief = clip.words[0].replace("_", " ") if clip.words else "no words"
+        row.brief = find_label(clip.words[0]).title if clip.words else "no words"
         row.seconds, row.mark = clip.seconds, clip.mark
         row.figures, row.told = _figures(clip), "\n".join(clip.told)
     paths = [row.path for row in listing.shown]

@@ -424,7 +424,7 @@ def saved(out: Path, write_to) -> None:
 
 def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
     from ..beyond_mocap.files import bvh
-    from .rig_bake import evaluated
+    from .rigs.source import evaluated
 
     frames = np.arange(stage.frame_end + 1)
     for copy in copies:

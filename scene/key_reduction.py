@@ -15,8 +15,9 @@ import numpy as np
 from ..beyond_mocap.base.vectors import unit_vectors
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
-from . import channels, rig_bake
-from .rig_bake import Driven
+from . import channels
+from .rigs import bake_record
+from .rigs.driven import Driven
 
 BEZIER, ALIGNED = 2, "ALIGNED"
 _ROUNDS, _TIGHTER = 14, 0.6
@@ -52,12 +53,12 @@ def reduce(
         if np.abs(np.linalg.norm(reach(found) - places, axis=-1)).max(initial=0.0) <= tolerance:
             break
         share *= _TIGHTER
-    before, as_baked = sum(len(curve.keyframe_points) for curve in curves.values()), rig_bake.is_as_baked(rig)
+    before, as_baked = sum(len(curve.keyframe_points) for curve in curves.values()), bake_record.is_as_baked(rig)
     for path, values in dense.items():
         for index in range(values.shape[1]):
             _rekey(curves[path, index], frames, values[:, index], kept[path])
     if as_baked:
-        rig_bake.note(rig)
+        bake_record.note(rig)
     return before, sum(len(curve.keyframe_points) for curve in curves.values())
 
 

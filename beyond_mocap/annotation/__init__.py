@@ -1,5 +1,6 @@
 """The language between people, tracks and clips: a vocabulary, timelines of words, their text form, and gaits by speed.
 
+- `labels`      what each label means, from one table (`vocabulary.csv`); `ball_contact` what that says of a ball met
 - `vocabulary`  the decision tree of words (Faustino, Appendix A), nearest words, left and right
 - `timeline`    stretches and key moments, validation, filling with automatic locomotion
 - `text`        the text form of timelines (§4.2.2)

@@ -18,16 +18,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from .vocabulary import TRANSITION, VOCABULARY, nearest, relatives, spoken, vocabulary_words
+from .labels import list_labels
+from .vocabulary import SIDES, TRANSITION, VOCABULARY, nearest, relatives, spoken, vocabulary_words
 
 PAGE = 9
 """Number keys of one page."""
 
-SIDES = ("left", "right")
-
 _TREES = {"moment": VOCABULARY["discrete"], "span": VOCABULARY["continuous"]}
-_LAST_TWO = {"moment": ("standing", "running"), "span": ("front", "back")}
-_BEHIND = {"moment": ("front", "back", "subtle", "with_setup"), "span": ("subtle", "with_setup")}
+_LAST_TWO = {"moment": list_labels(group="pace"), "span": list_labels(group="way")}
+_MODIFIERS = tuple(word for word in VOCABULARY["modifier"] if word not in SIDES)
+_BEHIND = {kind: tuple(word for word in _MODIFIERS if word not in last) for kind, last in _LAST_TWO.items()}
+_IN_BOTH = tuple(word for word in VOCABULARY["discrete"] if word in VOCABULARY["continuous"])
 _EXCLUSIVE = (frozenset(SIDES), frozenset(_LAST_TWO["moment"]), frozenset(_LAST_TWO["span"]))
 
 
@@ -137,7 +138,7 @@ def _layout(walk: Walk, held: Held | None) -> list[str | None]:
         return []
     own = _own_words(walk, held)
     if not walk.steps:
-        ends = ("turning",) if walk.kind == "moment" else (TRANSITION,)
+        ends = _IN_BOTH if walk.kind == "moment" else (TRANSITION,)
         return [*(word for word in _TREES[walk.kind] if word not in ends), *ends, *own]
     last = _LAST_TWO[walk.kind]
     below = [word for word in _next_words(walk) if word not in (*SIDES, *last)]

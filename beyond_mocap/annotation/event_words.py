@@ -10,20 +10,37 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from ..motion.striking import BODY_PARTS
+from .labels import list_labels
 from .text import read_text
 from .timeline import checked_words
-from .vocabulary import similar_words, vocabulary_words
+from .vocabulary import SIDES, similar_words, vocabulary_words
 
-KINDS = (
-    "pass", "shot", "clearance", "receive", "interception", "tackle", "aerial", "save", "catch", "punch", "pick-up",
-    "dribble", "take-on", "carry", "touch", "deflection", "miscontrol", "foul", "out", "other",
+
+@dataclass(frozen=True)
+class EventKind:
+    """What an event says of the ball. ball: "sends", "takes" or "". touch: "certain", "possible" or "none"."""
+
+    name: str
+    ball: str = ""
+    touch: str = "possible"
+
+
+EVENT_KINDS = (
+    EventKind("pass", "sends", "certain"), EventKind("shot", "sends", "certain"),
+    EventKind("clearance", "sends", "certain"), EventKind("receive", "takes"), EventKind("interception"),
+    EventKind("tackle"), EventKind("aerial"), EventKind("save", touch="certain"),
+    EventKind("catch", "takes", "certain"), EventKind("punch", touch="certain"),
+    EventKind("pick-up", "takes", "certain"), EventKind("dribble"), EventKind("take-on"), EventKind("carry"),
+    EventKind("touch"), EventKind("deflection"), EventKind("miscontrol"), EventKind("foul", touch="none"),
+    EventKind("out", touch="none"), EventKind("other", touch="none"),
 )  # fmt: skip
-"""What events and touches are, whoever tells of them."""
+"""What events and touches are, in the words of no provider."""
 
-PARTS = ("foot", "head", "chest", "hand")
+KINDS = tuple(kind.name for kind in EVENT_KINDS)
 
 FILLED_IN = {
-    "side": ("left", "right"), "height": ("low", "middle", "high"), "gait": ("standing", "running"), "jump": ("jump",),
+    "side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",),
 }  # fmt: skip
 """What may stand in braces in a row's words, and the words that it becomes."""
 
@@ -36,7 +53,7 @@ _STEP = "see docs/match-input.md"
 
 @dataclass(frozen=True)
 class EventRow:
-    """A row of the table: kind of KINDS, part of PARTS or "" for any, detail or "" for any, words as written, with
+    """A row of the table: kind of KINDS, part of BODY_PARTS or "" for any, detail or "" for any, words as written, with
     braces."""
 
     kind: str
@@ -56,8 +73,8 @@ class EventWords:
     ) -> tuple[str, ...]:
         """The words for something that happened, () where it makes no key moment.
 
-        kind: of KINDS. part: of PARTS, "" where unknown. details: what else is known. filled_in: what stands for the
-        names of FILLED_IN; those that are missing or "" are left out. Of the rows that fit, one that names the part
+        kind: of KINDS. part: of BODY_PARTS, "" where unknown. details: what else is known. filled_in: what stands for
+        the names of FILLED_IN; those that are missing or "" are left out. Of the rows that fit, one that names the part
         counts before one that does not, then one that names a detail, then the first.
         """
         fitting = [row for row in self.rows if row.kind == kind and row.part in ("", part)]
@@ -114,8 +131,8 @@ def _row(cells: list[str], known: frozenset[str], place: str) -> tuple[str, str,
     kind, part, detail, said = cells
     if kind not in KINDS:
         raise InputError(place, f"kind {kind!r}", f"one of {', '.join(KINDS)}", _STEP)
-    if part and part not in PARTS:
-        raise InputError(place, f"part {part!r}", f"one of {', '.join(PARTS)}, or none", _STEP)
+    if part and part not in BODY_PARTS:
+        raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or none", _STEP)
     words = said.split()
     for word in words:
         if word.startswith("{"):

@@ -6,11 +6,15 @@ import numpy as np
 
 from ..errors import InputError
 from ..motion.runs import equal_runs
+from .labels import list_gaits, list_labels
 
-LOCOMOTION = ("standing", "walking", "jogging", "running", "sprinting")
+LOCOMOTION = list_gaits()
 """The words that speed alone decides, slow to fast; "dribble" goes with any of them when the ball is at the feet."""
 
-LOCOMOTION_WORDS = frozenset((*LOCOMOTION, "dribble"))
+STANDING = LOCOMOTION[0]
+"""The gait that does not travel."""
+
+LOCOMOTION_WORDS = frozenset((*LOCOMOTION, *list_labels(ball="carries")))
 
 STANDING_SPEED = 0.3
 """m/s of a smoothed track; below it a player stands. (Raw tracking noise alone looks like that; a smoothed track that

@@ -12,6 +12,7 @@ from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.track import SampledTrack, zero_phase_hann
 from .gaits import without_short_runs
+from .vocabulary import DIRECTIONS
 
 _SPEEDS = np.array([0.8, 1.5, 2.5, 4.0, 6.0])
 _MOST_TURNED = np.array([np.pi, 1.3, 0.6, 0.2, 0.0])
@@ -42,4 +43,4 @@ def direction_words(offset: np.ndarray, fps: float) -> list[str]:
     """The words for walking that way at each of `offset` (T,) radians (`wanted_offset`): front, back, or to a side,
     none for less than _SHORTEST seconds. Facing to the left of one's way is walking to the right."""
     quarter = np.round(quaternion.wrapped(offset) / (np.pi / 2.0)).astype(int) % 4
-    return [("front", "right", "back", "left")[number] for number in without_short_runs(quarter, int(_SHORTEST * fps))]
+    return [DIRECTIONS[-number] for number in without_short_runs(quarter, int(_SHORTEST * fps))]

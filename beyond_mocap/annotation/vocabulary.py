@@ -15,52 +15,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 
-_PACES: dict = {"standing": {}, "running": {}}
+from .labels import KINDS, list_labels, read_labels
 
-VOCABULARY: dict[str, dict] = {
-    "continuous": {
-        "standing": {"knee": {}, "turning": {}},
-        "walking": {"back": {}, "dribble": {}, "turning": {}},
-        "jogging": {"dribble": {}},
-        "running": {"with": {}, "dribble": {}},
-        "sprinting": {"dribble": {}},
-        "sitting": {},
-        "ground": {},
-        "celebration": {"running": {"arms": {"inside": {}, "outside": {}}}, "arms": {"inside": {}, "outside": {}}},
-        "hold": {"high": {}, "middle": {}, "low": {}, "ground": {}, "sitting": {}},
-        "turning": {},
-        "dribble": {},
-    },
-    "discrete": {
-        "receive": {"foot": {"low": {"inside": {}}, "high": {"inside": {}}}, "body": {}},
-        "kick": {
-            "low": {"inside": _PACES, "outside": _PACES, "top": _PACES, "volley": _PACES},
-            "high": {"inside": _PACES, "top": _PACES},
-            "bicycle": {"half": {}},
-        },
-        "throwb": {"high": {}, "middle": {}},
-        "turning": {"dribble": {"letgo": {}}},
-        "header": {"standing": {"jump": {}}, "running": {"jump": {}}},
-        "scissors": {},
-        "getting_up": {"short_duration": {}, "long_duration": {}, "with": {}},
-        "fall": {"standing": {}, "slide": {}},
-        "fly": {"slide": {}},
-        "jump": {"slide": {}},
-        "intercept": {
-            "slide": {}, "knee": {}, "inside": {}, "outside": {}, "short_duration": {}, "long_duration": {},
-        },
-        "catchb": {
-            "high": {}, "middle": {}, "low": {}, "slide": {},
-            "dive": {"long_duration": {"low": {}}, "short_duration": {"high": {}, "low": {}}},
-        },
-        "stomp": {
-            "high": {}, "middle": {}, "low": {},
-            "dive": {"long_duration": {"high": {}, "low": {}}, "short_duration": {"high": {}, "low": {}}},
-        },
-    },
-    "modifier": {"right": {}, "left": {}, "front": {}, "back": {}, "subtle": {}, "with_setup": {}},
-}
-"""Faustino, Appendix A: kind -> root word -> nested words below it."""
+SIDES = ("left", "right")
+"""In the order of arrays by side."""
+
+DIRECTIONS = ("front", "left", "back", "right")
+"""Labels of the way a body goes or acts, in quarter turns counterclockwise from where it faces."""
+
+
+def _tree_of(kind: str) -> dict[str, dict]:
+    """A kind's root labels with the tree below each; of a root of two kinds that is in the discrete one."""
+    roots = [label for label in read_labels().values() if kind in label.kinds]
+    return {root.name: root.below if kind == root.kinds[-1] else {} for root in roots}
+
+
+VOCABULARY: dict[str, dict] = {kind: _tree_of(kind) for kind in KINDS}
+"""Faustino, Appendix A: kind -> root word -> nested words below it, from the table (`labels`)."""
 
 TRANSITION = "transition"
 """Alone in a timeline's line: this stretch is left to continuity."""
@@ -71,7 +42,7 @@ CONTINUOUS = frozenset(VOCABULARY["continuous"])
 DISCRETE = frozenset(VOCABULARY["discrete"]) - CONTINUOUS
 """Motions with a key moment. "turning" is in both of Faustino's lists and counts as continuous here."""
 
-_SIDES = {"left": "right", "right": "left"}
+_OPPOSITE_SIDE = dict(zip(SIDES, reversed(SIDES)))
 
 
 def vocabulary_words(extra: Iterable[str] = ()) -> frozenset[str]:
@@ -81,7 +52,7 @@ def vocabulary_words(extra: Iterable[str] = ()) -> frozenset[str]:
 
 def swap_sides(words: Iterable[str]) -> tuple[str, ...]:
     """The words of the mirrored motion (Faustino §3.1.2): left and right change places, also inside `turn_left`."""
-    return tuple("_".join(_SIDES.get(part, part) for part in word.split("_")) for word in words)
+    return tuple("_".join(_OPPOSITE_SIDE.get(part, part) for part in word.split("_")) for word in words)
 
 
 @lru_cache(maxsize=1024)
@@ -151,8 +122,8 @@ def spoken(words: Iterable[str]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1024)
 def _spoken(words: frozenset[str]) -> tuple[str, ...]:
-    sides = [word for word in ("left", "right") if word in words]
-    ways = [word for word in ("front", "back") if word in words]
+    sides = [word for word in SIDES if word in words]
+    ways = [word for word in list_labels(group="way") if word in words]
     actions = [word for _, word in _in_tree_order(words & DISCRETE)]
     rest = [word for _, word in _in_tree_order(words - DISCRETE - {*sides, *ways})]
     return (*actions, *sides, *rest, *ways) if actions else (*rest, *ways, *sides)

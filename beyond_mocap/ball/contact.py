@@ -16,12 +16,10 @@ from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..motion.striking import Surface, surfaces
+from ..motion.striking import BODY_PARTS, Surface, part_surfaces
 from ..motion.track import BALL_RADIUS
 
-PARTS = ("foot", "head", "chest", "hand", "tool")
-WORDS = {"foot": "foot", "head": "head", "chest": "chest", "hand": "throw"}
-"""A word of the vocabulary by which each part meets a ball."""
+PARTS = (*BODY_PARTS, "tool")
 
 JOINT_RADIUS = 0.06
 """Metres around a joint that strikes, where it is none of PARTS."""
@@ -59,8 +57,8 @@ def striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: Tool |
         raise InputError("part", f"{part} of side {side!r}", "left or right")
     if part == "tool":
         return _tool(skeleton, side, tool or Tool())
-    if part in WORDS:
-        found = [one for one in surfaces(skeleton, {WORDS[part], side}) if one.side in ("", side)]
+    if part in BODY_PARTS:
+        found = part_surfaces(skeleton, part, (side,))
         if found:
             return found[0]
     elif part in skeleton.names:

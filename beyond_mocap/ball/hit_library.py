@@ -17,7 +17,9 @@ import numpy as np
 from ..base.digest import hex_digest
 from ..library.clip import Clip
 from ..library.library import Library
-from ..motion.striking import striking_part
+from ..annotation.ball_contact import striking_part
+from ..annotation.ball_contact import may_use_several
+from ..motion.striking import BODY_PARTS
 from . import kept
 from .contact import Tool
 from .hits import HitMotion, analyse, hit_at
@@ -182,11 +184,11 @@ def _names(words, part: str, side: str) -> bool:
 def _told(clip: Clip, hit: HitMotion) -> bool:
     """Whether the clip's words call this a touch of the part, or say nothing here but elsewhere in the clip; words do
     not know tools and joints."""
-    if hit.part not in ("foot", "head", "chest", "hand"):
+    if hit.part not in BODY_PARTS:
         return True
     here = [row.words for row in clip.annotations if row.start <= hit.key <= row.end]
     rows = here or [row.words for row in clip.annotations]
-    juggles = hit.part in ("foot", "head", "chest") and any("juggling" in words for words in rows)
+    juggles = any(may_use_several(words, hit.part) for words in rows)
     return juggles or any(_names(words, hit.part, hit.side) for words in rows)
 
 

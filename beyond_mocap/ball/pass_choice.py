@@ -25,7 +25,7 @@ from .pass_costs import (
     ways_of, wished,
 )  # fmt: skip
 from .pass_court import ON_TARGET, Court, Link, Natural, Site, turned
-from .pass_scene import GROUND, Pass
+from .pass_scene import GROUND, RECEIVE, Pass
 from .strike_moments import StrikeMoments, launched_from
 
 TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
@@ -203,7 +203,7 @@ def _tried(
 
 def _pushes(site: Site, link: Link) -> np.ndarray:
     """(3,): the way in which the part pushes the ball: as it moves; who receives gives way, and has it before him."""
-    own = [0.8, 0.0, 0.6] if site.kind == "receive" else link.moment.struck.velocity[0]
+    own = [0.8, 0.0, 0.6] if site.kind == RECEIVE else link.moment.struck.velocity[0]
     return turned(np.array([own]), link.facing)[0]
 
 

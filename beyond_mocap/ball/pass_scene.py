@@ -13,6 +13,7 @@ from .contact import Tool
 from .hits import HitMotion
 
 KINDS = ("toss", "pass", "attack")
+RECEIVE = "receive"
 SIDES = ("", "left", "right")
 ERRORS = ("", "missed", "dropped")
 GROUND = "ground"

@@ -8,17 +8,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..annotation.ball_contact import striking_part
+from ..annotation.labels import list_labels
 from ..library.library import Library
-from ..motion.striking import striking_part
 from .contact import Tool, striking_surface
 from .hit_library import HitLibrary, LibraryHit
 from .orders import HitOrder
+from .pass_scene import RECEIVE
 from .physics import FASTEST
 
-TOOL_WORDS = frozenset({"stroke", "racquet", "racket", "swing", "bat", "serve"})
-RECEIVE_WORDS = frozenset({"receive", "trap", "catch", "catchb"})
-OTHER_ACTS = frozenset({"getting_up", "celebration", "fall", "fly"})
+TOOL_WORDS = frozenset(list_labels(part="tool"))
+RECEIVE_WORDS = frozenset(list_labels(ball="takes"))
+OTHER_ACTS = frozenset(list_labels(ball="never"))
 _SAID, _SILENT, _OTHER = range(3)
+_HAND_VOLLEY = {"hand", "volley"}  # a volleyball player's, no footballer's
 _SIDED = ("foot", "hand", "tool")
 
 
@@ -45,15 +48,14 @@ class Choice:
     def of_kind(self, kind: str, side: str = "") -> tuple[LibraryHit, ...]:
         """The strikes that serve a toss, a pass, an attack or a receive, the best first; side: "left", "right", or
         either."""
-        wanted = {"receive"} if kind == "receive" else {kind}
         found = self._called([i for i, one in enumerate(self.hits) if not side or one.hit.side in ("", side)])
         stops = [i for i in found if self.words[i] & RECEIVE_WORDS]
-        if kind == "receive":
+        if kind == RECEIVE:
             found = stops or found
         else:
             found = [i for i in found if i not in stops] or found
-        named = [i for i in found if self.words[i] & wanted]
-        if named or kind == "receive":
+        named = [i for i in found if kind in self.words[i]]
+        if named or kind == RECEIVE:
             return tuple(self.hits[i] for i in (named or sorted(found, key=lambda i: self.hits[i].hit.max_speed)))
         return self._by_speed(kind, found)
 
@@ -85,7 +87,7 @@ def _said_part(words: frozenset[str]) -> str | None:
     """Which part words say that strikes."""
     if words & TOOL_WORDS:
         return "tool"
-    return "hand" if "hand" in words and "volley" in words else striking_part(words)
+    return "hand" if _HAND_VOLLEY <= words else striking_part(words)
 
 
 def _words_at(library: Library, clip: int, frame: float) -> frozenset[str]:

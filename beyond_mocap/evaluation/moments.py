@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import KeyMoment
+from ..annotation.ball_contact import contact_gap, meeting_words, met_within
 from ..library.library import Library
 from ..library.made import MADE_FOLDER
-from ..motion.striking import contact_gap, meeting_words, met_within
+from ..motion.striking import part_surfaces, smallest_gap
 from ..motion.track import Track
 from ..take import DribbleTouch
 from . import pieces
@@ -164,7 +165,8 @@ def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Trac
 
 def _foot_gap(played: Played, frame: int, side: str) -> float:
     pose = played.positions[frame], played.rotations[frame]
-    return abs(float(contact_gap(played.motion.skeleton, *pose, ("dribble", side), written_ball(played, frame))))
+    foot = part_surfaces(played.motion.skeleton, "foot", (side,))
+    return abs(float(smallest_gap(foot, *pose, written_ball(played, frame))))
 
 
 def ball_shift(played: Played, frame: int, track: Track) -> float:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.striking import faster_middle, nearest_on, surfaces
+from ..annotation.ball_contact import surfaces
+from ..motion.striking import faster_middle, nearest_on
 from . import feet, jerk, root
 from .moments import Moment, met, touching_words, written_ball
 from .view import View

@@ -15,6 +15,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ..annotation.gaits import STANDING
 from ..errors import InputError
 from ..library.clip import Clip
 from ..library.library import Library
@@ -237,6 +238,6 @@ def source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_
 def _slowest_gait(library: Library) -> float:
     """Speed of the slowest gait that gets about, m/s; NaN where the library has no locomotion."""
     try:
-        return min(gait.speed for gait in library.gaits if gait.word != "standing")
+        return min(gait.speed for gait in library.gaits if gait.word != STANDING)
     except InputError:
         return np.nan

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-NOT_PLAYED = frozenset({"out", "foul", "other"})
+from ..annotation.event_words import EVENT_KINDS
+
+NOT_PLAYED = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "none")
 """Kinds that are no touch of the ball."""
 
-CERTAIN = frozenset({"pass", "shot", "clearance", "save", "catch", "punch", "pick-up"})
+CERTAIN = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "certain")
 """Kinds that are a touch for certain."""
 
 

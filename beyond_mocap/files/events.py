@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..annotation.event_words import KINDS, PARTS
+from ..annotation.event_words import KINDS
 from ..errors import InputError
+from ..motion.striking import BODY_PARTS
 from .event_data import MatchEvent, MatchEvents
 from .event_kinds import kind_of
 from .event_players import Who, same_players
@@ -165,8 +166,8 @@ def _plain(path: Path, match: Match | None):
         kind = said if said in KINDS else _TABLE_KINDS.get(said, "other")
         words = detail.replace("/", " ").replace("_", " ")
         part = row.get("part", "").lower() or _part_in(words, said)
-        if part and part not in PARTS:
-            raise InputError(place, f"part {part!r}", f"one of {', '.join(PARTS)}, or none")
+        if part and part not in BODY_PARTS:
+            raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or none")
         sides = f"{row.get('side', '')} {words}".split() if part == "foot" else ()
         side = next((one for one in ("left", "right") if one in sides), "")
         details = ("throw-in",) if "throw in" in f"{said} {words}".replace("-", " ") else ()

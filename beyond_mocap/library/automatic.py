@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..annotation.gaze import direction_words, wanted_offset
+from ..annotation.vocabulary import DIRECTIONS
 from ..motion.track import SampledTrack
 from .library import Library
 
@@ -16,6 +17,6 @@ def automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> 
     words: list[tuple[str, ...]] = []
     for number, direction in zip(gait, direction_words(wanted_offset(track), track.fps)):
         own = library.gaits[number].words
-        turned = tuple(direction if word == "front" else word for word in own)
+        turned = tuple(direction if word == DIRECTIONS[0] else word for word in own)
         words.append(turned if turned in recorded else own)
     return words

@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
-
-# a foot meets the ball in all of these: where one is lacking, another shows at least the same contact
-_FOOT_ON_BALL = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"})
+from ..annotation.ball_contact import shows_foot_on_ball
+from ..annotation.labels import list_labels
+from ..annotation.vocabulary import SIDES
 
 # words below several actions of App. A that name what the body does: a dive shows a dive, be it to catch or to punch
-_SAME_MOVE = frozenset({"dive"})
-_SIDES = frozenset({"left", "right"})
+_SAME_MOVE = frozenset(list_labels(in_flight=True))
+_SIDES = frozenset(SIDES)
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ def _actions(words: frozenset[str]) -> frozenset[str]:
 
 
 def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
-    both = any(part <= a for part in _FOOT_ON_BALL) and any(part <= b for part in _FOOT_ON_BALL)
-    return 0.5 if both else 0.0
+    """Where a foot on the ball is lacking, another shows at least the same contact."""
+    return 0.5 if shows_foot_on_ball(a) and shows_foot_on_ball(b) else 0.0
 
 
 def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...], words) -> tuple[Key, ...]:

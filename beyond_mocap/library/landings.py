@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import ClipAnnotation
+from ..annotation import LOCOMOTION, ClipAnnotation
 from ..motion.landing import ends_in_flight, landed
 from ..motion.motion import Motion
 from ..motion.moves import getting_up
 from .scan import CACHE_FOLDER
 
 LANDING_FOLDER = f"{CACHE_FOLDER}/made-landing/"
-_UPRIGHT, _MADE_FPS = {"standing", "walking"}, 60.0
+_UPRIGHT, _MADE_FPS = frozenset(LOCOMOTION[:2]), 60.0
 _FEET_DOWN = 0.35  # seconds of a way up in which the body still turns over: no foot stands
 
 

@@ -15,6 +15,8 @@ import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds
 from ..errors import InputError
+from ..annotation.gaits import STANDING
+from ..annotation.vocabulary import DIRECTIONS
 from ..motion.skeleton import Skeleton
 from . import cache
 from .clip import Clip
@@ -141,7 +143,7 @@ class Library:
 
 def _made(library: Library) -> Library:
     """What the recordings lack (`library.made`), described like them."""
-    speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != "standing"}
+    speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != STANDING}
     clips = []
     for made in made_clips(library.clips, library.frames, library.fps, speeds, library.keys):
         clip = Clip(made.name, False, made.motion, made.rows, made.standing)
@@ -203,7 +205,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
         if times:
             words = max(times, key=lambda w: (times[w], w))
             found.append(Gait(word, words, metres[word][words] / max(times[words], 1e-9)))
-    if not any(gait.word != "standing" for gait in found):
+    if not any(gait.word != STANDING for gait in found):
         raise InputError(
             library.folder, "no locomotion clip", "clips annotated walking, jogging, running or sprinting",
             "annotate which clips are locomotion",
@@ -219,5 +221,5 @@ def gait_word(row: ClipAnnotation) -> str | None:
     return words[0] if alone else None
 
 
-_DIRECTIONS = frozenset({"front", "back", "left", "right"})
+_DIRECTIONS = frozenset(DIRECTIONS)
 

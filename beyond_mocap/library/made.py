@@ -28,6 +28,7 @@ import numpy as np
 
 from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
 from ..base.vectors import cross
+from ..annotation import LOCOMOTION
 from ..motion import contacts, gestures, quaternion
 from ..motion.arctangent import arctan2
 from ..motion.course import GaitStyle
@@ -56,7 +57,7 @@ _GRID = 1.03  # ratio of neighbouring speeds
 _BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
 _PAIRS = 3  # of recordings mixed into each gap at most
 _STEADY = 0.15
-_GAITS = ("walking", "jogging", "running", "sprinting")
+_GAITS = LOCOMOTION[1:]
 # m/s of gaits that no recording shows
 _USUAL = {"running": 4.6, "sprinting": 7.3}
 # radians by which a runner's style differs from the usual at most

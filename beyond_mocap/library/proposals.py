@@ -20,25 +20,26 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
-from ..annotation import ClipAnnotation, automatic_gaits
-from ..annotation.gaits import without_short_runs
+from ..annotation import LOCOMOTION, ClipAnnotation, automatic_gaits
+from ..annotation.gaits import STANDING, without_short_runs
+from ..annotation.labels import find_label
+from ..annotation.vocabulary import DIRECTIONS
 from ..motion import contacts, quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.runs import equal_runs, runs
-from ..motion.striking import surfaces
+from ..motion.striking import part_surfaces
 from .library import Library
 from .proposal import Proposal
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
 
-GAITS = (("standing", 0.0), ("walking", 0.4), ("jogging", 2.0), ("running", 4.0), ("sprinting", 5.5))
+GAITS = tuple((word, find_label(word).gait) for word in LOCOMOTION)
 """Each gait and the speed in m/s from which on it holds, where no library says its own."""
 
 
-_WAYS = ("front", "left", "back", "right")
 _GAIT_SECONDS, _SHORTEST = 0.5, 0.5  # over which speed is averaged; of a stretch
 _FOOT_SECONDS = 0.012  # over which a foot's speed is averaged: a kick's peak is short
 # a kick's foot is faster against the pelvis than this, and than a stride at the pelvis's speed v: m/s, share of v, m/s
@@ -123,12 +124,12 @@ def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
     gait = automatic_gaits(seen.speed, fps, middle, limits, hysteresis=0.1, minimum=_SHORTEST)
     off = quaternion.wrapped(arctan2(seen.path[:, 1], seen.path[:, 0]) - seen.facing)
     quarter = without_short_runs(np.round(off / (np.pi / 2.0)).astype(int) % 4, int(_SHORTEST * fps))
-    way = np.where(np.array([words[g] == "standing" for g in gait]), -1, quarter)
+    way = np.where(np.array([words[g] == STANDING for g in gait]), -1, quarter)
     kind = without_short_runs(gait * 5 + way + 1, int(_SHORTEST * fps))
     out = []
     for start, stop in equal_runs(kind):
         number, facing = divmod(int(kind[start]), 5)
-        said = (words[number],) if facing == 0 else (words[number], _WAYS[facing - 1])
+        said = (words[number],) if facing == 0 else (words[number], DIRECTIONS[facing - 1])
         speed = float(seen.speed[start:stop].mean())
         near = float(np.min(np.abs(limits - speed))) if len(limits) else 1.0
         sure = float(np.clip(0.5 + near, 0.5, 0.95))
@@ -164,7 +165,7 @@ def _kick(seen: _Seen, over: float, key: int, side: str, speed: float) -> Propos
     height = float(ankle[key, 2] - seen.floor)
     words.append("high" if height > _HIGH else "low")
     words.append("inside" if _inner_share(seen, side, key) > _INSIDE else "top")
-    words.append(_WAYS[_kicked_way(seen, toe, key)])
+    words.append(DIRECTIONS[_kicked_way(seen, toe, key)])
     start, end = key - seen.frames(_KICK_BEFORE), key + seen.frames(_KICK_AFTER)
     return Proposal(seen.row(start, end, words, key), float(np.clip(0.5 + 0.15 * over, 0.5, 0.95)),
                     f"{side} foot at {speed:.1f} m/s")
@@ -172,7 +173,7 @@ def _kick(seen: _Seen, over: float, key: int, side: str, speed: float) -> Propos
 
 def _inner_share(seen: _Seen, side: str, key: int) -> float:
     """Cosine between where the foot goes and where its inner side looks: across the plane of shin and foot."""
-    ankle, tip = surfaces(seen.motion.skeleton, ("kick", side))[0].line(seen.places, seen.world)
+    ankle, tip = part_surfaces(seen.motion.skeleton, "foot", (side,))[0].line(seen.places, seen.world)
     shin = ankle[key] - seen.places[key, getattr(seen.body, side).lower_leg]
     inner = np.cross(tip[key] - ankle[key], shin) * (1.0 if side == "right" else -1.0)
     way = _velocity(ankle, seen.motion.fps, _FOOT_SECONDS)[key]
@@ -180,7 +181,7 @@ def _inner_share(seen: _Seen, side: str, key: int) -> float:
 
 
 def _kicked_way(seen: _Seen, toe: np.ndarray, key: int) -> int:
-    """Index into _WAYS: where the foot swings, against the body's facing."""
+    """Index into DIRECTIONS: where the foot swings, against the body's facing."""
     way = _velocity(toe, seen.motion.fps, _FOOT_SECONDS)[key]
     off = quaternion.wrapped(arctan2(way[1], way[0]) - seen.facing[key])
     return int(np.round(off / (np.pi / 2.0))) % 4

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..annotation.ball_contact import surfaces
 from ..motion.motion import Motion, pose_kinematics
-from ..motion.striking import ball_gap, surfaces
+from ..motion.striking import ball_gap
 from ..motion.track import BALL_RADIUS
 from ..polish.strike_at import Meeting, met_at
 from ..take import KeyResult, Take

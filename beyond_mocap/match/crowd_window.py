@@ -10,8 +10,8 @@ import numpy as np
 
 from ..library.features import FPS
 from ..library.library import Library
+from ..annotation.ball_contact import surfaces
 from ..motion.motion import Motion
-from ..motion.striking import surfaces
 from ..polish.crowd.correction import CURVES, Correction, applied
 from ..polish.crowd.spacing import keeping
 from ..take import Take

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..annotation.event_words import EVENT_KINDS
+from ..ball.tracked.kinds import TOUCH_KINDS
 from ..ball.tracked.solve import SolvedTouch
 from ..errors import InputError
 from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
@@ -41,10 +43,10 @@ _LEAST_CHANCE = 0.04  # of an event to fit with a wrong lag: few events in a sho
 _LEAST_SURE = 4.0  # nats
 _PAIR = 2.7  # nats that a pair is worth
 _DOUBTFUL = 0.3  # of an event that may be no touch, where one that is a touch for certain counts 1
-_SENDING = {"pass", "shot", "clearance"}
-_TAKING = {"receive", "catch", "pick-up"}
-_SENT = {"kick", "header", "throw-in"}  # kinds of touches
-_TAKEN = {"receive", "chest", "hand", "save"}
+_SENDING = {kind.name for kind in EVENT_KINDS if kind.ball == "sends"}
+_TAKING = {kind.name for kind in EVENT_KINDS if kind.ball == "takes"}
+_SENT = {kind.name for kind in TOUCH_KINDS if kind.ball == "sends"}
+_TAKEN = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
 _CHANCES = (-97.0, -71.0, -53.0, -37.0, 37.0, 53.0, 71.0, 97.0)  # s by which lags are wrong for certain
 _NEAR = 1.0  # s within which an event fits, for these shares
 _UNLIKE = 0.6  # s that another kind or part of the body is worth

@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
+from ..annotation.ball_contact import takes_with_foot
 from ..annotation.event_words import EventWords, read_event_words
+from ..ball.tracked import kinds
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
 from ..files.match_data import Match
@@ -37,11 +39,8 @@ _SHORTEST = 0.8  # s of a dribble
 _FORGETS = 0.2  # of what is doubtful in a touch, with an event that tells of it too
 _TOLD = 0.4  # confidence in an event without a touch
 _SHOWN_BY = 0.5  # s from an event without a touch within which another moment of the player shows it
-_LIKE_EVENT = {  # kind of a touch -> kind, details of an event like it
-    "kick": ("pass", ()), "receive": ("receive", ()), "dribble": ("dribble", ()), "header": ("pass", ()),
-    "chest": ("receive", ()), "throw-in": ("pass", ("throw-in",)), "hand": ("catch", ()), "save": ("save", ()),
-    "deflection": ("deflection", ()),
-}  # fmt: skip
+_LIKE_EVENT = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
+_DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,7 @@ def moment_of(
     """The key moment of a touch, None where it makes none. times (N,) s and path (N, 2) m of its player; heights:
     whether the touch's is known. event: what tells of the same touch; its words count before the touch's own."""
     kind, details = _LIKE_EVENT[touch.kind]
-    if touch.kind == "save" and np.linalg.norm(touch.after) > _CAUGHT:
+    if touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT:
         details = (*details, "parried")
     filled_in = {**seen_words(touch.time, times, path), **height_words(touch.part, touch.position[2], heights)}
     if event is None:
@@ -202,7 +201,7 @@ def apart(moments: Iterable[Moment]) -> list[Moment]:
 
 
 def _weight(moment: Moment) -> tuple[float, float]:
-    told = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * ("receive" not in moment.words)
+    told = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * (not takes_with_foot(moment.words))
     return moment.confidence + told, -moment.time
 
 
@@ -211,14 +210,14 @@ def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
     out, first = [], 0
     for index in range(1, len(touches) + 1):
         if index < len(touches) and touches[index].time - touches[index - 1].time < _CHAIN:
-            if touches[index - 1].kind in ("dribble", "receive"):
+            if touches[index - 1].kind in (kinds.DRIBBLE, kinds.RECEIVE):
                 continue
         chain, first = touches[first:index], index
         lasts = chain[-1].time - chain[0].time
-        if lasts >= _SHORTEST and any(touch.kind == "dribble" for touch in chain):
+        if lasts >= _SHORTEST and any(touch.kind == kinds.DRIBBLE for touch in chain):
             sure = float(np.mean([touch.confidence for touch in chain]))
             out.append(
-                Moment(round(chain[0].time, 3), ("dribble",), TOUCHES, round(sure, 3), round(chain[-1].time, 3))
+                Moment(round(chain[0].time, 3), _DRIBBLE.labels, TOUCHES, round(sure, 3), round(chain[-1].time, 3))
             )
     return out
 

@@ -17,47 +17,10 @@ from .humanoid import Humanoid, Limb, identify
 from .skeleton import Skeleton
 from .track import BALL_RADIUS
 
+BODY_PARTS = ("foot", "head", "chest", "hand")
 FOOT_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.10, 0.12, 0.05
-_FOOT_WORDS = {"kick", "foot", "volley", "bicycle", "slide", "pass", "dribble", "trap", "tackle", "receive"}
-# stomp is a keeper's punch
-_HAND_WORDS = {"throw", "throwb", "catch", "catchb", "stomp", "save", "dive"}
-_CATCHING = {"catch", "catchb", "throw", "throwb"}
-_FLIGHT_SECONDS = 0.6
 _HERE = np.zeros(3)
 _HERE.setflags(write=False)
-
-
-def striking_part(words: Iterable[str]) -> str | None:
-    """Which part meets the ball: "foot", "head", "chest" or "hand"; None for words that touch no ball.
-
-    A receive is taken with the foot unless it says body or chest (Faustino App. A: receive foot | body).
-    """
-    words = set(words)
-    if "header" in words or "head" in words:
-        return "head"
-    if {"chest", "body"} & words:
-        return "chest"
-    if _HAND_WORDS & words:
-        return "hand"
-    return "foot" if _FOOT_WORDS & words else None
-
-
-def meeting_words(played: Iterable[str], asked: Iterable[str]) -> tuple[str, ...]:
-    """The words that say which part meets the ball at a key moment: those that are played, else those asked for."""
-    played = tuple(played)
-    return played if striking_part(played) else tuple(asked)
-
-
-def met_within(words: Iterable[str]) -> float:
-    """Seconds after a key moment in which the ball may be met: 0, but for dives by hand, whose key is where the ball is
-    met or, in recordings without a ball, where the body takes off."""
-    words = set(words)
-    return _FLIGHT_SECONDS if "dive" in words and striking_part(words) == "hand" else 0.0
-
-
-def by_both_hands(words: Iterable[str]) -> bool:
-    """Whether the words ask for a ball between both hands, where both come near enough."""
-    return bool(_CATCHING & set(words))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +45,14 @@ class Surface:
         )
 
 
-def surfaces(skeleton: Skeleton, words: Iterable[str]) -> tuple[Surface, ...]:
-    """The surfaces that may meet the ball by these words: one per limb, of the side that is named or of both (a dive's
-    side is where it goes: either hand serves); none for words that touch no ball or a part that the skeleton lacks."""
-    words, body = set(words), identify(skeleton)
-    part = striking_part(words)
-    named = set() if part == "hand" and "dive" in words else words
-    sides = [side for side in ("left", "right") if side in named] or ["left", "right"]
-    limbs = [(side, getattr(body, side)) for side in sides]
+def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left", "right")) -> tuple[Surface, ...]:
+    """The surfaces of a part of BODY_PARTS: of foot and hand one for each of `sides`; none where the skeleton lacks
+    it."""
+    body = identify(skeleton)
     if part == "foot":
-        return tuple(_foot(skeleton, side, limb) for side, limb in limbs)
+        return tuple(_foot(skeleton, side, getattr(body, side)) for side in sides)
     if part == "hand":
-        hands = [(side, limb.hand) for side, limb in limbs if limb.hand is not None]
+        hands = [(side, getattr(body, side).hand) for side in sides if getattr(body, side).hand is not None]
         return tuple(Surface("hand", side, HAND_RADIUS, (hand, _HERE), (hand, _HERE)) for side, hand in hands)
     if part == "head" and body.head is not None:
         return (_head(skeleton, body),)
@@ -128,15 +87,15 @@ def nearest_on(line: tuple[np.ndarray, np.ndarray], place: np.ndarray) -> np.nda
     return start + np.clip(share, 0.0, 1.0)[..., None] * along
 
 
-def contact_gap(
-    skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, words: Iterable[str], ball: np.ndarray
+def smallest_gap(
+    found: Sequence[Surface], positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray
 ) -> np.ndarray:
-    """The smallest gap (...,) m of the surfaces that may meet the ball by these words, NaN without any; see `ball_gap`.
+    """The smallest gap (...,) m of the surfaces `found`, NaN without any; see `ball_gap`.
 
     positions (..., J, 3) m and rotations (..., J, 4): joints, world; ball (..., 3): its centre, m.
     """
-    found = [ball_gap(s.line(positions, rotations), s.radius, ball) for s in surfaces(skeleton, words)]
-    return np.min(found, axis=0) if found else np.full(np.shape(ball)[:-1], np.nan)
+    gaps = [ball_gap(s.line(positions, rotations), s.radius, ball) for s in found]
+    return np.min(gaps, axis=0) if gaps else np.full(np.shape(ball)[:-1], np.nan)
 
 
 def _foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:

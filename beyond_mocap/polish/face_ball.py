@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..annotation.ball_contact import surfaces
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..motion.striking import faster_middle, surfaces
+from ..motion.striking import faster_middle
 from .strike import Touch
 
 MOST = np.radians(60.0)

@@ -8,7 +8,7 @@ from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..motion.striking import Surface, surfaces
+from ..motion.striking import Surface, part_surfaces
 from ..motion.track import BALL_RADIUS, zero_phase_hann
 
 SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0
@@ -33,7 +33,7 @@ class Legs:
         body = identify(skeleton)
         self.fps = fps
         self.pelvis = places[:, body.hips, :2]
-        self.feet: tuple[Surface, ...] = surfaces(skeleton, {"dribble"})
+        self.feet: tuple[Surface, ...] = part_surfaces(skeleton, "foot")
         self.lines = [foot.line(places, world) for foot in self.feet]
         solid = [(line, foot.radius) for line, foot in zip(self.lines, self.feet)]
         for limb in (body.left, body.right):

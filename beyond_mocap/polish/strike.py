@@ -14,10 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.vectors import unit_vector
+from ..annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
+from ..annotation.labels import list_labels
 from ..motion.humanoid import Limb, heading_from_positions, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..motion.striking import Surface, ball_gap, by_both_hands, contact_gap, met_within, surfaces
+from ..motion.striking import Surface, ball_gap, part_surfaces
 from ..motion.track import BALL_RADIUS
 from .above_ground import above_ground
 from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
@@ -41,8 +43,8 @@ _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in whic
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
-_STOPPING = {"receive", "trap", "catch", "catchb"}
-_HIGH = {"high", "volley", "bicycle"}
+_STOPPING = frozenset(list_labels(ball="takes"))
+_HIGH = frozenset(list_labels(height="high"))
 _ROUNDS, _CLOSE = 4, 5e-4
 
 
@@ -237,7 +239,7 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
 
 def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
     """Line and radius of the foot and the shin that do not strike."""
-    other = next(part for part in surfaces(body.skeleton, {"foot"}) if part.side != foot.side)
+    other = next(part for part in part_surfaces(body.skeleton, "foot") if part.side != foot.side)
     knee, ankle = body.places[at, list(_chain(body, other)[1:])]
     return [(body.line(other, at), other.radius), ((knee, ankle), other.radius)]
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..annotation.ball_contact import surfaces
 from ..library.keys import Key
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.motion import at_frames, pose_kinematics
-from ..motion.striking import faster_middle, surfaces
+from ..motion.striking import faster_middle
 from ..motion.track import SampledTrack
 from .wanted import pool_frame
 

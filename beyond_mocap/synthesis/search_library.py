@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..annotation.ball_contact import takes_with_foot
 from ..library.chosen import with_chosen_gaits
 from ..library.library import Library
 from ..motion.track import sample
@@ -37,5 +38,5 @@ def _lacks(library: Library, plan: ResolvedPlan) -> bool:
     """Whether the recordings lack speeds that the track asks for, or touches as fast as its key moments."""
     track = sample(plan.track, library.fps, plan.asked.track_window)
     moments = np.array([key.in_force for key in plan.timeline.keys])
-    takes = np.array(["receive" in key.words for key in plan.timeline.keys], bool)
+    takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)
     return library.lacks(track.speed, np.interp(moments, track.times, track.speed), takes)

@@ -8,14 +8,15 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
+from ..annotation.ball_contact import may_use_foot
+from ..annotation.vocabulary import SIDES
 from ..library.keys import Key
 from ..library.library import Library
 
 WEAK_FOOT_COST = 1.5
 """What serving a key moment by the weak foot costs, in metres per second of missed speed."""
 
-_FOOT = ({"kick"}, {"receive", "foot"}, {"receive", "low"}, {"dribble"}, {"juggling"})
-_SIDES = {"left", "right"}
+_SIDES = frozenset(SIDES)
 
 
 def off_style_cost(library: Library, style: Sequence[str], weight: float, warnings: list[str]) -> np.ndarray | None:
@@ -48,5 +49,5 @@ def weak_foot_cost(asked: Iterable[str], choices: Sequence[Key], weak_foot: str)
     asked for, where no foot meets the ball, or where nobody minds."""
     if not weak_foot or _SIDES.intersection(asked):
         return np.zeros(len(choices))
-    weak = [weak_foot in key.words and any(part <= key.words for part in _FOOT) for key in choices]
+    weak = [weak_foot in key.words and may_use_foot(key.words) for key in choices]
     return WEAK_FOOT_COST * np.array(weak, float)

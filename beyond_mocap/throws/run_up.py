@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline
+from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, labels
 from ..ball.way import hermite
 from ..errors import InputError, TimedLine, told_time
 from ..known_touches import solve_touches
@@ -42,7 +42,8 @@ from ..synthesis.wanted import Wanted, build_order
 OWN_WORD = "generated"
 """The word that only the generated clip carries."""
 
-ACTIONS = {"throw": ("throwb",), "kick": ("kick",)}
+ACTIONS = {action: labels.list_labels(action=action, is_root=True)[:1] for action in labels.ACTIONS}
+"""What a network does -> the label of the key moment in which it does it."""
 """The words of a generated clip beside that."""
 
 SMOOTH = 0.7

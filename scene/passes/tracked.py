@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
+from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
 from ...beyond_mocap.errors import InputError
 from .. import bake, ball, channels, dots, lanes, lay_strips, linked, strips, tracks
 from ..clock import of_scene
@@ -21,10 +22,9 @@ if TYPE_CHECKING:
     from ...beyond_mocap.ball.tracked.solve import SolvedBall
 
 BALL = "Solved Ball"
-WORDS = {  # kind of a touch -> words of its key moment; dribbles are stretches, deflections nobody's wish
-    "kick": "kick", "receive": "receive foot", "header": "header", "chest": "receive body", "throw-in": "throwb",
-    "hand": "catchb", "save": "catchb",
-}  # fmt: skip
+WORDS = {kind.name: " ".join(kind.labels) for kind in TOUCH_KINDS if kind.labels and kind.ball != "carries"}
+"""Kind of a touch -> words of its key moment; dribbles are stretches, deflections nobody's wish."""
+
 NEAR = 0.4  # seconds between a touch and a key moment that is there already
 
 

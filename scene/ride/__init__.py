@@ -4,8 +4,7 @@
 - `curve`     the curve object: read as a path of the core, and made of one
 - `carrier`   how an armature's motion is read and written; `keys` in place, channel by channel
 - `rigs`      carriers of rigs of any kind: looked at once (`rig_look`, `rig_source`), their body found (`rig_parts`),
-  their
-              controls studied (`rig_study`) and carried (`rig_ride`)
+              their controls carried (`rig_ride`) by what `..rigs.control_study` finds
 - `source`    the original motion relative to its own path, kept while a path is dragged; the ground
 - `riders`    a ride begun, brought up to date, kept or ended
 - `live`      sees that something has been edited, and brings riders up to date

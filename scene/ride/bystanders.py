@@ -9,8 +9,9 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.errors import BeyondMocapError, InputError
-from .. import channels, rig_bake
+from .. import channels
 from ..measure import frames_per_second, units_per_metre
+from ..rigs.bone_curves import is_carried
 from . import rig_look, rig_parts
 from .carrier import carrier_of
 from .rig_source import Played, playing_strips
@@ -101,7 +102,7 @@ def _frames(scene, body) -> np.ndarray:
         first, last = int(played[0]), int(played[-1])
     except BeyondMocapError:  # a pose alone
         first = last = scene.frame_start
-    if rig_bake.is_carried(body):
+    if is_carried(body):
         first, last = min(first, scene.frame_start), max(last, scene.frame_end)
     step = max(int(frames_per_second(scene) / _A_SECOND), 1)
     return np.unique([*range(first, last, step), last, last + (first == last)])

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, pose_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
 from .. import bone_maps
-from ..rig_bake import IK_FOLLOWERS
+from ..rigs.driven import upright_turn
+from ..rigs.followers import list_followers
 from .rig_look import Look
 
 _SAME, _ALONG = 0.01, 0.94  # of the rig's size; cosine
@@ -60,7 +60,8 @@ def of_rig(rig: bpy.types.Object) -> Parts | None:
         return None
     spine = [part for part in shown if part.startswith("spine")]
     trunk = {"chest": spine[-1]} if spine and {"torso", "chest"} <= set(rig.data.bones.keys()) else {}
-    return Parts(controls, shown, _follows(rig, controls, shown), trunk, table.get("root", ""), True)
+    follows = list_followers(rig, controls, shown, _SAME * _size(rig))
+    return Parts(controls, shown, follows, trunk, table.get("root", ""), True)
 
 
 def _shown(rig: bpy.types.Object, control: str) -> str:
@@ -119,67 +120,9 @@ def _stands(rig: bpy.types.Object, shown: dict[str, str]) -> bool:
     return bool(length < 1e-9 or trunk @ leg > _UPRIGHT * length)
 
 
-def _follows(rig: bpy.types.Object, controls: dict[str, str], shown: dict[str, str]) -> dict[str, str]:
-    """Bones that go with a part: what its bones copy, targets and poles of its inverse kinematics, and known names."""
-    part_of = {bone: part for table in (controls, shown) for part, bone in table.items()}
-    trunk = {bone.name for part in ("hips", "left upper_leg", "right upper_leg") if part in controls
-             for bone in rig.data.bones[controls[part]].parent_recursive}
-    held = {name for bone in rig.pose.bones for one in bone.constraints if one.type in ("IK", "SPLINE_IK")
-            for name in [bone.name, *(up.name for up in bone.parent_recursive[: (one.chain_count or 99) - 1])]}
-    found: dict[str, str] = {}
-    heads, near = {part: rig.data.bones[bone].head_local for part, bone in shown.items()}, _SAME * _size(rig)
-
-    def limb_at(name: str) -> str | None:
-        """The part that rests where a helper bone does."""
-        at = rig.data.bones[name].head_local
-        return next((part for part, head in heads.items() if (head - at).length < near), None)
-
-    def goes(name: str, part: str) -> None:
-        bone = rig.data.bones.get(name)
-        while bone is not None and bone.name not in part_of and bone.name not in trunk:
-            if len(rig.pose.bones[bone.name].constraints) == 0:
-                found.setdefault(bone.name, part)
-            bone = bone.parent
-
-    for bone in rig.pose.bones:
-        for constraint in bone.constraints:
-            if getattr(constraint, "target", None) != rig:
-                continue
-            part = part_of.get(bone.name) or limb_at(bone.name)
-            if part is None:
-                continue
-            if constraint.type == "IK":
-                end, upper = _ends(part)
-                if end in shown:
-                    goes(constraint.subtarget, end)
-                if constraint.pole_target == rig and constraint.pole_subtarget and upper in shown:
-                    goes(constraint.pole_subtarget, upper)
-            elif constraint.type.startswith("COPY_") and bone.name in part_of and constraint.subtarget not in held:
-                goes(constraint.subtarget, part)
-    for bone in rig.data.bones:
-        for pattern, kind in IK_FOLLOWERS:
-            if pattern.match(bone.name):
-                side = "left" if re.search(r"(?i)(l|left)$", bone.name) else "right"
-                if f"{side} {kind}" in shown:
-                    found[bone.name] = f"{side} {kind}"
-    return {name: part for name, part in found.items() if name not in part_of}
-
-
-def _ends(part: str) -> tuple[str, str]:
-    """The end of the limb to which a part belongs, and its upper part."""
-    side, kind = part.partition(" ")[::2]
-    return (f"{side} hand", f"{side} upper_arm") if kind in ("lower_arm", "upper_arm", "hand") else (
-        f"{side} foot", f"{side} upper_leg")
-
-
 def upright(rig: bpy.types.Object, shown: dict[str, str]) -> np.ndarray:
     """The turn (4,), by quarter turns, that lets the armature's space stand along Z and face +X."""
-    heads = {part: np.array(rig.data.bones[bone].head_local) for part, bone in shown.items()}
-    legs = [heads["left upper_leg"], heads["right upper_leg"]]
-    up = nearest_axis(np.mean(legs, axis=0) - 0.5 * (heads["left foot"] + heads["right foot"]))
-    across = legs[0] - legs[1]
-    left = nearest_axis(across - (across @ up) * up)
-    return quaternion.from_matrix(np.stack([np.cross(left, up), left, up]))
+    return upright_turn({part: np.array(rig.data.bones[bone].head_local) for part, bone in shown.items()})
 
 
 def motion_of(rig: bpy.types.Object, parts: Parts, seen: Look, units: float, fps: float) -> Motion:

@@ -16,10 +16,10 @@ import numpy as np
 
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics
+from ..rigs.control_study import STATIC, Rides
 from .keys import rotation
 from .rig_look import Look
 from .rig_parts import Parts, in_world, rotations
-from .rig_study import STATIC, Rides
 
 WHOLE, OBJECT = "whole", "object"
 _SAME = 1e-6

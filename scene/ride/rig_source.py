@@ -11,12 +11,13 @@ from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from .. import channels
 from ..measure import frames_per_second, units_per_metre
-from . import rig_look, rig_parts, rig_study
+from ..rigs import control_study
+from ..rigs.posing import CHANNELS
+from . import rig_look, rig_parts
 from .rig_look import channel_of
 from .rig_ride import OBJECT, Carried, Rows, channel_values
 
-POSED = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
-_OBJECT = {*POSED, *(f"delta_{name}" for name in POSED)}
+_OBJECT = {*CHANNELS, *(f"delta_{name}" for name in CHANNELS)}
 BONE = re.compile(r'^pose\.bones\["((?:[^"\\]|\\.)*)"\]\.(\w+)$')
 _MOST = 20000  # frames
 
@@ -38,7 +39,7 @@ class RigSource:
             parts = rig_parts.of_rig(rig) or rig_parts.whole(rig, seen, played.object_keyed, self.units)
             self.motion = rig_parts.motion_of(rig, parts, seen, self.units, frames_per_second(scene))
             controls = _controls(rig, side, parts, played)
-            rides = rig_study.study(rig, side, controls, list(parts.shown.values()))
+            rides = control_study.study_rides(rig, side, controls, list(parts.shown.values()))
         self._rows: Rows | None = None
         self._ways = seen.lies @ np.linalg.inv(seen.basis)
         self._hangs = bool(np.ptp(self._ways, axis=0).max() > 1e-6)
@@ -80,7 +81,7 @@ class RigSource:
                 table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers((path, index, "is"), table)
             )
         match = BONE.match(path)
-        if match is None or match[2] not in POSED or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
+        if match is None or match[2] not in CHANNELS or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
             return None
         table = self.seen.channels[match[2]][:, self.seen.number(bpy.utils.unescape_identifier(match[1]))]
         if match[2] == "rotation_quaternion":
@@ -155,7 +156,7 @@ class Played:
         self.places = {place for place in found if _is_posed(place[0]) or place[0] in self.others}
         self.switches = any(path not in _OBJECT for path in self.others)
         self.bones = {
-            bpy.utils.unescape_identifier(m[1]) for path in paths if (m := BONE.match(path)) and m[2] in POSED
+            bpy.utils.unescape_identifier(m[1]) for path in paths if (m := BONE.match(path)) and m[2] in CHANNELS
         }
         self.object_keyed = bool(_OBJECT & paths)
 
@@ -183,7 +184,7 @@ def _cycles(curve: bpy.types.FCurve) -> bool:
 
 def _is_posed(path: str) -> bool:
     match = BONE.match(path)
-    return bool(match and match[2] in POSED)
+    return bool(match and match[2] in CHANNELS)
 
 
 def _resolves(rig: bpy.types.Object, path: str) -> bool:
@@ -204,13 +205,14 @@ def _controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: Playe
     free = [bone.name for bone in rig.data.bones
             if (bone.name in top or bone.parent is not None and bone.parent.name in above)
             and not len(rig.pose.bones[bone.name].constraints)]
-    names = [*played.bones, *parts.controls.values(), *parts.follows, *([parts.root] if parts.root else []), *free]
+    own = [*parts.controls.values(), *parts.follows, *([parts.root] if parts.root else [])]
+    names = [*sorted(played.bones), *own, *free]
     names = [name for name in dict.fromkeys(names) if name in rig.data.bones and name not in driven]
     side.frame_set(int(played.frames[0]))
     if not played.switches:
         shown = [bone.name for bone in rig.data.bones if bone.use_deform] or list(rig.data.bones.keys())
         unkeyed = [name for name in names if name not in played.bones]
-        idle = {name for name, moves in zip(unkeyed, rig_study.moves(rig, side, unkeyed, shown)) if not moves}
+        idle = {name for name, moves in zip(unkeyed, control_study.list_moving(rig, side, unkeyed, shown)) if not moves}
         names = [name for name in names if name not in idle]
     return sorted(names, key=lambda name: len(rig.data.bones[name].parent_recursive))
 
@@ -221,6 +223,6 @@ def _driven(rig: bpy.types.Object) -> set[str]:
     found = set()
     for driver in data.drivers if data is not None else ():
         match = BONE.match(driver.data_path)
-        if match and match[2] in POSED and not driver.mute:
+        if match and match[2] in CHANNELS and not driver.mute:
             found.add(bpy.utils.unescape_identifier(match[1]))
     return found

@@ -15,13 +15,15 @@ import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.errors import InputError
-from .. import armature, channels, rig_bake
+from .. import armature, channels
 from ..action import PLACED
 from ..measure import frames_per_second, units_per_metre
+from ..rigs.posing import CHANNELS
+from ..rigs.bone_curves import is_carried
 from ..set_aside import play_as_before, put_aside, stance_of, stand
 from . import keys, rig_parts
 from .carrier import MARK, Carrier, Read
-from .rig_source import BONE, POSED, RigSource, layered, playing_strips
+from .rig_source import BONE, RigSource, layered, playing_strips
 
 KIND = "beyond_mocap_ride_kind"
 """Custom property of a rider's action that is carried as a rig: "rig", or "layers" where it stands for several."""
@@ -174,7 +176,7 @@ def rides_as_rig(body: bpy.types.Object) -> bool:
 def is_plain(body: bpy.types.Object) -> bool:
     """Whether an armature shows just what the channels of its bones say, of which the topmost alone travels."""
     data = body.animation_data
-    if data is None or layered(body) or rig_bake.is_carried(body):
+    if data is None or layered(body) or is_carried(body):
         return False
     bones = body.pose.bones
     if any(not one.mute and one.influence > 0.0 for bone in bones for one in bone.constraints):
@@ -193,7 +195,7 @@ def is_plain(body: bpy.types.Object) -> bool:
         if curve.mute or curve.modifiers:
             return False
         posed = BONE.match(path)
-        moves = path in POSED or posed is not None and posed[2] in ("location", "scale") and not path.startswith(top)
+        moves = path in CHANNELS or posed is not None and posed[2] in ("location", "scale") and not path.startswith(top)
         if (moves or posed is not None and posed[2] == "scale") and _varies(curve):
             return False
     humanoid = rig_parts.of_rig(body)

@@ -9,9 +9,13 @@ import numpy as np
 
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from .. import armature, bone_maps, channels, rig_bake
+from .. import bone_maps, channels, rig_bake
 from ..ride.carrier import carrier_of
 from ..ride.rigs import is_plain
+from ..rigs import bake_record
+from ..rigs.driven import Driven, check
+from ..rigs.fit import BakeOptions
+from ..rigs.source import Source
 from .settings import MARK
 
 if TYPE_CHECKING:
@@ -20,14 +24,14 @@ if TYPE_CHECKING:
 _own: dict[int, tuple["Motion | None", int]] = {}
 
 
-def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> rig_bake.Driven | None:
+def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
     """An armature whose bones do not simply play what they show, by its driven bones; None for plain ones. InputError
     where it cannot be baked onto."""
     wish = body.beyond_mocap_throw
     if not wish.rigged and (wish.before.kept or not _posed_otherwise(body)):
         return None
-    rig_bake.check(body)
-    return rig_bake.Driven(body, bone_maps.kept(body) or bone_maps.suggest(body), scene)
+    check(body)
+    return Driven(body, bone_maps.kept(body) or bone_maps.suggest(body), scene)
 
 
 def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
@@ -49,7 +53,7 @@ def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None"
     return found
 
 
-def stands(rig: rig_bake.Driven) -> tuple[np.ndarray, float]:
+def stands(rig: Driven) -> tuple[np.ndarray, float]:
     """Where a rig that plays nothing stands, (2,) m, and which way it faces, rad."""
     place = rig.placement.to_world(np.array([rig.rest_place[rig.bone("hips")]]))[0]
     ahead = quaternion.rotate(quaternion.inverse(rig.upright), np.array([1.0, 0.0, 0.0]))
@@ -57,7 +61,7 @@ def stands(rig: rig_bake.Driven) -> tuple[np.ndarray, float]:
     return np.asarray(place[:2]), float(np.arctan2(ahead[1], ahead[0]))
 
 
-def lift(rig: rig_bake.Driven) -> float:
+def lift(rig: Driven) -> float:
     """m that the rig's toes stand higher than those of its bare skeleton."""
     from ...beyond_mocap.motion.contacts import sole_height
 
@@ -67,11 +71,11 @@ def lift(rig: rig_bake.Driven) -> float:
 def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
     """Let a rig play a motion of its driven skeleton; `take_away` takes it away again.
     Returns lines about it."""
-    source = rig_bake.Source(motion, start, name)
-    fitted = rig_bake.fitted(body, table, source, scene, rig_bake.Wishes(exact=True))
+    source = Source(motion, start, name)
+    fitted = rig_bake.fitted(body, table, source, scene, BakeOptions(exact=True))
     played = channels.playing(body)[0]
     if played is not None and not played.get(MARK):
-        played.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
+        played.pop(bake_record.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
     baked = rig_bake.lay(fitted)
     baked.action[MARK] = True
     return baked.told
@@ -79,10 +83,10 @@ def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], m
 
 def take_away(body: bpy.types.Object) -> None:
     """Let a rig play what it did before its throw; a bake below it can be taken away as before."""
-    rig_bake.remove(body)
+    bake_record.remove(body)
     played = channels.playing(body)[0]
-    if played is not None and rig_bake.BEFORE in played:
-        played[rig_bake.MARK] = True
+    if played is not None and bake_record.BEFORE in played:
+        played[bake_record.MARK] = True
 
 
 def _posed_otherwise(body: bpy.types.Object) -> bool:

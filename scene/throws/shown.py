@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from .. import action, bake, channels, linked, rig_bake, session
+from .. import action, bake, channels, linked, session
+from ..rigs.bake_record import BEFORE, KEYS
+from ..rigs.bake_record import MARK as BAKE_MARK
 from ..measure import frames_per_second
 from ..set_aside import bring_back, drop, put_aside
 from . import flown, order, rigged
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from .made import Result
 
 MOST_LINES = 12
-BAKED = (rig_bake.MARK, rig_bake.BEFORE, rig_bake.KEYS)
+BAKED = (BAKE_MARK, BEFORE, KEYS)
 """What tells a bake that is taken away again."""
 RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "told")
 

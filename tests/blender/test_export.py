@@ -25,7 +25,8 @@ SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "export", "deliver")}
+            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rigs.source", "rigs.fit", "export",
+                         "deliver")}
 
 
 @pytest.fixture(scope="session")
@@ -132,9 +133,10 @@ def test_axes_of_engines_come_back_too(rooms, body, tmp_path, format, engine):
 
 
 def baked(rooms, rig, body, **wishes):
-    source = rooms["rig_bake"].source_of(body, bpy.context.scene)
+    source = rooms["rigs.source"].source_of(body, bpy.context.scene)
     table = rooms["bone_maps"].suggest(rig)
-    return rooms["rig_bake"].bake(rig, table, source, bpy.context.scene, rooms["rig_bake"].Wishes(**wishes))
+    options = rooms["rigs.fit"].BakeOptions(**wishes)
+    return rooms["rig_bake"].lay(rooms["rig_bake"].fitted(rig, table, source, bpy.context.scene, options))
 
 
 @pytest.mark.parametrize("format", SUFFIXES)

@@ -34,8 +34,9 @@ def recorded(part, core):
         if onto is None:
             return body
         rig = onto() if callable(onto) else rigs.rigify(onto)
+        source, options = part("rigs.source").source_of(body, scene), part("rigs.fit").BakeOptions(**wishes)
         bake = part("rig_bake")
-        bake.bake(rig, part("bone_maps").suggest(rig), bake.source_of(body, scene), scene, bake.Wishes(**wishes))
+        bake.lay(bake.fitted(rig, part("bone_maps").suggest(rig), source, scene, options))
         bpy.data.objects.remove(body)
         bpy.context.view_layer.update()
         return rig

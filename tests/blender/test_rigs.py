@@ -26,9 +26,8 @@ FAMILIES = {"mixamo": rigs.mixamo, "unreal": rigs.unreal, "metahuman": rigs.meta
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rig_controls", "key_reduction",
-                         "rig",
-                         "rig_copy")}
+            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rigs.posing", "rigs.source",
+                         "rigs.fit", "key_reduction", "rig", "rig_copy")}
 
 
 @pytest.fixture(scope="session")
@@ -61,8 +60,9 @@ def rigify(tmp_path_factory):
 def bake(rooms, rig, body, **wishes):
     scene = bpy.context.scene
     table = rooms["bone_maps"].suggest(rig)
-    source = rooms["rig_bake"].source_of(body, scene)
-    return table, rooms["rig_bake"].bake(rig, table, source, scene, rooms["rig_bake"].Wishes(**wishes))
+    source = rooms["rigs.source"].source_of(body, scene)
+    options = rooms["rigs.fit"].BakeOptions(**wishes)
+    return table, rooms["rig_bake"].lay(rooms["rig_bake"].fitted(rig, table, source, scene, options))
 
 
 def directions(rig, table, frames=range(START, START + 60, 6)):
@@ -266,18 +266,18 @@ def test_fewer_keys_stay_within_the_tolerance(rooms, body):
 
 def test_what_is_carried_over_is_the_takes_own_contact(rooms, body):
     scene = bpy.context.scene
-    source = rooms["rig_bake"].source_of(body, scene, lambda frames: np.zeros((len(frames), 2), bool))
+    source = rooms["rigs.source"].source_of(body, scene, lambda frames: np.zeros((len(frames), 2), bool))
     assert source.standing.shape == (60, 2) and source.start == START
 
 
 def test_nla_strips_are_baked_as_they_play(rooms, body):
-    expected = rooms["rig_bake"].source_of(body, bpy.context.scene)
+    expected = rooms["rigs.source"].source_of(body, bpy.context.scene)
     data = body.animation_data
     action, slot = data.action, data.action_slot
     data.action = None
     strip = data.nla_tracks.new().strips.new("clip", START, action)
     strip.action_slot = slot
-    found = rooms["rig_bake"].source_of(body, bpy.context.scene)
+    found = rooms["rigs.source"].source_of(body, bpy.context.scene)
     assert found.start == START and len(found.motion) == len(expected.motion)
     np.testing.assert_allclose(found.motion.root_positions, expected.motion.root_positions, atol=1e-5)
     assert np.abs(np.sum(found.motion.rotations * expected.motion.rotations, axis=-1)).min() > 1 - 1e-6
@@ -318,7 +318,7 @@ def test_a_removed_bake_leaves_nothing_behind(rooms, body):
     own = rig.animation_data.action.name
     settings = choose(rig, body)
     settings.root = "SMOOTH"
-    before = {b.name: [tuple(getattr(b, c)) for c in rooms["rig_controls"].CHANNELS] for b in rig.pose.bones}
+    before = {b.name: [tuple(getattr(b, c)) for c in rooms["rigs.posing"].CHANNELS] for b in rig.pose.bones}
     actions = sorted(a.name for a in bpy.data.actions)
     press(bpy.ops.beyond_mocap.bake_to_rig)
     press(bpy.ops.beyond_mocap.bake_to_rig)
@@ -326,7 +326,7 @@ def test_a_removed_bake_leaves_nothing_behind(rooms, body):
     bpy.context.scene.frame_set(START + 30)
     press(bpy.ops.beyond_mocap.unbake)
     assert rig.animation_data.action.name == own and sorted(a.name for a in bpy.data.actions) == actions
-    assert {b.name: [tuple(getattr(b, c)) for c in rooms["rig_controls"].CHANNELS] for b in rig.pose.bones} == before
+    assert {b.name: [tuple(getattr(b, c)) for c in rooms["rigs.posing"].CHANNELS] for b in rig.pose.bones} == before
 
 
 def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.ball_contact import surfaces
 from beyond_mocap.errors import Cancelled, InputError, NotInLibrary
 from beyond_mocap.library.build import build
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.motion.striking import HEAD_RADIUS, surfaces
+from beyond_mocap.motion.striking import HEAD_RADIUS
 from beyond_mocap.motion.track import BALL_RADIUS, Track, clean, sample, zero_phase_hann
 from beyond_mocap.plan import METHODS, Plan
 from beyond_mocap.synthesize import synthesize

@@ -2,11 +2,40 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ...motion.track import BALL_RADIUS
 
-KINDS = ("kick", "receive", "dribble", "header", "chest", "throw-in", "hand", "save", "deflection")
+
+@dataclass(frozen=True)
+class TouchKind:
+    """What a touch was. ball: "sends", "takes", "carries" or "". labels: of what a player does at it, () where it is no
+    wish. event, details: kind and details of an event like it."""
+
+    name: str
+    ball: str
+    labels: tuple[str, ...]
+    event: str
+    details: tuple[str, ...] = ()
+
+
+KICK, RECEIVE, DRIBBLE, HEADER, CHESTED = "kick", "receive", "dribble", "header", "chest"
+THROW_IN, HAND, SAVE, DEFLECTION = "throw-in", "hand", "save", "deflection"
+
+TOUCH_KINDS = (
+    TouchKind(KICK, "sends", ("kick",), "pass"),
+    TouchKind(RECEIVE, "takes", ("receive", "foot"), "receive"),
+    TouchKind(DRIBBLE, "carries", ("dribble",), "dribble"),
+    TouchKind(HEADER, "sends", ("header",), "pass"),
+    TouchKind(CHESTED, "takes", ("receive", "body"), "receive"),
+    TouchKind(THROW_IN, "sends", ("throwb",), "pass", ("throw-in",)),
+    TouchKind(HAND, "takes", ("catchb",), "catch"),
+    TouchKind(SAVE, "takes", ("catchb",), "save"),
+    TouchKind(DEFLECTION, "", (), "deflection"),
+)
+KINDS = tuple(kind.name for kind in TOUCH_KINDS)
 CHEST, HEAD = 0.95, 1.45  # m of the ball's centre from which the chest, the head meets it
 _FAST = 7.0  # m/s relative to the player, more than a dribble's touch
 _STOPPED = 4.0  # m/s, less than a pass
@@ -33,14 +62,14 @@ def kind_of(part: str, before: np.ndarray, after: np.ndarray, same_next: bool, s
     """
     fast_in, fast_out = np.linalg.norm(before[:2]), np.linalg.norm(after[:2])
     if part == "head":
-        return "header"
+        return HEADER
     if _is_deflection(before, after, fast_in, fast_out, same_next):
-        return "deflection"
+        return DEFLECTION
     if part == "chest" and fast_out < _FAST:
-        return "chest"
+        return CHESTED
     if same_next and fast_out < _FAST:
-        return "dribble" if same_before and fast_in < _STOPPED else "receive"
-    return "kick"
+        return DRIBBLE if same_before and fast_in < _STOPPED else RECEIVE
+    return KICK
 
 
 def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
@@ -78,8 +107,8 @@ def keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height
     if toward > _SHOT:
         across = place[1] + before[1] * away / toward
         if abs(across) < GOAL_WIDTH / 2.0 + _BESIDE:
-            return ("foot" if known_height and place[2] < _LOW else "hand"), "save"
-    return ("hand", "hand") if known_height and place[2] > _HELD else None
+            return ("foot" if known_height and place[2] < _LOW else "hand"), SAVE
+    return ("hand", HAND) if known_height and place[2] > _HELD else None
 
 
 def keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:

@@ -251,7 +251,7 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
         kind = kinds.kind_of(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
         if kinds.is_throw_in(place[k], before[k], after[k], since, pitch[1]):
-            part, kind = "hand", "throw-in"
+            part, kind = "hand", kinds.THROW_IN
         elif player in goals:
             part, kind = kinds.keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
         sure = _sure(margin[k], away[:, k], player)
@@ -285,7 +285,7 @@ def _thrown_in(solved: list[SolvedTouch], ends: list[BallEnd], width: float) -> 
         takes = (k for k in later if out[k].position[1] * end.y > 0.0)
         first = next((k for k in takes if kinds.leaves_line(out[k].position, out[k].after, width)), None)
         if end.kind == "touch line" and first is not None:
-            out[first] = replace(out[first], part="hand", kind="throw-in")
+            out[first] = replace(out[first], part="hand", kind=kinds.THROW_IN)
     return out
 
 
@@ -297,13 +297,13 @@ def _along(touch: SolvedTouch, path: SolvedPath, heights: bool) -> SolvedTouch:
     """The touch with the velocities that the path has just before and after it; where the feed has no heights, with the
     height and the part that a flight into it asks for."""
     before, after = path.velocity(np.array([touch.time - 1e-4, touch.time + 1e-4]))
-    if touch.kind in ("receive", "dribble", "chest"):
+    if touch.kind in (kinds.RECEIVE, kinds.DRIBBLE, kinds.CHESTED):
         after = np.array([after[0], after[1], max(after[2], -_SINKS)])
     if heights or touch.part == "hand":
         return replace(touch, before=before, after=after)
     height = float(path.at(np.array([touch.time]))[0, 2])
     part = kinds.part_of(height)
-    kind = {"head": "header", "chest": "chest"}.get(part, touch.kind)
+    kind = {"head": kinds.HEADER, "chest": kinds.CHESTED}.get(part, touch.kind)
     position = np.array([*touch.position[:2], kinds.ground_height(height)])
     return replace(touch, before=before, after=after, position=position, part=part, kind=kind)
 

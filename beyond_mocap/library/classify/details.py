@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..proposal import Proposal
+from ...annotation.labels import GROUPS, list_labels
 
-EXCLUSIVE = (
-    ("left", "right"), ("low", "middle", "high"), ("inside", "outside", "top", "volley"), ("standing", "running"),
-    ("front", "back"),
-)
+EXCLUSIVE = tuple(list_labels(group=group) for group in GROUPS)
 """Words of which an act has one at most; any other word is there or not."""
 
 _SPREAD, _PENALTY = 9.0, 0.05  # of a window's components; C

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...annotation import LOCOMOTION, VOCABULARY, ClipAnnotation, spoken
+from ...annotation.labels import list_labels
 from ...errors import Cancelled, InputError
 from ...motion.humanoid import identify
 from ...motion.motion import Motion
@@ -17,7 +18,7 @@ from ..proposal import Proposal
 from ..word_sources import is_open
 from .signals import Signals, signals
 
-_COLOURS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], "low", "middle", "high"))
+_COLOURS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], *list_labels(group="height")))
 
 
 @dataclass(frozen=True, eq=False)

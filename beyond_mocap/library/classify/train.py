@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...annotation import swap_sides
+from ...annotation.labels import find_label
 from ...errors import InputError
 from ..proposal import Proposal
 from . import confidence, details, kernel
@@ -61,7 +62,7 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
             if cancelled is not None and cancelled():
                 raise Cancelled("learning: cancelled")
             if progress is not None:
-                progress(number / len(wanted), f"Learning {word.replace('_', ' ')}")
+                progress(number / len(wanted), f"Learning {find_label(word).title}")
             acts.append(_act(word, moment, sides))
     kept = tuple(act for act in acts if act is not None)
     if not kept:

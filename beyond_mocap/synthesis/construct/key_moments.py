@@ -6,7 +6,7 @@ import numpy as np
 
 from ...annotation import spoken
 from ...library.library import Library
-from ...motion.striking import striking_part
+from ...annotation.ball_contact import striking_part
 from ...polish.strike import Touch
 from ...take import KeyResult
 from ..edit_list import EditList

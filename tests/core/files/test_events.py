@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.annotation.event_words import KINDS, PARTS
+from beyond_mocap.annotation.event_words import KINDS
 from beyond_mocap.errors import InputError
 from beyond_mocap.files.event_players import Who, same_players
 from beyond_mocap.files.event_providers import guessed_event_provider, other_file
 from beyond_mocap.files.events import read_events
 from beyond_mocap.files.match_data import Match, MatchPlayer
+from beyond_mocap.motion.striking import BODY_PARTS
 
 PLAYERS = (
     MatchPlayer("h7", "home", "Ana Núñez", 7), MatchPlayer("h9", "home", "Bo Berg", 9),
@@ -54,7 +55,7 @@ def test_every_provider_is_known_by_its_form(name, meta, provider, count):
     events = read_events(folder / name, meta and folder / meta)
     assert events.provider == provider and len(events.events) == count
     for event in events.events:
-        assert event.kind in KINDS and event.part in ("", *PARTS) and event.side in ("", "left", "right")
+        assert event.kind in KINDS and event.part in ("", *BODY_PARTS) and event.side in ("", "left", "right")
         assert event.period >= 1 and np.isfinite(event.time) and event.team in ("home", "away", "")
     clock = [(event.period, event.time) for event in events.events]
     assert clock == sorted(clock) and any(event.kind == "pass" and event.player for event in events.events)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.motion import striking
+from beyond_mocap.annotation.ball_contact import contact_gap, met_within, striking_part
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
@@ -16,7 +16,7 @@ TIPS = JOINTS[list(SKELETON.end_parents)] + SKELETON.end_offsets
 
 
 def gap(words, ball):
-    return striking.contact_gap(SKELETON, JOINTS, TURNS, words.split(), np.asarray(ball))
+    return contact_gap(SKELETON, JOINTS, TURNS, words.split(), np.asarray(ball))
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def gap(words, ball):
     ],
 )
 def test_words_name_the_part(words, part):
-    assert striking.striking_part(words.split()) == part
+    assert striking_part(words.split()) == part
 
 
 @pytest.mark.parametrize("distance", [-0.02, 0.0, 0.005, 0.3])
@@ -70,4 +70,4 @@ def test_either_hand_serves_a_dive_whose_side_is_where_it_goes():
                      ("kick slide", False)]
 )
 def test_only_a_dive_by_hand_may_meet_the_ball_after_its_key(words, later):
-    assert (striking.met_within(words.split()) > 0.0) == later
+    assert (met_within(words.split()) > 0.0) == later

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.ball_contact import surfaces
 from beyond_mocap.motion.contacts import detect
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.motion.striking import ball_gap, surfaces
+from beyond_mocap.motion.striking import ball_gap
 from beyond_mocap.motion.track import BALL_RADIUS
 from beyond_mocap.polish.dribble import dribble
 from beyond_mocap.polish.meeting import lead, led

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.ball_contact import surfaces
 from beyond_mocap.motion.gestures import strike as made_strike
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.motion.striking import surfaces
 from beyond_mocap.polish.face_ball import MOST, turned_to_ball
 from beyond_mocap.polish.strike import Touch
 from beyond_mocap.synthesis.construct.construction import apply_heading

@@ -5,12 +5,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.ball_contact import surfaces
 from beyond_mocap.motion import gestures
 from beyond_mocap.motion.contacts import detect
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, pose_kinematics
-from beyond_mocap.motion.striking import ball_gap, surfaces
+from beyond_mocap.motion.striking import ball_gap
 from beyond_mocap.polish.strike import BALL_NOISE, MOST_DROP, MOST_MOVED, Touch, strike
 
 FPS = 30.0

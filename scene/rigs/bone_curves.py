@@ -1,0 +1,179 @@
+"""Where a rig's driven bones have to be at each frame to show a motion, and the curves of their channels.
+
+With S the turn and size from the armature's space to the core's skeleton, O the object's turn in the scene, W_j the
+core's world rotation of a joint and R_j its bone's rotation at rest, the bone has to be at O^-1 W_j S R_j.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.motion import Motion, forward_kinematics
+from .. import armature
+from ..measure import units_per_metre
+from .driven import Driven
+
+
+def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
+    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that the driven bones are to have, and lines
+    told."""
+    heads, world = forward_kinematics(motion)
+    hips = heads[:, driven.parts.index("hips")]
+    told = []
+    if root != "KEEP":
+        root_turn, root_place = _root_line(driven, motion, heads, "straight" if root == "STRAIGHT" else "smooth")
+    if root == "IN_PLACE":  # what the line does is taken off everything: what is left begins where it began
+        back = quaternion.multiply(root_turn[:1], quaternion.inverse(root_turn))
+        world = quaternion.multiply(back[:, None], world)
+        hips = quaternion.rotate(back, hips - root_place) + root_place[:1]
+        root_turn, root_place = np.repeat(root_turn[:1], len(hips), axis=0), np.repeat(
+            root_place[:1], len(hips), axis=0
+        )
+    if root in ("SMOOTH", "STRAIGHT") and "root" not in driven.table:
+        told.append("no root bone: the hips carry all of the motion; Export Motion can add one to a copy")
+    lie_turn, lie_origin = placements(driven.rig, driven.scene, frames)
+    scale = driven.placement.scale
+
+    def turned(turn: np.ndarray, bone: str) -> np.ndarray:
+        to_rest = quaternion.multiply(turn, driven.upright)
+        return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(lie_turn), to_rest)) @ driven.rest_turn[bone]
+
+    def placed(points: np.ndarray) -> np.ndarray:
+        return quaternion.rotate(quaternion.inverse(lie_turn), points - lie_origin) / scale
+
+    turns = {driven.bone(part): turned(world[:, i], driven.bone(part)) for i, part in enumerate(driven.parts)}
+    places = {driven.bone("hips"): placed(hips)}
+    if "root" in driven.table:
+        bone = driven.bone("root")
+        if root == "KEEP":  # it stays at rest
+            turns[bone] = np.repeat(driven.rest_turn[bone][None], len(frames), axis=0)
+            places[bone] = np.repeat(driven.rest_place[bone][None], len(frames), axis=0)
+        else:
+            turns[bone] = turned(root_turn, bone)
+            places[bone] = placed(root_place)
+    _follow(driven, turns, places, hips, world, motion, placed)
+    return turns, places, told
+
+
+def _root_line(driven: Driven, motion: Motion, heads: np.ndarray, way: str):
+    """The root's turn (F, 4) and place (F, 3) in the world: on the ground under the pelvis, as it rests below it."""
+    from ...beyond_mocap.motion.humanoid import heading_from_positions
+    from ...beyond_mocap.motion.root_path import ground_path
+
+    middle = heads[:, [driven.parts.index(f"{side} upper_leg") for side in ("left", "right")]].mean(axis=1)
+    facing = np.unwrap(heading_from_positions(motion.skeleton, heads))
+    line, yaw = ground_path(middle[:, :2], facing, motion.fps, way)
+    turn = quaternion.about_up(yaw)
+    rest = driven.metres(driven.heads("left upper_leg", "right upper_leg").mean(axis=0))
+    own = driven.metres(driven.heads("root")[0]) - rest if "root" in driven.table else np.zeros(3)
+    own = np.array([own[0], own[1], 0.0])
+    return turn, np.column_stack([line, np.zeros(len(line))]) + quaternion.rotate(turn, own)
+
+
+def _follow(driven: Driven, turns: dict, places: dict, hips, world, motion: Motion, placed) -> None:
+    """IK targets go rigidly with the bone that they belong to."""
+    if not driven.followers:
+        return
+    heads = _shifted_heads(motion, world, hips)
+    for bone, part in driven.followers.items():
+        carrier = driven.bone(part)
+        own = driven.rest_turn[carrier].T @ driven.rest_turn[bone]
+        offset = driven.rest_turn[carrier].T @ (driven.rest_place[bone] - driven.rest_place[carrier])
+        turns[bone] = turns[carrier] @ own
+        places[bone] = placed(heads[:, driven.parts.index(part)]) + turns[carrier] @ offset
+
+
+def _shifted_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.ndarray:
+    """All joints' places (F, J, 3) from world rotations and the hips' places."""
+    skeleton, heads = motion.skeleton, np.zeros((*world.shape[:2], 3))
+    for joint, parent in enumerate(skeleton.parents):
+        heads[:, joint] = hips if parent < 0 else heads[:, parent] + quaternion.rotate(
+            world[:, parent], skeleton.offsets[joint])
+    return heads
+
+
+def placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How the armature object lies in the scene at each frame: turns (F, 4) and origins (F, 3) metres."""
+    still = armature.placement(rig, scene)
+    if not is_carried(rig):
+        return np.repeat(still.rotation[None], len(frames), axis=0), np.repeat(still.origin[None], len(frames), axis=0)
+    now, subframe, rows = scene.frame_current, scene.frame_subframe, []
+    for frame in frames:
+        scene.frame_set(int(frame))
+        origin, turn, _ = rig.matrix_world.decompose()
+        rows.append((*turn, *origin))
+    scene.frame_set(now, subframe=subframe)
+    table = np.array(rows)
+    return quaternion.continuous(table[:, :4]), table[:, 4:] / units_per_metre(scene)
+
+
+def is_carried(rig: bpy.types.Object) -> bool:
+    """Whether something moves the object: its own constraints, or anything about one of its parents."""
+    if len(rig.constraints):
+        return True
+    parent = rig.parent
+    while parent is not None:
+        if parent.animation_data is not None or len(parent.constraints):
+            return True
+        parent = parent.parent
+    return False
+
+
+def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.ndarray]]:
+    """Curves for the driven bones' channels, each bone in its own rotation mode."""
+    found = {}
+    for name, (rotation, location) in basis.items():
+        path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
+        mode = rig.pose.bones[name].rotation_mode
+        if location is not None:
+            found[f"{path}.location"] = (name, location)
+        if mode == "QUATERNION":
+            if rotation[0, 0] < 0:
+                rotation = -rotation
+            found[f"{path}.rotation_quaternion"] = (name, rotation)
+        elif mode == "AXIS_ANGLE":
+            found[f"{path}.rotation_axis_angle"] = (name, _axis_angles(rotation))
+        else:
+            found[f"{path}.rotation_euler"] = (name, _euler_curves(rotation, mode))
+    return found
+
+
+def _axis_angles(rotation: np.ndarray) -> np.ndarray:
+    """Angle and axis (F, 4) of sign-continuous rotations (F, 4)."""
+    length = np.linalg.norm(rotation[:, 1:], axis=1)
+    axis = np.where(length[:, None] > 1e-9, rotation[:, 1:] / np.maximum(length, 1e-9)[:, None], [0.0, 1.0, 0.0])
+    return np.column_stack([2.0 * np.arctan2(length, rotation[:, 0]), axis])
+
+
+def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
+    """Blender's Euler angles (F, 3), X Y Z, of rotations (F, 4), without jumps: of the two ways to write a rotation the
+    one nearer to the frame before, full turns added."""
+    order = mode[::-1]  # Blender names the axes in the order in which they are applied to a point
+    angles = quaternion.to_euler(rotation, order)
+    out = np.empty_like(angles)
+    last = np.zeros(3)
+    for frame, first in enumerate(angles):
+        other = np.array([first[0] + np.pi, np.pi - first[1], first[2] + np.pi])
+        choices = [a - 2.0 * np.pi * np.round((a - last) / (2.0 * np.pi)) for a in (first, other)]
+        last = min(choices, key=lambda a: np.abs(a - last).sum())
+        out[frame] = last
+    found = np.empty_like(out)
+    for column, letter in enumerate(order):
+        found[:, "XYZ".index(letter)] = out[:, column]
+    return found
+
+
+def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.ndarray]]:
+    """Curves of one key each: IK/FK switches, and constraints that are switched off."""
+    found = {}
+    for switch in driven.controls.switches:
+        path = f'pose.bones["{bpy.utils.escape_identifier(switch.bone)}"]["{bpy.utils.escape_identifier(switch.name)}"]'
+        found[path] = (switch.bone, np.array([[float(switch.value)]]))
+    if not bakes_ik:
+        for one in driven.overrides:
+            path = (f'pose.bones["{bpy.utils.escape_identifier(one.bone)}"]'
+                    f'.constraints["{bpy.utils.escape_identifier(one.constraint)}"].influence')
+            found[path] = (one.bone, np.array([[0.0]]))
+    return found

@@ -1,0 +1,219 @@
+"""A pose asked for in the world as values of a rig's channels: plain arithmetic, without asking Blender for each frame.
+
+What the arithmetic needs is found out once (`control_study`): on what each driven bone rides, and which way it goes for
+each of its location channels.
+"""
+
+from __future__ import annotations
+
+import re
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from .control_study import RIDES, STATIC, TRIALS, nearest_carrier, place_spread, split_poses, turn_spread
+from .posing import PosedRig
+
+_TURN = 0.7
+_TO_FK, _FROM_FK = re.compile(r"(?i)ik.*fk"), re.compile(r"(?i)fk.*ik")
+_FOLLOW = re.compile(r"(?i)follow")
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A number on a pose bone that has to stand at `value` for the controls to count."""
+
+    bone: str
+    name: str
+    value: float
+    before: float
+
+
+@dataclass(frozen=True)
+class Override:
+    """A constraint that would hold a driven bone against its channels."""
+
+    bone: str
+    constraint: str
+    kind: str
+
+
+@dataclass
+class _Ride:
+    """What one control rides on: the carrier's index (-1: the armature itself) and the constant part, seen in it."""
+
+    turn_of: int
+    turn: np.ndarray
+    place_of: int
+    place: np.ndarray
+    axes_of: int = STATIC
+    axes: np.ndarray | None = None
+
+
+class Controls:
+    """The driven bones of a rig, studied."""
+
+    def __init__(self, rig: bpy.types.Object, bones: list[str], movers: list[str], overrides: list[Override]):
+        """bones: driven ones, carriers before what they carry. movers: those of them that are also moved.
+
+        overrides: constraints that are to be silent. The rig is as it was when this returns.
+        """
+        self.rig, self.bones, self.movers = rig, list(bones), [bone for bone in bones if bone in movers]
+        self.switches, self.overrides = list_switches(rig), overrides
+        self.loose: list[str] = []
+        with self._posed() as posed:
+            self._study(posed)
+
+    def _study(self, posed: PosedRig) -> None:
+        dice, none = np.random.default_rng(7), quaternion.identity(len(self.bones))
+        self.rest_turn, self.rest_place = split_poses(posed.pose(none, self.bones))
+        self.size = float(np.ptp(self.rest_place, axis=0).max()) or 1.0
+        own, poses = [], []
+        for _ in range(TRIALS):
+            vectors = dice.normal(size=(len(self.bones), 3))
+            vectors *= _TURN / np.linalg.norm(vectors, axis=1, keepdims=True)
+            own.append(quaternion.from_rotation_vector(vectors))
+            poses.append(posed.pose(own[-1], self.bones))
+        turns, places = split_poses(np.array(poses))
+        self.rides = self._carried(turns, places, quaternion.to_matrix(np.array(own)))
+        for bone in self.movers:
+            self._measure_axes(posed, bone, own[-1], turns[-1])
+
+    def _carried(self, turns: np.ndarray, places: np.ndarray, own: np.ndarray) -> list[_Ride]:
+        """What each bone rides on, from the trials' poses (K, B, 3, 3), (K, B, 3) and own turns (K, B, 3, 3)."""
+        base, found = turns @ own.transpose(0, 1, 3, 2), []
+        turning, going = turn_spread(turns, base), place_spread(turns, places, places)
+        for i, bone in enumerate(self.bones):
+            turn_of, worst = nearest_carrier(turning[:, i], i)
+            place_of, off = nearest_carrier(going[:, i], i)
+            seen = np.swapaxes(self._of(turns, turn_of), -1, -2) @ base[:, i]
+            away = places[:, i] - (places[:, place_of] if place_of >= 0 else np.zeros((len(places), 3)))
+            carrier = np.broadcast_to(self._of(turns, place_of), base[:, i].shape)
+            place = np.einsum("kji,kj->ki", carrier, away).mean(axis=0)
+            found.append(_Ride(turn_of, _nearest_turn(seen.mean(axis=0)), place_of, place))
+            if worst > 10 * RIDES or off > RIDES * self.size:
+                self.loose.append(bone)
+        return found
+
+    def _measure_axes(self, posed: PosedRig, bone: str, own: np.ndarray, turns: np.ndarray) -> None:
+        """Which way a mover goes for each of its location channels: measured at rest, and in the last trial, in which
+        the bones turned by `own` (B, 4) and were posed as `turns` (B, 3, 3)."""
+        i = self.bones.index(bone)
+        measured = [self._axes_of(posed, i, turn) for turn in (quaternion.identity(len(self.bones)), own)]
+        if abs(np.linalg.det(measured[0])) < 1e-3:
+            raise InputError(f"rig {self.rig.name}", f"bone {bone} does not move when its location is set",
+                             "a bone that is free to move", "choose another one in the bone map")
+        carriers = [(d, self.rest_turn[d], turns[d]) for d in range(i - 1, -1, -1)]
+        carriers.append((STATIC, np.eye(3), np.eye(3)))
+        spread = [np.abs(a.T @ measured[0] - b.T @ measured[1]).max() for _, a, b in carriers]
+        d, rest, _ = carriers[int(np.argmin(spread))]
+        self.rides[i].axes_of, self.rides[i].axes = d, rest.T @ measured[0]
+
+    def _axes_of(self, posed: PosedRig, i: int, own: np.ndarray) -> np.ndarray:
+        """Where bone i goes (3, 3), one column for each of its location channels, while the bones turn by `own`."""
+        _, start = split_poses(posed.pose(own, self.bones))
+        columns = []
+        for axis in range(3):
+            went = np.zeros((len(self.bones), 3))
+            went[i, axis] = self.size
+            columns.append((split_poses(posed.pose(own, self.bones, went))[1][i] - start[i]) / self.size)
+        return np.stack(columns, axis=1)
+
+    def basis(self, turns: dict[str, np.ndarray], places: dict[str, np.ndarray]):
+        """The channels that put the driven bones so, in the armature's space.
+
+        turns: bone -> rotation matrices (F, 3, 3), for all bones; places: mover -> heads (F, 3). Returns bone ->
+        (basis rotations (F, 4), locations (F, 3) or None), and all heads (F, B, 3).
+        """
+        count = len(next(iter(turns.values())))
+        turn = np.stack([turns[bone] for bone in self.bones], axis=1)
+        heads, out = np.zeros((count, len(self.bones), 3)), {}
+        for i, (bone, ride) in enumerate(zip(self.bones, self.rides)):
+            base = self._of(turn, ride.turn_of) @ ride.turn
+            origin = heads[:, ride.place_of] if ride.place_of >= 0 else 0.0
+            heads[:, i] = self._of(turn, ride.place_of) @ ride.place + origin
+            location = None
+            if bone in places:
+                axes = self._of(turn, ride.axes_of) @ ride.axes
+                location = np.linalg.solve(axes, (places[bone] - heads[:, i])[..., None])[..., 0]
+                heads[:, i] = places[bone]
+            rotation = quaternion.from_matrix(np.swapaxes(base, -1, -2) @ turn[:, i])
+            out[bone] = quaternion.continuous(rotation), location
+        return out, heads
+
+    def forward(self, turns: dict[str, np.ndarray], locations: dict[str, np.ndarray | None]) -> np.ndarray:
+        """The opposite of `basis`: heads (F, B, 3) in the armature's space from channels, basis rotations (F, 4) of all
+        driven bones and locations (F, 3) of those that have some."""
+        count = len(next(iter(turns.values())))
+        turn = np.zeros((count, len(self.bones), 3, 3))
+        heads = np.zeros((count, len(self.bones), 3))
+        for i, (bone, ride) in enumerate(zip(self.bones, self.rides)):
+            turn[:, i] = self._of(turn, ride.turn_of) @ ride.turn @ quaternion.to_matrix(turns[bone])
+            origin = heads[:, ride.place_of] if ride.place_of >= 0 else 0.0
+            heads[:, i] = self._of(turn, ride.place_of) @ ride.place + origin
+            if locations[bone] is not None and ride.axes is not None:
+                axes = self._of(turn, ride.axes_of) @ ride.axes
+                heads[:, i] += (axes @ locations[bone][..., None])[..., 0]
+        return heads
+
+    @staticmethod
+    def _of(turn: np.ndarray, d: int) -> np.ndarray:
+        return turn[:, d] if d >= 0 else np.eye(3)
+
+    @contextmanager
+    def _posed(self):
+        """The rig without its animation, its switches on FK, overrides silent; all as it was afterwards."""
+        bones = self.rig.pose.bones
+        silent = [bones[one.bone].constraints[one.constraint] for one in self.overrides]
+        with PosedRig(self.rig, bpy.context.view_layer, self.bones, silent) as posed:
+            try:
+                for switch in self.switches:
+                    bones[switch.bone][switch.name] = switch.value
+                yield posed
+            finally:
+                for switch in self.switches:
+                    bones[switch.bone][switch.name] = switch.before
+
+
+def _nearest_turn(matrix: np.ndarray) -> np.ndarray:
+    """The rotation (3, 3) nearest to a matrix."""
+    u, _, v = np.linalg.svd(matrix)
+    return u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
+
+
+def list_switches(rig: bpy.types.Object) -> list[Switch]:
+    """Numbers on pose bones that choose between IK and FK, or let a bone follow by halves."""
+    found = []
+    for bone in rig.pose.bones:
+        for name, value in bone.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                continue
+            if _TO_FK.search(name) or _FROM_FK.search(name):
+                whole = type(value)(1 if _TO_FK.search(name) else 0)
+            elif _FOLLOW.search(name) and 0.0 < value < 1.0:
+                whole = 1.0
+            else:
+                continue
+            found.append(Switch(bone.name, name, whole, value))
+    return found
+
+
+def list_overrides(rig: bpy.types.Object, bones: list[str]) -> list[Override]:
+    """Constraints that hold driven bones: those on them, and inverse kinematics below that reach up to them."""
+    driven, found = set(bones), []
+    for bone in rig.pose.bones:
+        for constraint in bone.constraints:
+            if constraint.mute or constraint.influence == 0.0:
+                continue
+            held = {bone.name}
+            if constraint.type in {"IK", "SPLINE_IK"}:
+                chain = [bone, *bone.parent_recursive]
+                length = constraint.chain_count
+                held = {one.name for one in (chain[:length] if length else chain)}
+            if held & driven:
+                found.append(Override(bone.name, constraint.name, constraint.type))
+    return found

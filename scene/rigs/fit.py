@@ -1,0 +1,142 @@
+"""A source's motion on a rig's driven skeleton, feet planted on its legs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...beyond_mocap.motion.motion import Motion, forward_kinematics
+from ...beyond_mocap.motion.skeleton import Skeleton
+from .. import armature
+from ...beyond_mocap.base.vectors import nearest_axis
+from .driven import Driven
+from .source import Source
+
+LEGS_ALIKE = (0.8, 1.25)
+_FLOOR = (-0.01, 0.05)  # heights of standing toe joints, metres, whose soles are on the scene's own ground
+_MOST_LEAN = np.radians(30.0)
+_MISS = 0.005  # metres that are told
+
+
+@dataclass(frozen=True)
+class BakeOptions:
+    """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are
+    alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again. exact: the motion
+    is on the driven skeleton already and is played as it is."""
+
+    root: str = "KEEP"
+    keeps_travel: bool | None = None
+    bakes_ik: bool = False
+    plants: bool = True
+    exact: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Slide:
+    """How far standing feet slide: mean cm/s while they stand, worst mm of a stance."""
+
+    cm_s: float
+    worst_mm: float
+
+
+class Fit:
+    """A source's motion on the driven skeleton, feet planted."""
+
+    def __init__(self, driven: Driven, source: Source, options: BakeOptions):
+        from ...beyond_mocap.motion import contacts  # these bring scipy, which is slow to import
+        from ...beyond_mocap.motion.retarget import Retargeter
+        from ...beyond_mocap.polish.foot_plant import plant
+
+        if options.exact:
+            self.scale, self.slides, self.motion, self.told = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
+            return
+        motion, skeleton = source.motion, _looking_ahead(driven.skeleton, source.motion.skeleton)
+        points = contacts.points(motion)
+        if source.standing is not None:
+            points = points | source.standing[:, :, None]
+        flat = points.all(axis=2)
+        ground = 0.0 if source.standing is not None else contacts.ground_height(motion)
+        floor = 0.0 if _FLOOR[0] <= ground <= _FLOOR[1] else ground
+        motion = _raised(motion, -ground)
+        carrier = Retargeter(motion, skeleton, standing=flat)
+        self.scale = carrier.target.leg / carrier.source.leg
+        keeps = LEGS_ALIKE[0] <= self.scale <= LEGS_ALIKE[1] if options.keeps_travel is None else options.keeps_travel
+        carrier.keeps_travel = keeps
+        carried = carrier.carry(motion)
+        level = _stand_spread(motion, points) < 0.05
+        planted = plant(skeleton, carried.root_positions, carried.rotations, points, motion.fps, levels=level)
+        fitted = Motion(skeleton, planted.root, planted.rotations, motion.fps) if options.plants else carried
+        self.slides = tuple(slide(m, flat) for m in (source.motion, carried, fitted))
+        self.lift = driven.sole - contacts.sole_height(skeleton)
+        self.motion = _raised(fitted, floor + self.lift)
+        self.told = self._lines(driven, planted.miss if options.plants else None, points, keeps)
+
+    def _lines(self, driven: Driven, miss: np.ndarray | None, points: np.ndarray, keeps: bool) -> list[str]:
+        lines = [
+            f"legs {self.scale:.2f} of the source's; {'footprints kept' if keeps else 'steps scaled with the legs'}"
+        ]
+        before, bare, after = self.slides
+        lines.append(
+            f"standing feet slide {after.cm_s:.1f} cm/s, worst stance {after.worst_mm:.0f} mm "
+            f"(source {before.cm_s:.1f} and {before.worst_mm:.0f}; before planting {bare.cm_s:.1f} and "
+            f"{bare.worst_mm:.0f})"
+        )
+        lines.append(f"floor: the front of the foot stands {100 * driven.sole:.1f} cm high, as in the rig's rest pose")
+        short = np.where(points.any(axis=2), miss, 0.0) if miss is not None else np.zeros((1, 2))
+        for side, name in enumerate(("left", "right")):
+            if short[:, side].max(initial=0.0) > _MISS:
+                lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm too short for its place in "
+                             f"{int(np.sum(short[:, side] > _MISS))} frames")
+        return lines
+
+
+def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
+    """The driven skeleton with a crown on its head, as far off the vertical as the source's crown is in its rest pose,
+    so that heads which look straight ahead at rest do so together. Unchanged where the source's rest pose says nothing.
+    """
+    from ...beyond_mocap.motion.humanoid import identify
+
+    body = identify(source)
+    if body.head is None or body.head not in source.end_parents or "Head" not in skeleton.names:
+        return skeleton
+    rest = armature.rest_positions(source)
+    crown = source.end_offsets[source.end_parents.index(body.head)]
+    across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
+    trunk = rest[body.head] - 0.5 * (rest[body.left.upper_leg] + rest[body.right.upper_leg])
+    if min(np.linalg.norm(v) for v in (crown, across, trunk)) < 1e-3:
+        return skeleton
+    up = nearest_axis(trunk)
+    ahead = np.cross(across - (across @ up) * up, up)
+    lean = np.arctan2(crown @ ahead / np.linalg.norm(ahead), crown @ up)
+    if trunk @ up < 0.9 * np.linalg.norm(trunk) or abs(lean) > _MOST_LEAN:
+        return skeleton
+    tip = 0.2 * np.array([np.sin(lean), 0.0, np.cos(lean)])
+    return Skeleton(skeleton.names, skeleton.parents, skeleton.offsets,
+                    (*skeleton.end_parents, skeleton.names.index("Head")), np.vstack([skeleton.end_offsets, tip]))
+
+
+def _stand_spread(motion: Motion, points: np.ndarray) -> float:
+    """How unevenly high the toes stand, metres: 5 % to 95 %."""
+    from ...beyond_mocap.motion.humanoid import identify
+
+    body = identify(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    heights = places[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2][points[:, :, 1]]
+    return float(np.ptp(np.percentile(heights, (5, 95)))) if len(heights) else 0.0
+
+
+def slide(motion: Motion, standing: np.ndarray) -> Slide:
+    """How far the feet of a motion slide while `standing` (T, 2) says that they stand."""
+    from ...beyond_mocap.evaluation import feet
+
+    joints = feet.foot_joints(motion.skeleton)
+    places = forward_kinematics(motion)[0][:, joints]
+    speeds = feet.contact_speeds(places, standing, motion.fps)
+    travel = feet.stance_travel(places[:, :, 1], feet.stances(standing))
+    mean = float(np.nanmean(speeds)) if np.isfinite(speeds).any() else 0.0
+    return Slide(100.0 * mean, 1000.0 * float(travel.max(initial=0.0)))
+
+
+def _raised(motion: Motion, by: float) -> Motion:
+    return Motion(motion.skeleton, motion.root_positions + [0.0, 0.0, by], motion.rotations, motion.fps)

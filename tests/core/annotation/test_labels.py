@@ -1,0 +1,128 @@
+"""What labels mean comes from one table: a new label is a row, and no other product file compares labels by name."""
+
+import ast
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from beyond_mocap.annotation import VOCABULARY, labels
+from beyond_mocap.annotation.labels import find_label, list_gaits, list_labels
+from beyond_mocap.errors import InputError
+
+TOP = pathlib.Path(__file__).parents[3]
+TOE_POKE = "toe_poke,toe poke,discrete,,foot,,sends,,low,,,low(running)\n"
+
+SYNTHETIC = {  # builders of motions and matches, each of certain labels
+    *(f"beyond_mocap/motion/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
+    "beyond_mocap/ball/tracked/planted.py", "beyond_mocap/library/made.py", "beyond_mocap/planted_examples.py",
+}  # fmt: skip
+ALLOWED = {
+    "beyond_mocap/ball/strike_choice.py": "a volley by hand is a volleyball player's, which no single label says",
+    "beyond_mocap/library/landings.py": "is about getting up",
+    "beyond_mocap/files/events.py": "providers' kinds of events",
+    "beyond_mocap/match/pool.py": "a cluster that is running",
+    "beyond_mocap/library/one_skeleton.py": "arguments by name",
+}
+DOES = ("act", "action")
+SAID_OTHERWISE = {"pass", "throw", "serve", "catch", "save", "jump"}
+
+
+def compared(text, known):
+    """Literals of `known` that the code compares, or has in a set or as a dict's keys; what networks do left out."""
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        parts = []
+        if isinstance(node, ast.Compare) and getattr(node.left, "attr", getattr(node.left, "id", "")) not in DOES:
+            parts = [node.left, *node.comparators]
+            parts += [cell for part in parts if isinstance(part, (ast.Tuple, ast.List)) for cell in part.elts]
+        elif isinstance(node, (ast.Set, ast.Dict)):
+            parts = node.elts if isinstance(node, ast.Set) else node.keys
+        said = [part.value for part in parts if isinstance(part, ast.Constant)]
+        found += [value for value in said if value in known and set(said) != set(labels.ACTIONS)]
+    return found
+
+
+def test_the_table_is_the_tree_of_the_appendix():
+    dive = {"long_duration": {"low": {}}, "short_duration": {"high": {}, "low": {}}}
+    assert VOCABULARY["discrete"]["catchb"]["dive"] == dive
+    assert VOCABULARY["discrete"]["turning"] == {"dribble": {"letgo": {}}} and VOCABULARY["continuous"]["turning"] == {}
+    assert list(VOCABULARY["modifier"]) == ["right", "left", "front", "back", "subtle", "with_setup"]
+
+
+def test_labels_say_what_they_do_with_the_ball():
+    assert find_label("receive").ball == "takes" and find_label("receive").part == "foot"
+    assert find_label("catchb").both_hands and find_label("catchb").title == "catch ball"
+    assert find_label("moonwalk").ball == find_label("moonwalk").part == ""
+    assert list_labels(ball="carries") == ("dribble",)
+    assert list_gaits() == ("standing", "walking", "jogging", "running", "sprinting")
+
+
+@pytest.mark.parametrize(
+    "row, found",
+    [("kick,kick,discrete,,,,,,,,,", "again"), (TOE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
+     ("toe_poke,toe poke", "other cells")]
+)  # fmt: skip
+def test_a_wrong_row_is_reported_with_its_line(row, found, tmp_path, monkeypatch):
+    table = tmp_path / "vocabulary.csv"
+    table.write_text(labels.TABLE.read_text() + row)
+    monkeypatch.setattr(labels, "TABLE", table)
+    with pytest.raises(InputError, match=f"vocabulary.csv:{len(table.read_text().splitlines())}: .*{found}"):
+        labels.read_labels.__wrapped__()
+
+
+def test_a_new_label_is_one_row(tmp_path):
+    """A copy of the core with one more row takes the label for a pass of the foot everywhere."""
+    ignored = shutil.ignore_patterns("__pycache__", "*.npz")
+    shutil.copytree(TOP / "beyond_mocap", tmp_path / "beyond_mocap", ignore=ignored)
+    with open(tmp_path / "beyond_mocap/annotation/vocabulary.csv", "a") as table:
+        table.write(TOE_POKE)
+    env = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    told = subprocess.run([sys.executable, "-P", "-c", USES], env=env, capture_output=True, text=True)
+    assert (told.returncode, told.stderr) == (0, "") and pathlib.Path(told.stdout.strip()).is_relative_to(tmp_path)
+
+
+USES = """
+import beyond_mocap
+from beyond_mocap import known_touches
+from beyond_mocap.annotation import DISCRETE, KeyMoment, Timeline, parse_timeline, spoken, validate, words_below
+from beyond_mocap.annotation.ball_contact import may_use_foot, surfaces
+from beyond_mocap.annotation.decision import Walk, choose, options
+from beyond_mocap.ball.strike_choice import _rank, _SAID
+from beyond_mocap.library.classify.examples import act_of
+from beyond_mocap.library.keys import Key, nearest_serving
+from beyond_mocap.annotation import ClipAnnotation
+from beyond_mocap.motion.adult import adult_skeleton
+from beyond_mocap.plan import Touched
+
+words = ("toe_poke", "right")
+timeline = parse_timeline("2.0 toe_poke right low", "a.txt", 30.0)
+validate(timeline, known_words=(), start=0.0, end=4.0, where="a.txt")
+assert "toe_poke" in DISCRETE and spoken(("low", "right", "toe_poke")) == ("toe_poke", "right", "low")
+assert words_below(("toe_poke",)) == ("low",) and "toe_poke" in {one.word for one in options(Walk("moment"))}
+assert [(one.part, one.side) for one in surfaces(adult_skeleton(), words)] == [("foot", "right")]
+assert may_use_foot(frozenset(words)) and _rank("foot", frozenset(words)) == _SAID
+
+kick, receive = Touched(2.2, True, "foot", "kick"), Touched(2.1, True, "foot", "receive")
+moved = known_touches._moved(Timeline(keys=(KeyMoment(2.0, words),)), (receive, kick))
+assert moved.keys[0].solved == 2.2
+assert act_of(ClipAnnotation(0, 9, 5, words)) == "toe_poke"
+key = Key(0, 5.0, 0.0, 9.0, frozenset(("kick", "right")))
+assert nearest_serving((key,), words) == (key,)
+print(beyond_mocap.__file__)
+"""
+
+
+def test_no_product_file_compares_labels_by_name():
+    known = {label.name for label in labels.read_labels().values() if label.is_root or label.ball} - SAID_OTHERWISE
+    offences = {}
+    for folder in ("beyond_mocap", "scene", "operators", "panels"):
+        for path in (TOP / folder).rglob("*.py"):
+            name = path.relative_to(TOP).as_posix()
+            if not name.startswith("beyond_mocap/annotation/") and name not in SYNTHETIC:
+                offences[name] = compared(path.read_text(), known)
+    assert {name for name, found in offences.items() if found} == set(ALLOWED)
+    assert compared('x = word in {"kick", "hand"} or word == "receive"', known) == ["receive", "kick"]
