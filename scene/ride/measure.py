@@ -10,6 +10,7 @@ import bpy
 
 from ...beyond_mocap.errors import BeyondMocapError
 from .. import background
+from ..core.live import Watcher
 from . import riders as rides
 from . import source
 from .settings import riders
@@ -97,16 +98,17 @@ def _collect() -> float:
     return LOOK
 
 
-def register():
-    """Measure from now on, where there is a window."""
-    if not bpy.app.background:
-        bpy.app.timers.register(_tick, first_interval=1.0, persistent=True)
-
-
-def unregister():
-    """Measure no more."""
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
+def restored() -> None:
+    """What is measured just now may be of another state than what undo or redo has brought back."""
     background.stop(KIND)
-    for kept in (_failed, _since, _running):
-        kept.clear()
+    _running.clear()
+    _since.clear()
+
+
+def forget() -> None:
+    """Measure no more."""
+    restored()
+    _failed.clear()
+
+
+WATCHER = Watcher(name="Figures of path editing", look=_tick, restored=restored, ends=forget)
