@@ -123,7 +123,8 @@ class Watcher:
         elif perf_counter() - self.since > RESTED:
             self.dirty = False
             with bpy.context.temp_override(window=shown):
-                self.dirty |= bool(self.settle(shown.scene))  # marked meanwhile, it stays so
+                again = self.settle(shown.scene)  # which may mark it meanwhile
+            self.dirty = self.dirty or bool(again)
         return TICK
 
 
