@@ -98,17 +98,11 @@ def _collect() -> float:
     return LOOK
 
 
-def restored() -> None:
-    """What is measured just now may be of another state than what undo or redo has brought back."""
-    background.stop(KIND)
-    _running.clear()
-    _since.clear()
-
-
 def forget() -> None:
     """Measure no more."""
-    restored()
-    _failed.clear()
+    background.stop(KIND)
+    for kept in (_failed, _since, _running):
+        kept.clear()
 
 
-WATCHER = Watcher(name="Figures of path editing", look=_tick, restored=restored, ends=forget)
+WATCHER = Watcher(name="Figures of path editing", look=_tick, ends=forget)
