@@ -13,6 +13,7 @@ from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.errors import BeyondMocapError, InputError
 from ..scene import areas, popup
 from ..scene.annotating import do, held, name_of, now, type_keys
+from ..scene.core import window
 from .verb import Verb
 
 SPACES = {
@@ -37,7 +38,7 @@ STATUS = (
 )
 
 _menu: dict = {}  # what is drawn: the box, in which region and for which (by pointer), the word under the mouse
-_handlers: list = []  # while somebody annotates: space types with their drawing
+_running: list[bool] = []  # not empty while the user annotates
 
 
 class BEYOND_MOCAP_OT_annotate(Verb, bpy.types.Operator):
@@ -72,7 +73,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         """Begin, or end where it runs already."""
         if bpy.app.background or self.keys:
             return self.execute(context)
-        if _handlers:
+        if _running:
             unwatch()  # the running one sees this and ends
             return {"CANCELLED"}
         try:
@@ -90,7 +91,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
 
     def modal(self, context, event):
         """Take our keys where an editor of time or space is under the pointer; pass on the rest."""
-        if not _handlers:
+        if not _running:
             return self.left(context)
         area, region = _under(context, event)
         if area is None:
@@ -162,7 +163,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         content = popup.content(self.state, self.who, self.told, self.folded)
         box = popup.laid_out(content, at, areas.free_part(area, region), popup.letters(), popup.width_of)
         _menu.update(box=box, region=region.as_pointer(), under=under.as_pointer(), hovered=None)
-        _redraw(context)
+        window.redraw(*SPACES)
 
     def left(self, context):
         """End: nothing is drawn any more, and there is no step for undo beside those that were made."""
@@ -172,23 +173,23 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
     def cancel(self, context):
         """Blender takes the operator away (a file is loaded, the window closes), or it has ended."""
         unwatch()
-        areas.clear_status()
-        _redraw(context)
+        window.clear_status()
+        window.redraw(*SPACES)
 
 
 def unwatch() -> None:
     """Take the drawing of the menu away."""
-    while _handlers:
-        space, handler = _handlers.pop()
-        space.draw_handler_remove(handler, "WINDOW")
+    window.undraw(_draw)
+    _running.clear()
     _menu.clear()
 
 
 def _watch() -> None:
     """Let the menu be drawn in every editor in which one annotates."""
     unwatch()
+    _running.append(True)
     for space in SPACES.values():
-        _handlers.append((space, space.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")))
+        window.draw(space, _draw)
 
 
 def _draw() -> None:
@@ -225,10 +226,3 @@ def _largest(context) -> tuple[bpy.types.Area, bpy.types.Region]:
 
 def _holds(place, event) -> bool:
     return 0 <= event.mouse_x - place.x < place.width and 0 <= event.mouse_y - place.y < place.height
-
-
-def _redraw(context) -> None:
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in SPACES:
-                area.tag_redraw()

@@ -12,6 +12,7 @@ from bpy.props import BoolProperty
 from ..beyond_mocap.annotation.labels import find_label
 from ..beyond_mocap.errors import InputError
 from ..scene import clips, foreign, preferences, session, watch
+from ..scene.core import window
 from ..scene.settings import absolute
 from .verb import BackgroundVerb
 
@@ -121,7 +122,7 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
         text = f"Converting {queue.todo[0].name}" if queue.todo else "Converted"
         running.kind, running.fraction, running.text = self.kind, done / max(queue.total, 1), text
         context.workspace.status_text_set(f"{text}   {done} of {queue.total}   ESC: cancel")
-        self.redraw(context)
+        window.redraw()
 
     def cancel(self, context):
         """Blender takes the operator away."""

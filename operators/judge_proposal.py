@@ -6,7 +6,8 @@ import bpy
 from bpy.props import EnumProperty, IntProperty
 
 from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import areas, proposals
+from ..scene import proposals
+from ..scene.core.window import clear_status
 from .annotate import SPACES
 from .verb import Verb
 
@@ -120,7 +121,7 @@ the next one; Up and Down step, Esc leaves"""
 
     def cancel(self, _context):
         """Blender takes the operator away, or it has ended."""
-        areas.clear_status()
+        clear_status()
 
 
 def judged(target: bpy.types.Object, what: str, index: int = -1) -> str:

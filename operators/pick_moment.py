@@ -38,7 +38,7 @@ class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
         self.target, self.begun, self.frame = name.target, event.mouse_region_x, name.frame
         self.dragged = False
         context.window_manager.modal_handler_add(self)
-        moment_names.redraw(context)
+        moment_names.redraw()
         return {"RUNNING_MODAL"}
 
     def pick(self, target, name):
@@ -82,4 +82,4 @@ class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
             lay_strips.change_moment(target, now.strip, now.index, key)
         if key == self.before.key:
             context.area.header_text_set(None)
-        moment_names.redraw(context)
+        moment_names.redraw()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene import areas
+from ..scene.core.live import soon
 from .verb import Verb
 
 
@@ -31,7 +32,7 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
         if space.dopesheet is not None:
             space.dopesheet.show_only_selected = False
         uid = context.scene.session_uid
-        bpy.app.timers.register(lambda: _settle(uid), first_interval=0.1)
+        soon(lambda: _settle(uid), 0.1)
         area.tag_redraw()
 
 

@@ -13,7 +13,8 @@ import bpy
 from bpy.props import StringProperty
 
 from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import areas, background, orders, plans, queue, session
+from ..scene import background, orders, plans, queue, session
+from ..scene.core.window import start_clock, stop_clock
 from .verb import Verb
 from .written import written
 
@@ -92,13 +93,11 @@ class TurnsVerb(Verb):
             running.waiting = "\n".join(queue.names())
             self.report({"INFO"}, f"waiting: {', '.join(queue.names())}")
             return {"CANCELLED"}  # nothing has changed yet, so no step for undo
-        windows = context.window_manager
         queue.work(True)
         self.entry, self.job, self.told, self.wrote = None, None, [], 0
         self.seen, self.drawn = None, 0.0
-        self.timer = windows.event_timer_add(0.05, window=context.window)
-        windows.progress_begin(0, 100)
-        windows.modal_handler_add(self)
+        self.clock = start_clock(context)
+        context.window_manager.modal_handler_add(self)
         self.show(context, "Beginning")
         return {"RUNNING_MODAL"}
 
@@ -235,13 +234,11 @@ class TurnsVerb(Verb):
         _redraw(context)
 
     def close(self, context):
-        """Take progress display and timer away."""
-        windows = context.window_manager
+        """Take progress display and clock away."""
+        running = context.window_manager.beyond_mocap_work
         queue.work(False)
-        windows.beyond_mocap_work.kind = windows.beyond_mocap_work.waiting = ""
-        windows.event_timer_remove(self.timer)
-        windows.progress_end()
-        areas.clear_status()
+        running.kind = running.waiting = ""
+        stop_clock(context, self.clock)
         _redraw(context)
 
 

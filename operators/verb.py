@@ -9,7 +9,8 @@ from bpy.props import CollectionProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import areas, background, export
+from ..scene import background, export
+from ..scene.core import window
 
 
 class Verb:
@@ -104,14 +105,14 @@ class BackgroundVerb(Verb):
 
     def do(self, context):
         """Order, work and apply in one go."""
-        window = context.window_manager
-        window.progress_begin(0, 100)
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
         try:
             order = self.order(context)
-            asking = (lambda done, text: window.progress_update(int(100 * done)), lambda: False, lambda: False)
+            asking = (lambda done, text: manager.progress_update(int(100 * done)), lambda: False, lambda: False)
             result = self.work(order, *asking)
         finally:
-            window.progress_end()
+            manager.progress_end()
         self.apply(context.scene, result)
 
     def invoke(self, context, _event):
@@ -128,10 +129,8 @@ class BackgroundVerb(Verb):
 
     def started(self, context):
         """Begin to poll."""
-        windows = context.window_manager
-        self.timer = windows.event_timer_add(0.05, window=context.window)
-        windows.progress_begin(0, 100)
-        windows.modal_handler_add(self)
+        self.clock = window.start_clock(context)
+        context.window_manager.modal_handler_add(self)
         self.show(context)
         return {"RUNNING_MODAL"}
 
@@ -170,20 +169,10 @@ class BackgroundVerb(Verb):
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
         context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
-        self.redraw(context)
+        window.redraw()
 
     def ended(self, context):
-        """Take progress display and timer away."""
-        windows = context.window_manager
-        windows.beyond_mocap_work.kind = ""
-        windows.event_timer_remove(self.timer)
-        windows.progress_end()
-        areas.clear_status()
-        self.redraw(context)
-
-    def redraw(self, context):
-        """Let the sidebars of all 3D views be drawn again."""
-        for window in context.window_manager.windows:
-            for area in window.screen.areas:
-                if area.type == "VIEW_3D":
-                    area.tag_redraw()
+        """Take progress display and clock away."""
+        context.window_manager.beyond_mocap_work.kind = ""
+        window.stop_clock(context, self.clock)
+        window.redraw()

@@ -41,6 +41,8 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
     def queue(self, context):
         """What is being made, how far it is, and who waits."""
         running = context.window_manager.beyond_mocap_work
+        if running.trouble:
+            self.layout.label(text=running.trouble, icon="ERROR")
         if running.kind != "synthesis":
             return
         box = self.layout.box().column(align=True)

@@ -9,6 +9,7 @@
 - `preferences` what the user sets once for all files
 - `tracks`, `plans`   the settings as tracks and plans of the core; `drawn_track` curves and moving objects as tracks,
                 `drawn_labels` their speeds in the view; `pins` Empties where hands, feet and gaze have to be
+- `core`        the one watcher, on which everything that looks by itself stands; what is hung over the windows
 - `live`        sees that a player's track, pins or strips have been edited, and has him updated
 - `bake`        a take becomes all of that
 - `result`, `preview`, `set_aside`, `blocks`   a take is shown, kept or put away again; as one action or as NLA strips
@@ -40,27 +41,30 @@ The classes are registered in the order of CLASSES: what others point to comes f
 
 import bpy
 
-from . import (
-    background, clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, overlays, pins, proposals,
-    result, rig, session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
+from . import (  # noqa: F401  (watchers are known once their modules are)
+    clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, pins, proposals, result, rig,
+    session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
 )
-from .aimed import live as aimed_live
+from .aimed import live as aimed_live  # noqa: F401
 from .aimed import settings as aimed
+from .core import live as core_live
 from .markers import kept as kept_markers
-from .markers import labels as marker_labels
+from .markers import labels as marker_labels  # noqa: F401
 from .markers import settings as markers
 from .match import child as match_child
 from .match import settings as match
-from .passes import hits_shown
-from .passes import live as passes_live
+from .overlays import draw, store  # noqa: F401
+from .passes import hits_shown  # noqa: F401
+from .passes import live as passes_live  # noqa: F401
 from .passes import settings as passes
-from .ride import live as ride_live
-from .ride import measure as ride_measure
+from .ride import live as ride_live  # noqa: F401
+from .ride import measure as ride_measure  # noqa: F401
 from .ride.settings import BeyondMocapRide
-from .stream import follow as stream_follow
-from .stream import play, receiver
+from .stream import follow as stream_follow  # noqa: F401
+from .stream import play  # noqa: F401
+from .stream import receiver  # noqa: F401
 from .stream import settings as stream
-from .throws import live as throws_live
+from .throws import live as throws_live  # noqa: F401
 from .throws import settings as throws
 
 CLASSES = (
@@ -121,50 +125,15 @@ def register():
         bpy.utils.register_class(cls)
     for owner, name, cls in KEPT_WITH:
         setattr(getattr(bpy.types, owner), name, bpy.props.PointerProperty(type=cls))
-    watch.register()
-    video.register()
-    migrate.register()
-    overlays.register()
-    strip_events.register()
-    moment_names.register()
     freshness.register()
-    drawn_labels.register()
-    marker_labels.register()
-    live.register()
-    ride_live.register()
-    ride_measure.register()
-    hits_shown.register()
-    aimed_live.register()
-    throws_live.register()
-    receiver.register()
-    stream_follow.register()
-    play.register()
-    passes_live.register()
+    core_live.register()
 
 
 def unregister():
     """Stop what runs and forget what was made; unregister the data classes, the last one first."""
-    play.unregister()
-    stream_follow.unregister()
-    receiver.unregister()
-    passes_live.unregister()
-    throws_live.unregister()
-    aimed_live.unregister()
-    hits_shown.unregister()
-    ride_measure.unregister()
-    ride_live.unregister()
-    live.unregister()
-    marker_labels.unregister()
-    drawn_labels.unregister()
+    core_live.unregister()
     freshness.unregister()
-    overlays.unregister()
-    background.stop()
     match_child.end_all()
-    video.unregister()
-    migrate.unregister()
-    moment_names.unregister()
-    strip_events.unregister()
-    watch.unregister()
     session.clear()
     kept_markers.clear()
     for owner, name, _ in reversed(KEPT_WITH):

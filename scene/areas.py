@@ -1,4 +1,4 @@
-"""Editors of the window: one that is open, or a part of the largest 3D view made into one; and the status bar."""
+"""Editors of the window: one that is open, or a part of the largest 3D view made into one."""
 
 from __future__ import annotations
 
@@ -16,12 +16,6 @@ def editor(context: bpy.types.Context, kind: str, direction: str, factor: float)
     if bpy.app.background or window is None:
         return None
     return largest(window.screen, kind) or _split(context, window, kind, direction, factor)
-
-
-def clear_status() -> None:
-    """Take our line off the status bar of every workspace: the user may have gone to another one meanwhile."""
-    for workspace in bpy.data.workspaces:
-        workspace.status_text_set(None)
 
 
 def free_part(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:

@@ -8,12 +8,11 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 from ..beyond_mocap.errors import InputError
 from . import drawn_track
+from .core.live import Watcher
 from .measure import units_per_metre
 from .settings import active_player
 
 SIZE, RGBA, PIN_RGBA = 12, (1.0, 0.85, 0.2, 1.0), (0.4, 0.9, 1.0, 1.0)
-
-_handle: list = []
 
 
 def labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float, float], str, tuple]]:
@@ -54,13 +53,4 @@ def _draw() -> None:
             blf.draw(0, text)
 
 
-def register():
-    """Draw from now on, where there is a window."""
-    if not bpy.app.background:
-        _handle.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
-
-
-def unregister():
-    """Draw no more."""
-    while _handle:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle.pop(), "WINDOW")
+WATCHER = Watcher(name="Labels of drawn tracks", draws=((bpy.types.SpaceView3D, _draw, "POST_PIXEL"),))

@@ -17,13 +17,14 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 from bpy.props import IntProperty, StringProperty
 
 from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.errors import BeyondMocapError
 from ..beyond_mocap.plan import Plan
-from . import bake, blocks, channels, hand_keys, plans, queue, session
+from . import background, bake, blocks, channels, hand_keys, plans, queue, session
+from .core import window
+from .core.live import Watcher, is_playing
 from .settings import BeyondMocapPlayer, absolute
 
 SECONDS = 1.0  # between two looks
@@ -123,7 +124,7 @@ def renew(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> BeyondMocapStale
     new = ("\n".join(lines), "\n".join(notes), mend)
     if (entry.lines, entry.notes, entry.mend) != new:
         entry.lines, entry.notes, entry.mend = new
-        _redraw()
+        window.redraw()
     return entry
 
 
@@ -180,13 +181,10 @@ def dirty(*_) -> None:
     _now["dirty"] = True
 
 
-def _tick():
+def _tick() -> float:
     """Look at one player, if something has changed and nobody is busy."""
-    scene, manager = bpy.context.scene, bpy.context.window_manager
-    if scene is None or not hasattr(scene, "beyond_mocap"):
-        return SECONDS
-    screens = [window.screen for window in manager.windows]
-    if any(screen.is_animation_playing for screen in screens):
+    scene = bpy.context.scene
+    if scene is None or is_playing():
         return SECONDS
     players = scene.beyond_mocap.players
     _look_at_files(scene)
@@ -251,57 +249,46 @@ def _changed_at(path: str) -> int:
         return 0
 
 
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
-
-
-@persistent
-def _after_load(*_):
-    """Nothing runs in a file that has just been opened, whatever was saved with it."""
+def _nothing_runs() -> None:
+    """Whatever was saved with a file that has just been opened; and when the extension is switched off."""
     manager = bpy.context.window_manager
-    manager.beyond_mocap_work.kind = manager.beyond_mocap_work.waiting = ""
+    work = manager.beyond_mocap_work
+    work.kind = work.waiting = work.trouble = ""
     manager.beyond_mocap_stale.clear()
     queue.clear()
     _now["hand"].clear()
     dirty()
 
 
-@persistent
-def _after_change(_scene, graph):
+def _end() -> None:
+    background.stop()
+    _nothing_runs()
+    queue.work(False)
+
+
+def _after_change(_scene, graph) -> None:
     """Objects, actions, texts or settings have changed."""
     if any(isinstance(update.id, (bpy.types.Action, bpy.types.Object)) for update in graph.updates):
         _now["hand"].clear()
-    if not _now["dirty"] and len(graph.updates):
+    if len(graph.updates):
         dirty()
 
 
-@persistent
-def _after_undo(*_):
+def _after_undo() -> None:
     _now["hand"].clear()
     dirty()
 
 
+WATCHER = Watcher(
+    name="What is out of date", changed=_after_change, restored=_after_undo, loaded=_nothing_runs, look=_tick, ends=_end
+)
+
+
 def register():
-    """Look after changes; with a window, from time to time."""
+    """What is found is kept beside the file."""
     bpy.types.WindowManager.beyond_mocap_stale = bpy.props.CollectionProperty(type=BeyondMocapStale)
-    bpy.app.handlers.load_post.append(_after_load)
-    bpy.app.handlers.undo_post.append(_after_undo)
-    bpy.app.handlers.redo_post.append(_after_undo)
-    if not bpy.app.background:
-        bpy.app.handlers.depsgraph_update_post.append(_after_change)
-        bpy.app.timers.register(_tick, first_interval=SECONDS, persistent=True)
 
 
 def unregister():
-    """Look no more."""
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    if _after_change in bpy.app.handlers.depsgraph_update_post:
-        bpy.app.handlers.depsgraph_update_post.remove(_after_change)
-    bpy.app.handlers.redo_post.remove(_after_undo)
-    bpy.app.handlers.undo_post.remove(_after_undo)
-    bpy.app.handlers.load_post.remove(_after_load)
+    """It is not kept any more."""
     del bpy.types.WindowManager.beyond_mocap_stale

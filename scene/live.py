@@ -11,18 +11,15 @@ import json
 from time import perf_counter
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..beyond_mocap.errors import BeyondMocapError
 from . import freshness, plans, queue
+from .core.live import Watcher, is_playing
 
-TICK = 0.05  # seconds between two looks
-SETTLED = 0.12  # seconds without a change after which the hand rests
 WHOLE = 0.8  # seconds without a change after which a quick take is made as well as it can be
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Action, bpy.types.Scene)
-HOLDING = ("TRANSFORM_OT", "CURVE_OT", "VIEW3D_OT_cursor3d")
 
-_seen: dict = {"changed": 0.0, "dirty": False, "quick": {}, "begun": {}}
+_seen: dict = {"looked": 0.0, "quick": {}, "begun": {}}
 
 
 def edited(scene: bpy.types.Scene, player) -> dict[str, str]:
@@ -41,63 +38,38 @@ def edited(scene: bpy.types.Scene, player) -> dict[str, str]:
 def due(scene: bpy.types.Scene, now: float) -> tuple[str, str] | None:
     """(player's name, "quick" or "whole") of whoever is to be updated at second `now`; None where nobody is. The same
     wish is begun once: what was cancelled, undone or cannot be made waits for the next edit."""
-    if now - _seen["changed"] < SETTLED:
-        return None
     players = {player.name: player for player in scene.beyond_mocap.players if player.use}
-    if _seen["dirty"]:
+    if _seen["looked"] != WATCHER.since:
         for name, player in players.items():
             asked = edited(scene, player)
             if asked and _seen["begun"].get(name) != asked:
                 _seen["quick"][name], _seen["begun"][name] = now, asked
                 return name, "quick"
-        _seen["dirty"] = False
+        _seen["looked"] = WATCHER.since
     for name, since in list(_seen["quick"].items()):
-        if now - max(since, _seen["changed"]) > WHOLE:
+        if now - max(since, WATCHER.since) > WHOLE:
             del _seen["quick"][name]
             if name in players and not edited(scene, players[name]):
                 return name, "whole"
     return None
 
 
-def mark() -> None:
-    """Something has changed that may matter."""
-    _seen["changed"], _seen["dirty"] = perf_counter(), True
-
-
-@persistent
-def _after_change(scene, depsgraph):
-    if scene.beyond_mocap.live and any(isinstance(update.id, MATTERS) for update in depsgraph.updates):
-        mark()
-
-
-def _tick():
-    window = next(iter(bpy.context.window_manager.windows), None)
-    scene = window.scene if window is not None else None
-    if scene is None or not scene.beyond_mocap.live:
+def settle(scene: bpy.types.Scene) -> bool:
+    """Have a player updated who is to be, where Live is on; whether one may have to be in a while."""
+    if not scene.beyond_mocap.live:
         _seen["quick"].clear()
-        return 0.5
-    busy = bpy.context.window_manager.beyond_mocap_work.kind or queue.names() or window.screen.is_animation_playing
-    if busy or any(operator.bl_idname.startswith(HOLDING) for operator in window.modal_operators):
-        return TICK
+        return False
+    if bpy.context.window_manager.beyond_mocap_work.kind or queue.names() or is_playing():
+        return True
     found = due(scene, perf_counter())
-    if found is not None:
-        with bpy.context.temp_override(window=window):
-            if bpy.ops.beyond_mocap.update_live.poll():
-                bpy.ops.beyond_mocap.update_live("INVOKE_DEFAULT", player=found[0], kind=found[1])
-    return TICK
+    if found is not None and bpy.ops.beyond_mocap.update_live.poll():
+        bpy.ops.beyond_mocap.update_live("INVOKE_DEFAULT", player=found[0], kind=found[1])
+    return found is not None or bool(_seen["quick"])
 
 
-def register():
-    """Look from now on, where there is a window."""
-    if not bpy.app.background:
-        bpy.app.handlers.depsgraph_update_post.append(_after_change)
-        bpy.app.timers.register(_tick, first_interval=1.0, persistent=True)
+def forget() -> None:
+    """No wish is known any more."""
+    _seen.update(looked=0.0, quick={}, begun={})
 
 
-def unregister():
-    """Look no more."""
-    if _after_change in bpy.app.handlers.depsgraph_update_post:
-        bpy.app.handlers.depsgraph_update_post.remove(_after_change)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    _seen.update(changed=0.0, dirty=False, quick={}, begun={})
+WATCHER = Watcher(name="Live", matters=MATTERS, settle=settle, ends=forget)

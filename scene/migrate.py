@@ -8,9 +8,9 @@ files (a track, a text on disk) is not done here: Bring to the Timeline does it 
 from __future__ import annotations
 
 import bpy
-from bpy.app.handlers import persistent
 
 from . import bake, channels
+from .core.live import Watcher
 from .settings import BeyondMocapSettings
 
 VERSION = 1  # 0: before the editor, when no number was kept yet; also a scene that has not been saved
@@ -34,29 +34,18 @@ def _know_bodies(settings: BeyondMocapSettings) -> None:
             player.result.state = "ACCEPTED"
 
 
-@persistent
-def on_load(*_) -> None:
+def on_load() -> None:
     """A file has been opened: nothing can be undone yet, so that this is no step of its own."""
     for scene in bpy.data.scenes:
         if scene.library is None:
             bring_up(scene)
 
 
-@persistent
-def on_save(*_) -> None:
+def on_save() -> None:
     """Scenes that were made since are of today's form."""
     for scene in bpy.data.scenes:
         if scene.library is None and scene.beyond_mocap.version != VERSION:
             scene.beyond_mocap.version = VERSION
 
 
-def register():
-    """Look at every file that is opened or saved."""
-    bpy.app.handlers.load_post.append(on_load)
-    bpy.app.handlers.save_pre.append(on_save)
-
-
-def unregister():
-    """Look no more."""
-    bpy.app.handlers.load_post.remove(on_load)
-    bpy.app.handlers.save_pre.remove(on_save)
+WATCHER = Watcher(name="Files of earlier versions", loaded=on_load, saving=on_save)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import bpy
 
 from . import lanes
+from .core import window
+from .core.live import Watcher
 from .subject import subject
 
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
@@ -132,26 +134,12 @@ def _rectangle(left: float, bottom: float, right: float, top: float, rgba) -> No
     batch_for_shader(shader, "TRIS", {"pos": corners}, indices=((0, 1, 2), (0, 2, 3))).draw(shader)
 
 
-_drawn: list[tuple[type, object]] = []
-
-
-def register():
-    """Draw in all NLA editors and dope sheets, where there is a window at all."""
-    if not bpy.app.background:
-        for space in (bpy.types.SpaceNLA, bpy.types.SpaceDopeSheetEditor):
-            _drawn.append((space, space.draw_handler_add(draw, (), "WINDOW", "POST_PIXEL")))
-
-
-def unregister():
-    """Draw no more."""
-    while _drawn:
-        space, handle = _drawn.pop()
-        space.draw_handler_remove(handle, "WINDOW")
-
-
-def redraw(context: bpy.types.Context) -> None:
+def redraw() -> None:
     """Let the editors that show names be drawn again."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in ("NLA_EDITOR", "DOPESHEET_EDITOR"):
-                area.tag_redraw()
+    window.redraw("NLA_EDITOR", "DOPESHEET_EDITOR")
+
+
+WATCHER = Watcher(
+    name="Names of key moments",
+    draws=tuple((space, draw, "POST_PIXEL") for space in (bpy.types.SpaceNLA, bpy.types.SpaceDopeSheetEditor)),
+)

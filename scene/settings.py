@@ -286,6 +286,7 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
     fraction: FloatProperty(min=0.0, max=1.0, description="How far it is")
     waiting: StringProperty(description="The players that wait for their turn, a line each")
     ending: BoolProperty(description="Whether it has been asked to finish early")
+    trouble: StringProperty(description="What that looks by itself has failed; empty where nothing has")
 
 
 def absolute(path: str) -> str:

@@ -9,12 +9,12 @@ the user did or had, and that is put in order again.
 from __future__ import annotations
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..beyond_mocap.annotation import Span
 from ..beyond_mocap.errors import InputError
 from . import dots, moment_names, word_checks
 from .clock import Clock, of_scene
+from .core.live import Watcher, is_running, soon
 from .lanes import AUTOMATIC, WORDS, has, is_lane, marker_frame, shows, strips, written_for
 from .lay_strips import lane_with_room, place, place_all, relay
 from .strip_lines import base_name, frames_of, key_of, line_of, recorded_span, remember, span_of, tell, words_of
@@ -217,25 +217,22 @@ def _soon(names: set[str] | None) -> None:
     if bpy.app.background:
         return
     _waiting = None if names is None or _waiting is None else _waiting | names
-    if not bpy.app.timers.is_registered(_later):
-        bpy.app.timers.register(_later, first_interval=DELAY, persistent=True)
+    soon(_later, DELAY)
 
 
 def _later():
     """The timer: waits while the user is still dragging."""
     global _waiting
-    windows = bpy.context.window_manager.windows
-    if any(running.bl_idname.startswith(UNDER_WAY) for window in windows for running in window.modal_operators):
+    if is_running(UNDER_WAY):
         return DELAY
     names, _waiting = _waiting, set()
     if put_in_order(bpy.context.scene, names):
-        moment_names.redraw(bpy.context)
+        moment_names.redraw()
     word_checks.keep(bpy.context)
     return None
 
 
-@persistent
-def _changed(_scene, depsgraph):
+def _changed(_scene, depsgraph) -> None:
     """An object with lanes, one of our actions or the scene's clock may have changed."""
     names, wanted = set(), False
     for update in depsgraph.updates:
@@ -256,30 +253,10 @@ def _other_clock(scene: bpy.types.Scene) -> bool:
                for player in scene.beyond_mocap.players)
 
 
-@persistent
-def _restored(*_):
+def _restored() -> None:
     """Undo, redo or a file has brought back strips as they were."""
     _soon(None)
 
 
 _waiting: set[str] | None = set()
-HANDLERS = (
-    ("depsgraph_update_post", _changed),
-    ("undo_post", _restored),
-    ("redo_post", _restored),
-    ("load_post", _restored),
-)
-
-
-def register():
-    """Listen to edits, undo, redo and files."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
-
-
-def unregister():
-    """Stop listening."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).remove(handler)
-    if bpy.app.timers.is_registered(_later):
-        bpy.app.timers.unregister(_later)
+WATCHER = Watcher(name="Strips", changed=_changed, restored=_restored, loaded=_restored)

@@ -16,6 +16,7 @@ from bpy.props import FloatProperty, PointerProperty
 
 from ..beyond_mocap.errors import InputError
 from .clock import of_scene
+from .core.live import Watcher, soon
 from .measure import frames_per_second
 
 _EARLY = 1e-3  # of a video frame: one that begins just here is shown
@@ -109,14 +110,13 @@ def frame_shown(scene: bpy.types.Scene, frame: float) -> int:
     return 1 + math.floor((of_scene(scene).seconds(frame) - video.begins) * video.rate + _EARLY)
 
 
-@bpy.app.handlers.persistent
 def watch(scene: bpy.types.Scene, _depsgraph=None) -> None:
     """See to it that the clip is read anew where another of its frames now belongs to a scene frame: Blender keeps
     pictures by the scene's frame. A changed scene rate comes by here too."""
     known, mapping = _mappings.get(scene.session_uid), _mapping(scene)
     _mappings[scene.session_uid] = mapping
-    if known != mapping and None not in (known, mapping) and not bpy.app.background:
-        bpy.app.timers.register(_reread, first_interval=0.0)  # what a handler tags is forgotten
+    if known != mapping and None not in (known, mapping):
+        soon(_reread, 0.0)  # what a handler tags is forgotten
 
 
 def _mapping(scene: bpy.types.Scene) -> tuple | None:
@@ -135,12 +135,4 @@ def _reread() -> None:
             clip.filepath = clip.filepath
 
 
-def register() -> None:
-    """Begin to watch."""
-    bpy.app.handlers.depsgraph_update_post.append(watch)
-
-
-def unregister() -> None:
-    """Watch no longer."""
-    bpy.app.handlers.depsgraph_update_post.remove(watch)
-    _mappings.clear()
+WATCHER = Watcher(name="Reference video", changed=watch, ends=_mappings.clear)

@@ -23,11 +23,12 @@ GHOSTS = (
 
 def _changed(_settings, context):
     """Let what is missing be prepared and the views be drawn again."""
+    from .core import window
     from .overlays import store
 
     if context.scene is not None and not bpy.app.background:
         store.sync(context.scene)
-        store.redraw()
+        window.redraw()
 
 
 def _switch(name: str, description: str, default: bool = False) -> BoolProperty:

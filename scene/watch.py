@@ -11,9 +11,10 @@ import threading
 from pathlib import Path
 
 import bpy
-from bpy.app.handlers import persistent
 
 from . import clips
+from .core import window
+from .core.live import Watcher
 from .settings import absolute
 
 SECONDS = 4.0  # between two looks
@@ -111,8 +112,7 @@ def relink(scene: bpy.types.Scene) -> str:
     return found
 
 
-@persistent
-def _after_load(*_):
+def _after_load() -> None:
     manager = bpy.context.window_manager
     clips.clear(manager)
     for scene in [scene for scene in bpy.data.scenes if scene.library is None]:
@@ -122,7 +122,7 @@ def _after_load(*_):
     check(bpy.context.scene)
 
 
-def _tick():
+def _tick() -> float:
     """Start a look where one is asked for and none runs; take in what it saw."""
     scene, manager = bpy.context.scene, bpy.context.window_manager
     if scene is None or not scene.beyond_mocap.library_watch:
@@ -158,23 +158,12 @@ def _take_in(manager: bpy.types.WindowManager, setting: str) -> None:
     told = news(clips.files(), saw) if not missing and listing.folder == setting else ""
     if (listing.missing, listing.news) != (missing, told):
         listing.missing, listing.news = missing, told
-        for window in manager.windows:
-            for area in window.screen.areas:
-                if area.type == "VIEW_3D":
-                    area.tag_redraw()
+        window.redraw()
 
 
-def register():
-    """Look for moved libraries after a file is opened; with a window also look from time to time."""
-    bpy.app.handlers.load_post.append(_after_load)
-    if not bpy.app.background:
-        bpy.app.timers.register(_tick, first_interval=SECONDS, persistent=True)
-
-
-def unregister():
-    """Look no more."""
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    bpy.app.handlers.load_post.remove(_after_load)
+def _end() -> None:
     _look.clear()
     clips.clear()
+
+
+WATCHER = Watcher(name="Watching the library", loaded=_after_load, look=_tick, ends=_end)

@@ -6,13 +6,12 @@ import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
+from ..core.live import Watcher
 from . import cloud as clouds
 from .settings import is_cloud
 
 WIDE = 32  # pixels of a label, at a scale of 1
 SIZE, RGBA, FREE = 11, (1.0, 1.0, 1.0, 0.9), (1.0, 0.65, 0.1, 1.0)
-
-_handle: list = []
 
 
 def labels(context: bpy.types.Context) -> list[tuple[Vector, str, tuple]]:
@@ -47,13 +46,4 @@ def _draw() -> None:
             blf.draw(0, text)
 
 
-def register():
-    """Draw from now on, where there is a window."""
-    if not bpy.app.background:
-        _handle.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
-
-
-def unregister():
-    """Draw no more."""
-    while _handle:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle.pop(), "WINDOW")
+WATCHER = Watcher(name="Marker labels", draws=((bpy.types.SpaceView3D, _draw, "POST_PIXEL"),))

@@ -14,6 +14,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
+from ..core.live import Watcher
 from ..settings import active_player
 from . import ball_rallies, ball_shots, colours, legend, place, rides, shapes, store
 from .prepare import Mesh, Prepared
@@ -22,7 +23,6 @@ BIAS = 1e-5
 DISC, LIFT = 0.12, 0.034  # metres: radius of a contact's disc, its height above the ground
 MOST_LABELS = 12
 
-_handles: list = []
 _batches: dict[tuple, list] = {}
 _owners: dict[str, Prepared] = {}
 
@@ -37,17 +37,8 @@ class Shown(NamedTuple):
     active: bool
 
 
-def register():
-    """Hang the two handlers into all 3D views."""
-    add = bpy.types.SpaceView3D.draw_handler_add
-    _handles.append(add(_draw_shapes, (), "WINDOW", "POST_VIEW"))
-    _handles.append(add(_draw_texts, (), "WINDOW", "POST_PIXEL"))
-
-
-def unregister():
-    """Take them out and free what they drew."""
-    while _handles:
-        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+def free() -> None:
+    """Free what was drawn."""
     _batches.clear()
     _owners.clear()
     legend.free()
@@ -245,3 +236,8 @@ def _text(context, where: Vector, lines, strength: float, shift: tuple[float, fl
         return
     scale = context.preferences.system.ui_scale
     legend.write(at.x + shift[0] * scale, at.y + shift[1] * scale, lines, scale, strength)
+
+
+WATCHER = Watcher(name="Overlays", ends=free, draws=(
+    (bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"), (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL"),
+))

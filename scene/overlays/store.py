@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.app.handlers import persistent
 
 from .. import background, session
+from ..core import window
+from ..core.live import Watcher, soon
 from ..settings import active_player
 from . import place
 
@@ -54,8 +55,8 @@ def sync(scene: bpy.types.Scene) -> None:
     for name in [name for name in _prepared if name not in kept]:
         del _prepared[name]
     _refused.intersection_update(kept)
-    if _missing(scene) and not bpy.app.timers.is_registered(_poll):
-        bpy.app.timers.register(_poll, first_interval=WAIT)
+    if _missing(scene):
+        soon(_poll, WAIT)
 
 
 def clear() -> None:
@@ -68,47 +69,22 @@ def clear() -> None:
 
 def tell_why(scene: bpy.types.Scene) -> None:
     """Put the text about the piece at the playhead where the panel finds it."""
-    window, settings = bpy.context.window_manager, scene.beyond_mocap
+    manager, settings = bpy.context.window_manager, scene.beyond_mocap
     player = active_player(settings)
     found = prepared(player.take) if player is not None and player.take else None
     piece = found.piece(place.seconds_at(scene)) if found else None
     text = "\n".join(piece.lines) if piece else ""
-    if window is not None and window.beyond_mocap_playhead.why != text:
-        window.beyond_mocap_playhead.why = text
+    if manager is not None and manager.beyond_mocap_playhead.why != text:
+        manager.beyond_mocap_playhead.why = text
 
 
-def register():
-    """Watch the file and the playhead."""
-    for handlers, watch in _watches():
-        handlers.append(watch)
-
-
-def unregister():
-    """Stop watching."""
-    for handlers, watch in _watches():
-        if watch in handlers:
-            handlers.remove(watch)
-    if bpy.app.timers.is_registered(_poll):
-        bpy.app.timers.unregister(_poll)
-
-
-def _watches():
-    on = bpy.app.handlers
-    return (
-        (on.depsgraph_update_post, _file_changed), (on.undo_post, _file_changed), (on.redo_post, _file_changed),
-        (on.load_post, _file_changed), (on.frame_change_post, _frame_changed),
-    )  # fmt: skip
-
-
-@persistent
-def _file_changed(_what, *_more):
-    if bpy.context.scene is not None and not bpy.app.is_job_running("RENDER"):
+def _file_changed(*_) -> None:
+    if not bpy.app.background and bpy.context.scene is not None and not bpy.app.is_job_running("RENDER"):
         sync(bpy.context.scene)
         tell_why(bpy.context.scene)
 
 
-@persistent
-def _frame_changed(scene, *_more):
+def _frame_changed(scene) -> None:
     if not bpy.app.is_job_running("RENDER"):
         tell_why(scene)
 
@@ -140,12 +116,12 @@ def _work(orders, _progress, cancelled, _hurry) -> dict[str, "Prepared"]:
 
 def _poll() -> float | None:
     """One look: start the thread, wait for it, or take what it brings."""
-    window, scene = bpy.context.window_manager, bpy.context.scene
+    scene = bpy.context.scene
     if not _running:
         orders = _missing(scene)[:1]
         if not orders:
             return None
-        if window.beyond_mocap_work.kind:  # something is being made: it comes first
+        if bpy.context.window_manager.beyond_mocap_work.kind:  # something is being made: it comes first
             return 5 * WAIT
         _running.append((background.Job(KIND, lambda *asking: _work(orders, *asking)), orders[0][0]))
         return WAIT
@@ -158,13 +134,10 @@ def _poll() -> float | None:
         _refused.add(name)
         print(f"Beyond Mocap: nothing can be drawn of {name}: {job.error}")
     tell_why(scene)
-    redraw()
+    window.redraw()
     return WAIT
 
 
-def redraw() -> None:
-    """Let all 3D views be drawn again."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+WATCHER = Watcher(
+    name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed, loaded=_file_changed, ends=clear
+)

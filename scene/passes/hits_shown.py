@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import InputError
 from .. import action, channels, linked
 from ..ride.carrier import carrier_of
+from ..core.live import Watcher
 from ..ride.rigs import rides_as_rig
 from . import graph
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
 
 MARKER = "hit"  # the names of our markers begin with it
-REPAINTS = ("load_post", "undo_post", "redo_post")
 _COLUMNS = 480
 
 
@@ -112,28 +111,16 @@ def is_ours(marker: bpy.types.TimelineMarker) -> bool:
     return record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER)
 
 
-@persistent
-def repaint(*_) -> None:
-    """Paint the pictures of all armatures that have an analysis: another file is open, or something was undone."""
-    for thing in bpy.data.objects:
+def repaint() -> None:
+    """Paint the pictures of all armatures that have an analysis, where there is a window to show them: another file is
+    open, or something was undone."""
+    for thing in () if bpy.app.background else bpy.data.objects:
         if thing.type == "ARMATURE" and thing.beyond_mocap_hits.found:
             graph.paint(thing.beyond_mocap_hits)
 
 
-def register():
-    """Keep the pictures up to date, where there is a window to show them."""
-    if not bpy.app.background:
-        for name in REPAINTS:
-            getattr(bpy.app.handlers, name).append(repaint)
-
-
-def unregister():
-    """Take handlers and pictures away."""
-    for name in REPAINTS:
-        if repaint in getattr(bpy.app.handlers, name):
-            getattr(bpy.app.handlers, name).remove(repaint)
-    graph.forget()
-
-
 def _pairs(stretches) -> list[list[int]]:
     return [[int(first), int(last)] for first, last in stretches]
+
+
+WATCHER = Watcher(name="Hit analysis", restored=repaint, loaded=repaint, ends=graph.forget)

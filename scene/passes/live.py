@@ -8,29 +8,19 @@ cannot be made waits for the next edit.
 
 from __future__ import annotations
 
-import traceback
-from time import perf_counter
-
 import bpy
-from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import BeyondMocapError
 from .. import background
+from ..core import window
+from ..core.live import Watcher, is_playing
 from . import rally
 from .settings import PLAYED
 
 KIND = "flights"
-TICK, IDLE = 0.05, 0.4  # seconds between two looks
-SETTLED = 0.15  # seconds without a change after which the hand rests
-HOLDING = ("TRANSFORM_OT", "VIEW3D_OT_cursor3d")
 
-_seen = {"dirty": False, "changed": 0.0, "begun": "", "drawn": ""}
+_seen = {"begun": "", "drawn": ""}
 _running: list[background.Job] = []  # at most one
-
-
-def mark() -> None:
-    """Something has changed that may matter."""
-    _seen["dirty"], _seen["changed"] = True, perf_counter()
 
 
 def edited(scene: bpy.types.Scene) -> str:
@@ -49,62 +39,45 @@ def edited(scene: bpy.types.Scene) -> str:
     return digest if digest != settings.made_of else ""
 
 
-@persistent
-def _after_change(scene, depsgraph):
+def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Note whether the scene shown may be another than is asked for."""
     settings = scene.beyond_mocap_passes
-    if not settings.live or not settings.made_of:
-        return
-    if any(isinstance(update.id, bpy.types.Object) for update in depsgraph.updates):
-        mark()
+    if settings.live and settings.made_of and any(isinstance(one.id, bpy.types.Object) for one in depsgraph.updates):
+        WATCHER.mark()
 
 
-def _tick():
-    try:
-        return _look()
-    except Exception:  # a timer that raises is never called again
-        traceback.print_exc()
-        _seen["dirty"] = False
-        return IDLE
-
-
-def _look() -> float:
-    """Do what is due; seconds until the next look."""
-    if not _seen["dirty"]:
-        return IDLE
-    window = next(iter(bpy.context.window_manager.windows), None)
-    if window is None or window.screen.is_animation_playing:
-        return TICK
-    if bpy.context.window_manager.beyond_mocap_work.kind not in ("", "passes"):
-        return TICK
-    if any(operator.bl_idname.startswith(HOLDING) for operator in window.modal_operators):
-        _drag(window.scene)
-        return TICK
-    if perf_counter() - _seen["changed"] < SETTLED:
-        return TICK
+def settle(scene: bpy.types.Scene) -> bool:
+    """Have the scene made again where it has been edited; whether that has to wait."""
+    if _busy():
+        return True
     _rest()
-    _seen["dirty"] = False
-    digest = edited(window.scene)
+    digest = edited(scene)
     if not digest:
         rally.show_dragged(None)
     if digest and digest != _seen["begun"]:
         _seen["begun"] = digest
-        with bpy.context.temp_override(window=window):
-            if bpy.ops.beyond_mocap.passes_make.poll():
-                bpy.ops.beyond_mocap.passes_make("INVOKE_DEFAULT", live=True)
-    return TICK
+        if bpy.ops.beyond_mocap.passes_make.poll():
+            bpy.ops.beyond_mocap.passes_make("INVOKE_DEFAULT", live=True)
+    return False
+
+
+def _busy() -> bool:
+    return is_playing() or bpy.context.window_manager.beyond_mocap_work.kind not in ("", "passes")
 
 
 def _drag(scene) -> None:
     """Take in the flights that have been worked out, and begin with those of where everybody is now."""
     from . import make
 
+    if _busy():
+        return
     if _running:
         if not _running[0].poll():
             return
         job = _running.pop()
         if job.result is not None:
             rally.show_dragged(job.result)
-            _redraw()
+            window.redraw()
     settings = scene.beyond_mocap_passes
     if not settings.live or settings.made_of in ("", PLAYED):
         return
@@ -124,34 +97,14 @@ def _rest() -> None:
     _seen["drawn"] = ""
 
 
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
-
-
-@persistent
-def _after_load(*_):
-    rally.forget()
-
-
-def register():
-    """Look from now on, where there is a window."""
-    if not bpy.app.background:
-        bpy.app.handlers.depsgraph_update_post.append(_after_change)
-        bpy.app.timers.register(_tick, first_interval=1.0, persistent=True)
-    bpy.app.handlers.load_post.append(_after_load)
-
-
-def unregister():
-    """Look no more."""
-    if _after_change in bpy.app.handlers.depsgraph_update_post:
-        bpy.app.handlers.depsgraph_update_post.remove(_after_change)
-    if _after_load in bpy.app.handlers.load_post:
-        bpy.app.handlers.load_post.remove(_after_load)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    _seen.update(dirty=False, changed=0.0, begun="", drawn="")
+def forget() -> None:
+    """Nothing is worked out or drawn any more."""
+    _seen["begun"] = ""
     _rest()
     rally.forget()
+
+
+WATCHER = Watcher(
+    name="Passing scene", changed=look_at, settle=settle, dragged=_drag, loaded=rally.forget, ends=forget,
+)
+mark = WATCHER.mark

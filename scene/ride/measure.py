@@ -10,6 +10,7 @@ import bpy
 
 from ...beyond_mocap.errors import BeyondMocapError
 from .. import background
+from ..core.live import Watcher
 from . import riders as rides
 from . import source
 from .settings import riders
@@ -97,16 +98,11 @@ def _collect() -> float:
     return LOOK
 
 
-def register():
-    """Measure from now on, where there is a window."""
-    if not bpy.app.background:
-        bpy.app.timers.register(_tick, first_interval=1.0, persistent=True)
-
-
-def unregister():
+def forget() -> None:
     """Measure no more."""
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
     background.stop(KIND)
     for kept in (_failed, _since, _running):
         kept.clear()
+
+
+WATCHER = Watcher(name="Figures of path editing", look=_tick, ends=forget)

@@ -73,7 +73,11 @@ def anybody_shown() -> bool:
 
 def shown(body: bpy.types.Object) -> Shown | None:
     """What was worked out for a rider last; None where nothing was in this session."""
-    return _shown[body.session_uid][1] if body.session_uid in _shown and body.beyond_mocap_ride.on else None
+    digest, known = _shown.get(body.session_uid, ("", None))
+    if known is None or not body.beyond_mocap_ride.on:
+        return None
+    played = channels.playing(body)[0]
+    return known if played is not None and played.get(MARK) == digest else None  # undo may have brought back another
 
 
 def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) -> bool:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import statistics
 import time
-import traceback
 from collections import deque
 
 import bpy
@@ -17,6 +16,8 @@ from ...beyond_mocap.ball.hits import HitMotion
 from ...beyond_mocap.errors import BeyondMocapError
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.stream.listener import Listener, poses
+from ..core import window
+from ..core.live import Watcher, attempt
 from . import receiver, streamed
 
 TICK, IDLE = 1.0 / 60.0, 0.25
@@ -142,46 +143,27 @@ def _give_up(why: str) -> None:
     told.state, told.line = "failed", why
 
 
-def _tick():
+def _tick() -> float:
     if receiver.listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
             tell()
-            _redraw()
+            window.redraw()
         return IDLE
     if bpy.app.is_job_running("RENDER"):
         return IDLE
     before = (told := bpy.context.window_manager.beyond_mocap_streaming).figures, told.played
-    for window in bpy.context.window_manager.windows[:1]:
-        with bpy.context.temp_override(window=window):
-            try:
-                look(window.scene)
-            except BeyondMocapError as error:
-                _give_up(str(error))
-            except Exception:  # a timer that raises is never called again
-                traceback.print_exc()
-                _give_up("The stream has ended by an error; see the system console")
+    for shown in bpy.context.window_manager.windows[:1]:
+        with bpy.context.temp_override(window=shown):
+            attempt(lambda: look(shown.scene), _give_up, "The stream has ended by an error")
     told = bpy.context.window_manager.beyond_mocap_streaming
     if (told.figures, told.played) != before:
-        _redraw()
+        window.redraw()
     return TICK
 
 
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
-
-
-def register():
-    """Follow where there is a window."""
-    if not bpy.app.background:
-        bpy.app.timers.register(_tick, first_interval=0.5, persistent=True)
-
-
-def unregister():
-    """Follow no more."""
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
+def _end() -> None:
     _on_hit.clear()
     _on_look.clear()
+
+
+WATCHER = Watcher(name="Stream", look=_tick, ends=_end)

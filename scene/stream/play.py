@@ -11,11 +11,11 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...beyond_mocap.ball.hits import HitMotion
 from ...beyond_mocap.errors import BeyondMocapError, InputError
 from .. import action, background, bake, linked
+from ..core.live import Watcher
 from ..measure import frames_per_second
 from ..passes import make
 from ..passes.settings import PLAYED
@@ -219,20 +219,10 @@ def _tell(scene, piece: Piece | None = None) -> None:
     told.played = "\n".join(lines)
 
 
-@persistent
-def _after_undo(*_):
+def _after_undo() -> None:
     """What is undone is not what the rally knows any more."""
     if rally() is not None:
         _over("Undo has ended Play Live: press it to begin anew")
 
 
-def register():
-    """End with an undo."""
-    bpy.app.handlers.undo_post.append(_after_undo)
-
-
-def unregister():
-    """End with the add-on."""
-    stop()
-    if _after_undo in bpy.app.handlers.undo_post:
-        bpy.app.handlers.undo_post.remove(_after_undo)
+WATCHER = Watcher(name="Play Live", restored=_after_undo, ends=stop)

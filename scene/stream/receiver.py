@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.stream.bvh_stream import hierarchy_of
 from ...beyond_mocap.stream.listener import Listener
 from ...beyond_mocap.stream.live_hits import LiveHits
+from ..core.live import Watcher
 
 _held: dict[str, object] = {}
 
@@ -47,21 +47,11 @@ def hits() -> LiveHits | None:
     return _held.get("hits")
 
 
-@persistent
-def _before_load(*_):
+def _before_load() -> None:
     from . import play
 
     play.stop()
     stop()
 
 
-def register():
-    """End with the file."""
-    bpy.app.handlers.load_pre.append(_before_load)
-
-
-def unregister():
-    """End with the add-on."""
-    stop()
-    if _before_load in bpy.app.handlers.load_pre:
-        bpy.app.handlers.load_pre.remove(_before_load)
+WATCHER = Watcher(name="Stream's listener", closing=_before_load, ends=stop)

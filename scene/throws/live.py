@@ -8,30 +8,19 @@ What undo or redo brings back is not made again, or nobody would get further bac
 
 from __future__ import annotations
 
-import traceback
-from time import perf_counter
-
 import bpy
-from bpy.app.handlers import persistent
 
 from ...beyond_mocap.errors import BeyondMocapError
 from .. import background
-from ..handlers import put_on, take_off
+from ..core.live import Watcher, attempt
 from . import made, order, shown
 
-TICK, IDLE = 0.1, 0.4  # seconds between two looks: after a change or while something is made, and else
-SETTLED = 0.15  # seconds without a change after which the hand rests
-HOLDING = ("TRANSFORM_OT", "VIEW3D_OT_cursor3d", "BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
+HELD_BY = ("BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
 MODES = ("OBJECT", "POSE")
 KIND = "throw again"
 MATTERS = (bpy.types.Object, bpy.types.Scene)
 
-_seen: dict = {"dirty": False, "changed": 0.0, "job": None, "begun": {}, "ended": set(), "restored": False}
-
-
-def mark() -> None:
-    """Something has changed that may matter."""
-    _seen["dirty"], _seen["changed"] = True, perf_counter()
+_seen: dict = {"job": None, "begun": {}, "ended": set(), "restored": False}
 
 
 def due(scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -88,77 +77,46 @@ def tell(scene: bpy.types.Scene, name: str, text: str) -> None:
         body.beyond_mocap_throw.told = text
 
 
-@persistent
-def _after_change(_scene, depsgraph):
-    if any(isinstance(update.id, MATTERS) for update in depsgraph.updates):
-        mark()
-
-
-@persistent
-def _after_undo(*_):
-    _seen["restored"] = True
-    mark()
-
-
-@persistent
-def _after_load(*_):
-    _seen.update(begun={}, ended=set(), restored=False)
-    mark()
-
-
-def _tick():
-    window = next(iter(bpy.context.window_manager.windows), None)
-    if window is None or not (_seen["dirty"] or _seen["job"]):
-        return IDLE
-    active = window.view_layer.objects.active
-    holds = any(one.bl_idname.startswith(HOLDING) for one in window.modal_operators)
-    # in other modes steps of undo know of the active object alone
-    holds = holds or active is not None and active.mode not in MODES
-    if holds or bpy.app.is_job_running("RENDER") or perf_counter() - _seen["changed"] < SETTLED:
-        return TICK
-    with bpy.context.temp_override(window=window):
-        _look(window.scene)
-    return TICK
-
-
-def _look(scene: bpy.types.Scene) -> None:
-    """Show what has come, begin what is due."""
+def settle(scene: bpy.types.Scene) -> bool:
+    """Show what has come, begin what is due; whether something is made or has to wait."""
+    active = bpy.context.view_layer.objects.active
+    if active is not None and active.mode not in MODES:  # steps of undo know of the active object alone there
+        return True
     name = _seen["job"][0] if _seen["job"] else ""
-    try:
-        if _seen["job"]:
-            uid, job = _seen["job"][1:]
-            if not job.poll() and not job.stale:
-                return
-            _seen["job"] = None
-            if uid == scene.session_uid:
-                finish(scene, job)
-            else:
-                _seen["begun"].pop(name, None)
-        body = due(scene)
-        if body is None:
-            _seen["dirty"] = False
-            return
-        name = body.name
-        _seen["job"] = name, scene.session_uid, begin(scene, body)
-    except BeyondMocapError as error:
-        tell(scene, name, str(error))
-    except Exception:  # a timer that raises is never called again
-        traceback.print_exc()
-        tell(scene, name, f"{name}: could not be made again here; see the system console")
+    if _seen["job"]:
+        uid, job = _seen["job"][1:]
+        if not job.poll() and not job.stale:
+            return True
+        _seen["job"] = None
+        if uid != scene.session_uid:
+            _seen["begun"].pop(name, None)
+        else:
+            _try(scene, name, lambda: finish(scene, job))
+    body = due(scene)
+    if body is not None:
+        _try(scene, body.name, lambda: _begin(scene, body))
+    return body is not None
 
 
-HANDLERS = (("undo_post", _after_undo), ("redo_post", _after_undo), ("load_post", _after_load),
-            ("depsgraph_update_post", _after_change))
+def _begin(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
+    _seen["job"] = body.name, scene.session_uid, begin(scene, body)
 
 
-def register():
-    """Look from now on, where there is a window."""
-    if not bpy.app.background:
-        put_on(HANDLERS, _tick, 1.0)
+def _try(scene: bpy.types.Scene, name: str, action) -> None:
+    attempt(action, lambda text: tell(scene, name, text), f"{name}: could not be made again here")
 
 
-def unregister():
-    """Look no more."""
-    take_off(HANDLERS, _tick)
+def restored() -> None:
+    """What undo or redo brings back is not made again."""
+    _seen["restored"] = True
+
+
+def forget() -> None:
+    """Another file is open, or none is looked at any more."""
     background.stop(KIND)
-    _seen.update(dirty=False, changed=0.0, job=None, begun={}, ended=set(), restored=False)
+    _seen.update(job=None, begun={}, ended=set(), restored=False)
+
+
+WATCHER = Watcher(
+    name="Throws", matters=MATTERS, settle=settle, held_by=HELD_BY, restored=restored, loaded=forget, ends=forget,
+)

@@ -171,17 +171,17 @@ def test_live_begins_the_same_wish_once(extension, scene):
     parts = freshness.parts_of_plan(plans.plan_of(scene.beyond_mocap, player)[0])
     player.take, player.result.made_of = "take", json.dumps(parts)
     player.height = 1.9
-    live.mark()
-    now = live._seen["changed"]
+    live.WATCHER.mark()
+    now = live.WATCHER.since
     try:
         assert live.due(scene, now + 0.2) == ("Drawn", "quick")
         # it failed, or was cancelled
         assert [live.due(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4
         player.height = 1.8
-        live.mark()
-        assert live.due(scene, live._seen["changed"] + 0.2) == ("Drawn", "quick")
+        live.WATCHER.mark()
+        assert live.due(scene, live.WATCHER.since + 0.2) == ("Drawn", "quick")
     finally:
-        live._seen.update(changed=0.0, dirty=False, quick={}, begun={})
+        live.forget()
 
 
 def test_a_drawn_player_has_a_dot_and_is_one_step(scene):
@@ -253,10 +253,9 @@ def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core
     take = session.made(player.take).take
     assert not live.edited(scene, player)
     player.drawn_track.data.splines[0].bezier_points[1].co.y += 1.0
-    live.mark()
+    live.WATCHER.mark()
     assert live.edited(scene, player)
-    now = live._seen["changed"]
-    assert live.due(scene, now + 0.05) is None
+    now = live.WATCHER.since
     assert live.due(scene, now + 0.2) == ("Drawn", "quick")
     assert bpy.ops.beyond_mocap.update_live(player="Drawn", kind="quick") == {"FINISHED"}
     quick = session.made(player.take).take

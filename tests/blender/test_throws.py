@@ -602,15 +602,13 @@ def test_what_is_shown_follows_its_target(room):
 
 def followed(live, scene):
     """What the timer does until there is nothing left to do."""
-    live.mark()
-    while live._seen["dirty"] or live._seen["job"]:
-        live._look(scene)
+    while live.settle(scene):
+        pass
 
 
 @pytest.mark.parametrize("act", ["throw", "kick"])
 def test_undo_after_a_throw_has_followed(act, room):
     live, scene = room("throws.live"), bpy.context.scene
-    live._after_load()
     a_body()
     press(getattr(bpy.ops.beyond_mocap, f"{act}_at_target"))
     for message in ("deselected", "target selected"):  # nothing of the armature changes between two steps
@@ -626,13 +624,11 @@ def test_undo_after_a_throw_has_followed(act, room):
     assert after["keys"] != dragged["keys"]
     for expected in (dragged, thrown):
         bpy.ops.ed.undo()
-        live._after_undo()  # without a window nobody listens
         assert state() == expected
         followed(live, bpy.context.scene)  # what undo has brought back stays
         assert state() == expected
     for expected in (dragged, after):
         bpy.ops.ed.redo()
-        live._after_undo()
         followed(live, bpy.context.scene)
         assert state() == expected
 

@@ -81,7 +81,7 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
         for entry in button.entries(hand.context):
             queue.add(entry)
         button.entry, button.job, button.told, button.wrote = None, None, [], 0
-        button.seen, button.drawn, button.timer = None, 0.0, "timer"
+        button.seen, button.drawn, button.clock = None, 0.0, "timer"
         return button
 
     def run(button, event=TIMER, limit=30.0, until=lambda: False):

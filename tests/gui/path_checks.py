@@ -195,7 +195,7 @@ def settled():
     while quiet < 4:
         assert time.monotonic() - start < 300.0, "live does not come to rest"
         yield 0.05
-        quiet = 0 if live._seen["dirty"] else quiet + 1
+        quiet = 0 if live.WATCHER.dirty else quiet + 1
 
 
 def over_the_view():

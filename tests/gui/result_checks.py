@@ -4,7 +4,8 @@ import threading
 import time
 
 import bpy
-from tab import PICTURES, TAB, output, room, run, sample, settings, settled, until, window, within
+import numpy as np
+from tab import EXTENSION, PICTURES, TAB, output, room, run, sample, settings, settled, until, window, within
 
 
 
@@ -270,3 +271,34 @@ def check_whatever_happens_in_the_middle():
         hold.go()
         yield from worked_off()
         assert states() == ["NONE", "NONE"] and not room("scene.queue").names()
+
+
+def status_bar(name):
+    """The lowest rows of the window, as pixels."""
+    window.picture(PICTURES / f"result-{name}.png")
+    image = bpy.data.images.load(str((PICTURES / f"result-{name}.png").resolve()))
+    pixels = np.array(image.pixels).reshape(*image.size[::-1], image.channels)[2:18, :1000, :3]
+    bpy.data.images.remove(image)
+    return pixels
+
+
+def check_switched_off_while_takes_are_made_nothing_is_left_in_the_window():
+    yield from opened()
+    yield from window.move(900, 500)
+    yield 1.0
+    before = status_bar("before")
+    with held():
+        run("beyond_mocap.synthesize")
+        yield 1.5
+        assert not np.array_equal(status_bar("working"), before), "the status bar says nothing"
+        run("preferences.addon_disable", "EXEC_DEFAULT", module=EXTENSION)
+        yield 1.5
+    assert np.array_equal(status_bar("switched-off"), before), "the status bar still says something"
+    assert not window.window.modal_operators
+    yield from worked_off()
+    run("preferences.addon_enable", "EXEC_DEFAULT", module=EXTENSION)
+    yield from opened()
+    assert not work().kind and not work().waiting
+    run("beyond_mocap.synthesize")
+    yield from settled()
+    assert "PREVIEW" in states()

@@ -55,20 +55,25 @@ def redrawn(count):
         yield 0.12
 
 
+DRAWN = (("_draw_shapes", "POST_VIEW"), ("_draw_texts", "POST_PIXEL"))
+
+
 class timed:
     """Counts how long the two handlers take, and how many batches they draw, while a `with` lasts."""
 
     def __init__(self):
         self.draw, self.seconds, self.drawn = room("scene.overlays.draw"), [], 0
+        self.window = room("scene.core.window")
 
     def __enter__(self):
         names = ("_draw_shapes", "_draw_texts", "_draw_batches", "_draw_contacts")
         self.kept, self.blf = {name: getattr(self.draw, name) for name in names}, None
-        self.draw.unregister()
-        for name in ("_draw_shapes", "_draw_texts"):
+        self.draw.free()
+        for name, when in DRAWN:
+            self.window.undraw(self.kept[name])
             setattr(self.draw, name, self.clocked(self.kept[name]))
+            self.window.draw(bpy.types.SpaceView3D, getattr(self.draw, name), when)
         self.draw._draw_batches = self.counted
-        self.draw.register()
         return self
 
     def clocked(self, function):
@@ -83,12 +88,14 @@ class timed:
         self.kept["_draw_batches"](context, batches)
 
     def __exit__(self, *error):
-        self.draw.unregister()
+        self.draw.free()
+        for name, when in DRAWN:
+            self.window.undraw(getattr(self.draw, name))
+            self.window.draw(bpy.types.SpaceView3D, self.kept[name], when)
         if self.blf is not None:
             self.draw.legend.blf, self.draw.legend.box = self.blf, self.box
         for name, function in self.kept.items():
             setattr(self.draw, name, function)
-        self.draw.register()
 
     def without_graphics(self):
         """From here on all is done but the drawing itself: what remains is Python's time. llvmpipe's says nothing."""
