@@ -1,0 +1,1 @@
+"""What every feature stands on. `settings`: the table of all settings."""
