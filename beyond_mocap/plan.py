@@ -4,38 +4,25 @@ and how to go about it."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .annotation import Timeline
+from .base.settings import defaults, rows_of, setting
+from .base.settings.setting import check_limits
 from .errors import InputError, told_time
 from .motion.skeleton import frozen_array
-from .motion.track import SMOOTHING_SECONDS, SampledTrack, Track, sample
+from .motion.track import SampledTrack, Track, sample
 
-METHODS = ("path", "distance", "blocks")
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
 FEET = ("", "left", "right")
-LIMITS = {
-    "alpha": (0.0, 1.0),
-    "delta": (0.0, 100.0),
-    "omega": (0.0, 100.0),
-    "seam_window": (0.0, 4.0),
-    "track_window": (0.2, 5.0),
-    "root_window": (0.2, 5.0),
-    "style_weight": (0.0, 10.0),
-    "variety": (0.0, 10.0),
-    "lag": (0.0, 60.0),
-}
-"""Least and most of a plan's numbers; outside them there is no sense in it."""
+METHODS = setting("synthesis", "method").choice_names
+_USUAL = defaults("synthesis", "player")
+_HEIGHT = setting("player", "height")
 
 LATER = {"later": True}
 """Marks fields that came after files were saved with fingerprints of the others."""
-
-HEIGHTS = (0.5, 3.0)
-"""Metres that a player is tall at least and at most."""
-
 
 @dataclass(frozen=True)
 class Pin:
@@ -128,48 +115,45 @@ class Plan:
     "path"); lag: which, s (`match.variety.lags`). solved: the ball's course where it is known already,
     such as from a whole match.
 
-    InputError for a number outside LIMITS or HEIGHTS, and for two pins of one part at one time.
+    InputError for a number outside the limits of its setting, and for two pins of one part at one time.
     """
 
     track: Track
     timeline: Timeline = field(default_factory=Timeline)
     library: str = ""
-    method: str = "path"
-    catch_up: bool = True
-    fps: float = 30.0
-    alpha: float = 0.2
-    mirror: bool = True
-    nearest: bool = False
-    seed: int = 0
-    delta: float = 0.5
-    omega: float = 0.0
-    made: bool = True
-    seam_window: float = 0.8
-    track_window: float = SMOOTHING_SECONDS
-    root_window: float = 1.5
+    method: str = _USUAL["method"]
+    catch_up: bool = _USUAL["catch_up"]
+    fps: float = _USUAL["fps"]
+    alpha: float = _USUAL["alpha"]
+    mirror: bool = _USUAL["mirror"]
+    nearest: bool = _USUAL["nearest"]
+    seed: int = _USUAL["seed"]
+    delta: float = _USUAL["delta"]
+    omega: float = _USUAL["omega"]
+    made: bool = _USUAL["made"]
+    seam_window: float = _USUAL["seam_window"]
+    track_window: float = _USUAL["track_window"]
+    root_window: float = _USUAL["root_window"]
     gaits: tuple[tuple[str, str], ...] = ()
     pins: tuple[Pin, ...] = ()
     height: float = 0.0
     strong_foot: str = ""
     style: tuple[str, ...] = ()
-    style_weight: float = 0.5
-    solve_touches: bool = field(default=False, metadata=LATER)
-    variety: float = field(default=0.0, metadata=LATER)
-    lag: float = field(default=0.0, metadata=LATER)
+    style_weight: float = _USUAL["style_weight"]
+    solve_touches: bool = field(default=_USUAL["solve_touches"], metadata=LATER)
+    variety: float = field(default=_USUAL["variety"], metadata=LATER)
+    lag: float = field(default=_USUAL["lag"], metadata=LATER)
     solved: SolvedCourse | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
         object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
-        for name, (least, most) in LIMITS.items():
-            if not least <= getattr(self, name) <= most:
-                raise InputError(name, f"{getattr(self, name):g}", f"{least:g} to {most:g}")
+        check_limits(self, (*rows_of("synthesis"), *rows_of("player")))
         if 0.0 < self.omega < 1.0:
             raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the usual thresholds")
-        if self.height and not HEIGHTS[0] <= self.height <= HEIGHTS[1]:
-            raise InputError(
-                "height", f"{self.height:g} m", f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} m, or 0 for the library's"
-            )
+        if self.height and not _HEIGHT.least <= self.height <= _HEIGHT.most:
+            limits = f"{_HEIGHT.least:g} to {_HEIGHT.most:g} m, or 0 for the library's"
+            raise InputError("height", f"{self.height:g} m", limits)
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
         self._check_pins()
@@ -195,17 +179,3 @@ class Plan:
                 if after.time <= before.end:
                     found = f"two pins of {part} at {told_time(after.time)} s"
                     raise InputError("pins", found, "one place at a time", "move one, or shorten the hold before it")
-
-
-def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
-    """(gait word, clip) of each text "WORD=CLIP", blanks around either left out; InputError for any other text and for
-    a word that comes twice."""
-    pairs = []
-    for text in texts:
-        word, _, clip = (part.strip() for part in text.partition("="))
-        if not word or not clip:
-            raise InputError("--gait", f"{text!r}", "WORD=CLIP, such as walking=folder/walk.bvh")
-        if word.lower() in dict(pairs):
-            raise InputError("--gait", f"{word!r} twice", "one clip for each gait")
-        pairs.append((word.lower(), clip.replace("\\", "/")))
-    return tuple(pairs)

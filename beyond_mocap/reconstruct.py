@@ -10,20 +10,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from . import __version__
+from .base.settings import defaults, setting
 from .errors import Cancelled, InputError
-from .markers.butterworth import CUTOFF
 from .markers.clean import Cleaned, clean
 from .markers.model import MarkerModel
 from .markers.pose import HeldBall, PoseSettings, Solved, solve
 from .markers.trial import MarkerTrial
 from .motion.motion import Motion
 
-FILTERS = ("butterworth", "kalman", "none")
-RELEASES = ("auto", "yes", "no")
+_USUAL = defaults("markers")
+FILTERS = setting("markers", "filter").choice_names
+RELEASES = setting("markers", "release").choice_names
+_SMOOTHNESS = setting("markers", "smoothness")
 LEAST_MARKERS = 0.5
 """Share of a model's markers that a trial must have."""
-MOST_SMOOTHNESS = 0.2
-"""Seconds: so far on a body hardly follows its markers any more."""
 _TOLD_FLOOR = 0.02  # metres
 _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
 
@@ -40,24 +40,25 @@ class ReconstructSettings:
     "auto": where a marker is on a ball, or the file's name tells a throw's speed."""
 
     marker_set: object | None = None
-    weights: bool = True
-    limits: bool = True
-    smoothness: float = 0.0
-    filter: str = "butterworth"
-    cutoff: float = CUTOFF
-    plant: bool = True
-    floor: bool = False
-    radius: float | None = None
-    hold_ball: bool = False
-    ball: str = "baseball"
-    release: str = "auto"
+    weights: bool = _USUAL["weights"]
+    limits: bool = _USUAL["limits"]
+    smoothness: float = _USUAL["smoothness"]
+    filter: str = _USUAL["filter"]
+    cutoff: float = _USUAL["cutoff"]
+    plant: bool = _USUAL["plant"]
+    floor: bool = _USUAL["floor"]
+    radius: float | None = _USUAL["radius"]
+    hold_ball: bool = _USUAL["hold_ball"]
+    ball: str = _USUAL["ball"]
+    release: str = _USUAL["release"]
 
     def __post_init__(self):
         for name, choices in (("filter", FILTERS), ("release", RELEASES)):
             if getattr(self, name) not in choices:
                 raise InputError(name, f"{getattr(self, name)!r}", f"one of {', '.join(choices)}")
-        if not 0.0 <= self.smoothness <= MOST_SMOOTHNESS:
-            raise InputError("smoothness", f"{self.smoothness} s", f"0 to {MOST_SMOOTHNESS:g} seconds")
+        least, most = _SMOOTHNESS.least, _SMOOTHNESS.most
+        if not least <= self.smoothness <= most:
+            raise InputError("smoothness", f"{self.smoothness} s", _SMOOTHNESS.limits_text(least, most))
 
 
 @dataclass(frozen=True, eq=False)

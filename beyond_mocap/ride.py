@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .base.settings import defaults, setting
 from .errors import InputError, TimedLine
 from .motion import contacts, quaternion
 from .motion.arc_length import ArcLength
@@ -48,8 +49,9 @@ from .polish.path_time import (
 )
 from .polish.underfoot import footing, is_level, mesh_surface, path_surface
 
-ENDS = ("stop", "repeat")
-SPEEDS = (0.05, 20.0)
+_USUAL = defaults("path_editing")
+ENDS = setting("path_editing", "end").choice_names
+_SPEED = setting("path_editing", "speed")
 LEANS_FROM = (0.7, 1.5)
 """m/s below which nobody leans into a bend, and from which on all of it counts: walkers lean too, on a path that is as
 smooth as these."""
@@ -74,19 +76,19 @@ class RideSettings:
     slow the motion (the two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that
     it begins later. detours: (arc m, width m, offset m to the left) each."""
 
-    fit: str = "spline"
-    degree: int = 13
-    by_arc_length: bool = True
-    speed: float = 1.0
-    end: str = "stop"
-    cycle: bool = False
-    frame: str = "path"
-    plant: bool = True
-    lean: bool = True
-    bends: bool = False
-    slopes: bool = True
-    climbs: bool = False
-    delay: float = 0.0
+    fit: str = _USUAL["fit"]
+    degree: int = _USUAL["degree"]
+    by_arc_length: bool = _USUAL["by_arc_length"]
+    speed: float = _USUAL["speed"]
+    end: str = _USUAL["end"]
+    cycle: bool = _USUAL["cycle"]
+    frame: str = _USUAL["frame"]
+    plant: bool = _USUAL["plant"]
+    lean: bool = _USUAL["lean"]
+    bends: bool = _USUAL["bends"]
+    slopes: bool = _USUAL["slopes"]
+    climbs: bool = _USUAL["climbs"]
+    delay: float = _USUAL["delay"]
     detours: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self):
@@ -95,8 +97,8 @@ class RideSettings:
             raise InputError("end of path", str(self.end), " or ".join(ENDS))
         if self.fit not in KINDS:
             raise InputError("path fit", str(self.fit), " or ".join(KINDS))
-        if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
-            raise InputError("speed", f"{self.speed:g} times", f"{SPEEDS[0]:g} to {SPEEDS[1]:g}")
+        if not _SPEED.least <= self.speed <= _SPEED.most:
+            raise InputError("speed", f"{self.speed:g} times", f"{_SPEED.least:g} to {_SPEED.most:g}")
         if not 0.0 <= self.delay < 86400.0:
             raise InputError("delay", f"{self.delay:g} s", "0 or more seconds")
 

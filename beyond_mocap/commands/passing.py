@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..base.settings.options import add_options
 from ..errors import InputError
-from .numbers import positive
 from .outputs import Writer
 from .told import Told
 
@@ -23,9 +23,7 @@ def add(verbs):
     verb.add_argument("scene", type=Path, metavar="SCENE.json", help="who passes to whom; docs/passes.md has its form")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
     verb.add_argument("--out", type=_named, required=True, metavar="FOLDER", help="is made where there is none")
-    verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
-    verb.add_argument("--skeleton", type=Path, metavar="CLIP.bvh", help="whose skeleton the library has")
-    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of the BVH files")
+    add_options(verb, "library")
     verb.set_defaults(run=run)
     return verb
 

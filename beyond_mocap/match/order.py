@@ -7,11 +7,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .. import __version__
+from ..base.settings import defaults
 from ..errors import InputError, told_time
 from ..files.event_providers import EVENT_PROVIDERS
 from .content_digest import digest_of_file
 from .units import OVERLAP, WINDOW
 
+_USUAL = defaults("match")
 FORM = 3
 """Raised whenever the same order would give other results, so that kept ones are not taken for them."""
 
@@ -48,13 +50,13 @@ class MatchOrder:
     start: float | None = None
     end: float | None = None
     players: tuple[str, ...] = ()
-    fps: float = 30.0
-    seed: int = 0
-    nearest: bool = True
-    solve_touches: bool = True
+    fps: float = _USUAL["fps"]
+    seed: int = _USUAL["seed"]
+    nearest: bool = _USUAL["nearest"]
+    solve_touches: bool = _USUAL["solve_touches"]
     annotations: Path | None = None
-    bvh: bool = False
-    figures: bool = True
+    bvh: bool = _USUAL["bvh"]
+    figures: bool = _USUAL["figures"]
     window: float = WINDOW
     overlap: float = OVERLAP
     variety: float = 0.3

@@ -7,12 +7,9 @@ import json
 import bpy
 from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
 
-from ..core.properties import with_settings
+from ..core.properties import property_values, with_settings
 from ..result import BeyondMocapBefore
 
-WISHES = ("fit", "degree", "by_arc_length", "speed", "end", "cycle", "frame", "plant", "lean", "bends", "slopes",
-          "climbs",
-          "delay")
 
 
 def is_curve(_ride, candidate: bpy.types.Object) -> bool:
@@ -75,7 +72,9 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
 
 def wishes(ride: BeyondMocapRide) -> dict:
     """The settings as arguments of the core's `RideSettings`."""
-    found = {name: getattr(ride, name) for name in WISHES}
+    from ...beyond_mocap.ride import RideSettings
+
+    found = property_values(RideSettings, ride, "path_editing")
     found["speed"], found["delay"] = (round(found[name], 6) for name in ("speed", "delay"))  # single precision
     try:
         found["detours"] = tuple(tuple(float(value) for value in detour) for detour in json.loads(ride.detours or "[]"))

@@ -15,7 +15,7 @@ MARK = "beyond_mocap_thrown"
 """Custom property of what a throw has made; no group has its name."""
 
 
-@with_settings("throw")
+@with_settings("throw", "throw.ball")
 class BeyondMocapThrow(bpy.types.PropertyGroup):
     """How an armature is to throw or kick, and what came of it."""
 

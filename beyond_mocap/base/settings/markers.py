@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from .setting import Setting
 
 FILTERS = (
@@ -54,8 +56,7 @@ TABLES = {
         Setting(name="radius", kind=float, default=None, least=0.005, most=0.5, unit="metres", option="--ball-radius",
             help="of a ball that carries a marker", title="Radius", tooltip="Metres; 0: fitted where a marker lies on "
             "the ball, else that of the ball's kind", precision=4, panel_more=dict(default=0.0, min=0.0)),
-        Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind", identifier="thrown", title="Ball",
-            tooltip="What is thrown"),
+        Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind"),
         Setting(name="hold_ball", default=False, option="--hold-ball", help="its marker takes part in the pose until "
             "the release"),
         Setting(name="release", default="auto", choices=("auto", "yes", "no"), option="--release",
@@ -64,6 +65,8 @@ TABLES = {
     "markers.adding": (
         Setting(name="add", default=False, title="Add to Library", tooltip="Write the motion with its words into the "
             "library's folder"),
+        Setting(name="add_to", kind=Path, default=None, option="--add-to",
+            help="adds the motion to a library as NAME.bvh", option_more=dict(metavar="LIBRARY")),
         Setting(name="words", default=(), option="--words", help="its annotation; a throw's key: release",
             title="Words", tooltip="The words of the clip that is added", option_more=dict(metavar="WORD", nargs="+"),
             panel_more=dict(default="throwb")),
@@ -79,8 +82,9 @@ TABLES = {
         Setting(name="hand", kind=str, default=None, choices=HANDS, option="--hand", help="that throws; default: found",
             title="Hand", tooltip="The hand that throws", option_more=dict(choices=("left", "right")),
             panel_more=dict(default="AUTO")),
-        Setting(name="ball", default="baseball", choices=("baseball", "tennis", "handball", "volleyball", "football"),
-            option="--ball-kind"),
+        Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind", identifier="thrown",
+            title="Ball",
+            tooltip="What is thrown"),
     ),
     "release.reading": (
         Setting(name="unit", kind=str, default=None, option="--unit", help="of the markers: metres per unit, or mm, "

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from .setting import Setting
 
 TABLES = {
@@ -28,7 +30,11 @@ TABLES = {
         Setting(name="solve_touches", default=True, option="--no-solve-touches", help="the ball as the feed has it, "
             "and no touches", title="Solve Touches", tooltip="Find out of the ball's course who touches it and when, "
             "and have it go as physics has it"),
+        Setting(name="annotations", kind=Path, default=None, option="--annotations",
+            help="words of players as DIR/ID.txt, not found ones", option_more=dict(metavar="DIR")),
         Setting(name="bvh", default=False, option="--bvh", help="every player as BVH too"),
+        Setting(name="scene", kind=Path, default=None, option="--scene", help="everybody, ball and pitch in one file; "
+            "inside Blender: .blend, .fbx, .glb, .usdc", option_more=dict(metavar="FILE")),
         Setting(name="figures", default=True, option="--no-figures", help="no reports, no provenance, no page"),
         Setting(name="fps", default=30.0, least=1.0, most=480.0, unit="frames per second", option="--fps"),
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),

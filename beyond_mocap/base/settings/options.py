@@ -10,10 +10,11 @@ from . import rows_of
 from .setting import Setting, collect
 
 
-def add_options(parser, group: str) -> None:
-    """Adds the options of a group of settings, in their order. parser: of argparse, or a group of one."""
+def add_options(parser, group: str, *names: str) -> None:
+    """Adds the options of a group of settings, in their order; of `names` alone, where there are any.
+    parser: of argparse, or a group of one."""
     for row in rows_of(group):
-        if row.option:
+        if row.option and (not names or row.name in names):
             parser.add_argument(*row.option.split(), **_arguments(row))
 
 

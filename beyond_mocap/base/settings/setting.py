@@ -89,11 +89,14 @@ class Setting:
 
 
 def check_limits(record: object, rows: Iterable[Setting]) -> None:
-    """Raises InputError where a number of `record` is outside the limits that `rows` have for it, or no choice."""
+    """Raises InputError where a number of the dataclass `record` is outside the limits that `rows` have for it; where
+    the default is outside them too, the record checks for itself."""
+    names = {one.name for one in fields(record)}
     for row in rows:
-        value = getattr(record, row.name)
-        if row.least is not None and row.least <= row.default and not row.least <= value <= row.most:
-            raise InputError(row.name, f"{value:g}", f"{row.least:g} to {row.most:g}")
+        if row.name in names and row.least is not None and row.least <= row.default:
+            value = getattr(record, row.name)
+            if not row.least <= value <= row.most:
+                raise InputError(row.name, f"{value:g}", f"{row.least:g} to {row.most:g}")
 
 
 def collect(record: type, rows: Iterable[Setting], said: Callable[[Setting], object]) -> dict[str, object]:

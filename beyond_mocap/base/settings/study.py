@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from .setting import Setting
 
 TABLES = {
     "study.order": (
         Setting(name="raters", kind=int, default=None, least=1, most=1000, option="--raters",
             option_more=dict(metavar="N", required=True)),
+        Setting(name="out", kind=Path, default=None, option="--out", help="a new or an empty folder",
+            option_more=dict(metavar="FOLDER", required=True)),
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),
         Setting(name="pairs", default=False, option="--pairs", help="compare two clips at a time instead of rating "
             "each"),

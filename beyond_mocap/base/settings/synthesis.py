@@ -30,7 +30,8 @@ TABLES = {
         Setting(name="catch_up", default=True, option="--no-catch-up", help="'distance' without regaining lost "
             "distance", title="Catch Up", tooltip="Let the body catch up with the track smoothly after each warp",
             in_preset=True),
-        Setting(name="fps", default=30.0, unit="frames per second", option="--fps", identifier="rate", title="Frame Rate",
+        Setting(name="fps", default=30.0, unit="frames per second", option="--fps", identifier="rate",
+            title="Frame Rate",
             tooltip="Frames per second that are synthesized; the scene keeps its own rate", in_preset=True,
             option_more=dict(least=1.0, most=480.0), panel_more=dict(min=10.0, max=240.0)),
         Setting(name="seed", default=0, option="--seed", help="of the clustering that blocks and distance search in",
@@ -65,6 +66,8 @@ TABLES = {
             option="--root-window", help="of the window behind which the body is on the track ('path'); default "
             "%(default)g", title="Sway Window", tooltip="Of On the path: the body is on the track when both are seen "
             "through this window; shorter keeps less sway", precision=2, in_preset=True),
+        Setting(name="variety", default=0.0, least=0.0, most=10.0),
+        Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds"),
         Setting(name="gaits", default=(), option="--gait", help="the clip that stands for a gait, such as "
             "walking=folder/walk.bvh; once for each gait", title="Gait Clips", tooltip="Which clip stands for which "
             "gait, where you choose: walking=folder/walk.bvh; jogging=folder/jog.bvh", convert=gait_choices,

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from .choices import SIDES
 from .setting import Setting
 
@@ -19,6 +21,8 @@ TABLES = {
     "throw": (
         Setting(name="limb", kind=str, default=None, choices=("left_hand", "right_hand", "left_foot", "right_foot"),
             option="--limb", help="default: what most examples of the model use"),
+        Setting(name="skeleton", kind=Path, default=None, option="--skeleton",
+            help="whose bones throw; default: the model's", option_more=dict(metavar="S.bvh")),
         Setting(name="speed", kind=float, default=None, least=0.5, most=80.0, unit="m/s", option="--speed",
             help="of the ball as it leaves; default: what suits", title="Ball Speed",
             tooltip="How fast the ball leaves, m/s; 0: as in examples that are thrown or kicked as far", precision=1,
@@ -28,16 +32,21 @@ TABLES = {
         Setting(name="fps", kind=float, default=None, least=10.0, most=480.0,
             expected="{least} to {most} frames per second, in which a throw can be seen", option="--fps",
             help="default: the model's, 30 with --library"),
+    ),
+    "throw.ball": (
+        Setting(name="kind", kind=str, default=None, choices=KINDS, option="--ball-kind",
+            help="baseball, tennis, handball, volleyball, football, paper", title="Kind",
+            tooltip="What kind of ball it is, in the air", option_more=dict(metavar="KIND", choices=None),
+            panel_more=dict(default="usual")),
+        Setting(name="ball", kind=Path, default=None, option="--ball", help="the ball's way",
+            option_more=dict(metavar="B.csv")),
+        Setting(name="report", kind=Path, default=None, option="--report", option_more=dict(metavar="R.json")),
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed", help="another motion with the same "
             "aim; default %(default)s", title="Seed", tooltip="Another number, another throw at the same target",
             panel_more=dict(max=None)),
         Setting(name="side", default="right", choices=SIDES, title="Side", tooltip="With which hand or foot"),
         Setting(name="frame", default=0, least=0, title="On Frame", tooltip="Scene frame on which the ball leaves hand "
             "or foot, up to half a frame sooner or later; 0: the current frame"),
-        Setting(name="kind", kind=str, default=None, choices=KINDS, option="--ball-kind",
-            help="baseball, tennis, handball, volleyball, football, paper", title="Kind",
-            tooltip="What kind of ball it is, in the air", option_more=dict(metavar="KIND"),
-            panel_more=dict(default="usual")),
         Setting(name="library", default=True, title="Run-Up by Library", tooltip="Let the synthesizer find the way "
             "into the throw and out of it among the clips of the library (step 1); without one the throw is eased into "
             "the armature's own motion"),
@@ -46,8 +55,12 @@ TABLES = {
     ),
     "throw.train": (
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action"),
+        Setting(name="config", kind=Path, default=None, option="--config",
+            help="sizes and rates; default: as shipped weights have", option_more=dict(metavar="C.json")),
         Setting(name="subject", default=(), option="--subject", help="train on this one only; repeatable",
             option_more=dict(metavar="S", action="append")),
+        Setting(name="skeleton", kind=Path, default=None, option="--skeleton",
+            help="whose bones the model has; default: the first's", option_more=dict(metavar="S.bvh")),
         Setting(name="resume", default=False, option="--resume", help="go on from the checkpoint beside W.npz"),
         Setting(name="seed", kind=int, default=None, least=0, most=2**31 - 1, option="--seed",
             help="of first weights, batches and dropout; default: the config's, else 0"),
@@ -60,6 +73,10 @@ TABLES = {
     "throw.evaluate": (
         Setting(name="subject", default=(), option="--subject", help="only this one's; repeatable",
             option_more=dict(metavar="S", action="append")),
+        Setting(name="report", kind=Path, default=None, option="--report",
+            option_more=dict(metavar="R.json", required=True)),
+        Setting(name="html", kind=Path, default=None, option="--html", help="the same as a page for a browser",
+            option_more=dict(metavar="R.html")),
         Setting(name="raw", default=False, option="--raw", help="networks alone: no pose iterations, no inverse "
             "kinematics"),
         Setting(name="as_they_are", default=False, option="--as-they-are", help="do not scale what is asked for by "
