@@ -96,7 +96,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     result: PointerProperty(type=BeyondMocapResult, description="What became of the newest take")
 
 
-@with_settings("synthesis", "result", "library", "library.build", "path.new_curve")
+@with_settings("synthesis", "result", "library", "path.new_curve")
 @with_settings("clock", update=renew)
 class BeyondMocapSettings(bpy.types.PropertyGroup):
     """All steps of one scene."""

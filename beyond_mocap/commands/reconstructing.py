@@ -27,9 +27,7 @@ def add(verbs):
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh", help="for a folder of trials: a folder")
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--save-model", type=Path, metavar="MODEL.json")
-    add_options(verb, "markers.reading")
     add_options(verb, "markers")
-    add_options(verb, "markers.adding")
     verb.set_defaults(run=run)
     return verb
 

@@ -20,8 +20,6 @@ def add(verbs):
     verb.add_argument("--motion", type=Path, required=True, metavar="M.bvh", help="the motion made from this trial")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
     add_options(verb, "release")
-    verb.add_argument("--ball-csv", type=Path, metavar="B.csv", help="the ball's way over the whole trial")
-    add_options(verb, "release.reading")
     verb.set_defaults(run=run)
     return verb
 

@@ -25,9 +25,6 @@ def add(verbs):
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     # Blender's own Cycles add-on reads what stands behind `--` (batch.py) and ends Blender over `--cycle`: hence --loop
     add_options(verb, "path_editing")
-    verb.add_argument("--report", type=Path, metavar="R.json")
-    verb.add_argument("--provenance", type=Path, metavar="P.csv")
-    add_options(verb, "path.unit")
     verb.set_defaults(run=run)
     return verb
 

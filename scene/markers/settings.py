@@ -117,7 +117,7 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
     release: StringProperty(name="Release", options={"HIDDEN"}, description="Lines about the ball's release")
 
 
-@with_settings("markers.reading", "markers", "markers.adding", "release")
+@with_settings("markers", "release")
 class BeyondMocapMarkers(bpy.types.PropertyGroup):
     """How recordings of markers are read and worked on, per scene."""
 

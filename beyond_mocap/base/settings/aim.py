@@ -12,8 +12,7 @@ WAYS = (
 )
 TIMES = (
     ("FREE", "Slowest", "As long as the slowest launch takes; along the ground, so that it arrives at a walking pace"),
-    ("SECONDS", "Seconds", "This long after the strike"),
-    ("FRAME", "On Frame", "On this scene frame"),
+    ("SECONDS", "Seconds", "This long after the strike"), ("FRAME", "On Frame", "On this scene frame"),
 )
 
 TABLES = {
@@ -44,8 +43,6 @@ TABLES = {
             tooltip="Seconds that the ball is followed behind the target, bouncing and rolling; 0: it stays there",
             precision=1),
     ),
-    "aim.handover": (
-        Setting(name="handover", default=60, title="On Frame", tooltip="Frame on which Blender's rigid bodies take the "
-            "ball over"),
-    ),
+    "aim.handover": (Setting(name="handover", default=60, title="On Frame", tooltip="Frame on which Blender's rigid "
+        "bodies take the ball over"),),
 }

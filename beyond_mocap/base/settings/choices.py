@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 PARTS = (
-    ("foot", "Foot", "From ankle to toe", "MOD_DYNAMICPAINT", 0),
-    ("head", "Head", "The middle of the head", "USER", 1),
+    ("foot", "Foot", "From ankle to toe", "MOD_DYNAMICPAINT", 0), ("head", "Head", "The middle of the head", "USER", 1),
     ("chest", "Chest", "The uppermost joint of the spine", "OUTLINER_OB_ARMATURE", 2),
     ("hand", "Hand", "The palm", "VIEW_PAN", 3),
     ("tool", "Tool", "What the hand holds, such as a racquet", "MOD_BEVEL", 4),
@@ -13,8 +12,7 @@ SIDES = (("right", "Right", "The right one"), ("left", "Left", "The left one"))
 EITHER = (("either", "Either", "Whichever suits"), *SIDES)
 BALLS = (
     ("football", "Football", "Size 5: measured drag, lift and bounce"),
-    ("volleyball", "Volleyball", "Lighter, and slower in the air"),
-    ("tennis", "Tennis Ball", "Small and fast"),
+    ("volleyball", "Volleyball", "Lighter, and slower in the air"), ("tennis", "Tennis Ball", "Small and fast"),
     ("paper", "As in the Paper", "Air takes 0.2 of the speed in a second, the bounce leaves 0.7, no spin"),
 )
 HOLDS = (

@@ -9,33 +9,27 @@ from .setting import Setting
 
 FILTERS = (
     ("butterworth", "Butterworth", "Zero-phase low-pass filter of fourth order"),
-    ("kalman", "Kalman", "Smoothing by how a body moves, forwards and backwards"),
-    ("none", "None", "As it was solved"),
+    ("kalman", "Kalman", "Smoothing by how a body moves, forwards and backwards"), ("none", "None", "As it was solved"),
 )
 _THROWN = ("baseball", "tennis", "handball", "volleyball", "football")
 THROWN = tuple((name, name.capitalize(), f"A {name}") for name in _THROWN)
 HANDS = (
-    ("AUTO", "Found", "The hand that throws"),
-    ("left", "Left", "The left hand"),
-    ("right", "Right", "The right hand"),
+    ("AUTO", "Found", "The hand that throws"), ("left", "Left", "The left hand"), ("right", "Right", "The right hand"),
 )
 
 TABLES = {
-    "markers.reading": (
-        Setting(name="marker_set", kind=str, default=None, option="--marker-set", help="whose markers these are; "
-            "default: what fits", option_more=dict(metavar="FILE|NAME")),
-        Setting(name="subject", kind=str, default=None, option="--subject", help="whose markers, where a file holds "
-            "several bodies", option_more=dict(metavar="NAME")),
-        Setting(name="unit", kind=str, default=None, option="--unit", help="of the files: m, cm, mm, in; default: as "
-            "they say", title="Unit", tooltip="Metres in one unit of a recording; 0: as its file says, or by the "
-            "body's size", precision=4, option_more=dict(metavar="UNIT"),
-            panel_more=dict(default=0.0, min=0.0, max=10.0)),
-        Setting(name="up", kind=str, default=None, option="--up", help="of the files that points up: X, Y, Z or "
-            "--up=-Y; default: found", option_more=dict(metavar="AXIS")),
-        Setting(name="fps", kind=float, default=None, least=1.0, most=20000.0, unit="frames per second", option="--fps",
-            help="of the trial, where its file says something else", option_more=dict(metavar="RATE")),
-    ),
     "markers": (
+        Setting(name="marker_set", kind=str, option="--marker-set", metavar="FILE|NAME", help="whose markers these are; "
+            "default: what fits"),
+        Setting(name="subject", kind=str, option="--subject", metavar="NAME", help="whose markers, where a file holds "
+            "several bodies"),
+        Setting(name="unit", kind=str, option="--unit", metavar="UNIT", help="of the files: m, cm, mm, in; default: as "
+            "they say", title="Unit", tooltip="Metres in one unit of a recording; 0: as its file says, or by the body's "
+            "size", precision=4, panel_more=dict(default=0.0, min=0.0, max=10.0)),
+        Setting(name="up", kind=str, option="--up", metavar="AXIS", help="of the files that points up: X, Y, Z or "
+            "--up=-Y; default: found"),
+        Setting(name="fps", kind=float, least=1.0, most=20000.0, unit="frames per second", option="--fps",
+            metavar="RATE", help="of the trial, where its file says something else"),
         Setting(name="filter", default="butterworth", choices=FILTERS, option="--filter", title="Filter",
             tooltip="How the motion is smoothed"),
         Setting(name="cutoff", default=13.4, least=0.1, most=1000.0, unit="hertz", option="--cutoff",
@@ -53,7 +47,7 @@ TABLES = {
             help="it all moves smoothly: 0.02 for a walk, 0.004 for a throw; default %(default)g", title="Smoothness",
             tooltip="Seconds over which the whole sequence is solved as one that moves smoothly: 0.003 to 0.005 for "
             "throws, 0.02 for noisy walks; 0: each frame for itself", precision=3),
-        Setting(name="radius", kind=float, default=None, least=0.005, most=0.5, unit="metres", option="--ball-radius",
+        Setting(name="radius", kind=float, least=0.005, most=0.5, unit="metres", option="--ball-radius",
             help="of a ball that carries a marker", title="Radius", tooltip="Metres; 0: fitted where a marker lies on "
             "the ball, else that of the ball's kind", precision=4, panel_more=dict(default=0.0, min=0.0)),
         Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind"),
@@ -61,46 +55,41 @@ TABLES = {
             "the release"),
         Setting(name="release", default="auto", choices=("auto", "yes", "no"), option="--release",
             help="look for a throw's release"),
-    ),
-    "markers.adding": (
         Setting(name="add", default=False, title="Add to Library", tooltip="Write the motion with its words into the "
             "library's folder"),
-        Setting(name="add_to", kind=Path, default=None, option="--add-to",
-            help="adds the motion to a library as NAME.bvh", option_more=dict(metavar="LIBRARY")),
-        Setting(name="words", default=(), option="--words", help="its annotation; a throw's key: release",
-            title="Words", tooltip="The words of the clip that is added", option_more=dict(metavar="WORD", nargs="+"),
+        Setting(name="add_to", kind=Path, option="--add-to", metavar="LIBRARY", help="adds the motion to a library as "
+            "NAME.bvh"),
+        Setting(name="words", default=(), option="--words", metavar="WORD", help="its annotation; a throw's key: "
+            "release", title="Words", tooltip="The words of the clip that is added", option_more=dict(nargs="+"),
             panel_more=dict(default="throwb")),
         Setting(name="dressed", default=True, title="Make Body", tooltip="Give the armature a simple body"),
         Setting(name="names", default=True, title="Names", tooltip="Write the labels of the active cloud at its "
             "markers"),
     ),
     "release": (
-        Setting(name="ball_marker", kind=str, default=None, option="--ball-marker", help="the marker on the ball; "
-            "default: one named as a ball", option_more=dict(metavar="LABEL")),
-        Setting(name="radius", kind=float, default=None, least=0.01, most=0.2, unit="metres", option="--radius",
+        Setting(name="ball_marker", kind=str, option="--ball-marker", metavar="LABEL", help="the marker on the ball; "
+            "default: one named as a ball"),
+        Setting(name="radius", kind=float, least=0.01, most=0.2, unit="metres", option="--radius",
             help="of the ball; default: its kind's, or as fitted"),
-        Setting(name="hand", kind=str, default=None, choices=HANDS, option="--hand", help="that throws; default: found",
-            title="Hand", tooltip="The hand that throws", option_more=dict(choices=("left", "right")),
+        Setting(name="hand", kind=str, choices=HANDS, option="--hand", help="that throws; default: found", title="Hand",
+            tooltip="The hand that throws", option_more=dict(choices=("left", "right")),
             panel_more=dict(default="AUTO")),
         Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind", identifier="thrown",
-            title="Ball",
-            tooltip="What is thrown"),
-    ),
-    "release.reading": (
-        Setting(name="unit", kind=str, default=None, option="--unit", help="of the markers: metres per unit, or mm, "
-            "cm, m, in", option_more=dict(metavar="UNIT")),
-        Setting(name="subject", kind=str, default=None, option="--subject", help="whose markers, where there are "
-            "several bodies in the file", option_more=dict(metavar="NAME")),
-        Setting(name="up", kind=str, default=None, option="--up", help="of the file that points up: X, Y, Z or "
-            "--up=-Y; default: found", option_more=dict(metavar="AXIS")),
+            title="Ball", tooltip="What is thrown"),
+        Setting(name="ball_csv", kind=Path, option="--ball-csv", metavar="B.csv", help="the ball's way over the whole "
+            "trial"),
+        Setting(name="unit", kind=str, option="--unit", metavar="UNIT", help="of the markers: metres per unit, or mm, "
+            "cm, m, in"),
+        Setting(name="subject", kind=str, option="--subject", metavar="NAME", help="whose markers, where there are "
+            "several bodies in the file"),
+        Setting(name="up", kind=str, option="--up", metavar="AXIS", help="of the file that points up: X, Y, Z or "
+            "--up=-Y; default: found"),
     ),
     "markers.cloud": (
         Setting(name="lines", default=True, title="Lines", tooltip="Draw lines between the markers of a segment"),
-        Setting(name="size", default=0.007, least=0.0, unit="metres", title="Size",
-            tooltip="Radius of the spheres at the markers", panel_more=dict(soft_max=0.05, unit="LENGTH")),
+        Setting(name="size", default=0.007, least=0.0, unit="metres", title="Size", tooltip="Radius of the spheres at "
+            "the markers", panel_more=dict(soft_max=0.05, unit="LENGTH")),
     ),
-    "markers.model": (
-        Setting(name="use_model", default=False, title="Use Model", tooltip="Take joints and markers from the model "
-            "instead of finding them anew"),
-    ),
+    "markers.model": (Setting(name="use_model", default=False, title="Use Model", tooltip="Take joints and markers from "
+        "the model instead of finding them anew"),),
 }

@@ -26,7 +26,7 @@ def option_values(record: type, options: argparse.Namespace, *groups: str) -> di
 
 def _arguments(row: Setting) -> dict:
     """The arguments of `add_argument`."""
-    more = {name: value for name, value in row.option_more.items() if name not in ("least", "most", "metavar")}
+    more = {name: value for name, value in row.option_more.items() if name not in ("least", "most")}
     out = {"dest": row.name, "help": row.help, "default": [] if row.kind is tuple else row.default}
     if row.kind is bool:
         return {**out, "action": "store_false" if row.default else "store_true", **more}
@@ -34,7 +34,8 @@ def _arguments(row: Setting) -> dict:
         out["choices"] = row.choice_names
     elif row.kind not in (str, tuple):
         out["type"] = _reader(row)
-    return {**out, "metavar": row.metavar, **more}
+    unit = row.unit.upper() if row.unit and " " not in row.unit else None
+    return {**out, "metavar": row.metavar or unit, **more}
 
 
 def _reader(row: Setting):

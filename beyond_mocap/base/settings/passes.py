@@ -9,8 +9,7 @@ from .choices import BALLS, EITHER, HOLDS, PARTS, SIDES
 from .setting import Setting
 
 KINDS = (
-    ("toss", "Toss", "Slow, to somebody near"),
-    ("pass", "Pass", "At a medium speed"),
+    ("toss", "Toss", "Slow, to somebody near"), ("pass", "Pass", "At a medium speed"),
     ("attack", "Attack", "Hard and fast"),
 )
 OWN_PARTS = (("own", "Own", "The part that the player is set to", "BLANK1", 9), *PARTS)
@@ -22,8 +21,7 @@ ERRORS = (
 )
 SERVES = (
     ("USUAL", "By Who Would Pass", "The player who would pass to the first one"),
-    ("PLAYER", "By a Player", "A player by name"),
-    ("GROUND", "From the Ground", "The ball lies at the first foot"),
+    ("PLAYER", "By a Player", "A player by name"), ("GROUND", "From the Ground", "The ball lies at the first foot"),
     ("PLACE", "From a Place", "The ball comes flying from a place"),
 )
 
@@ -32,8 +30,8 @@ TABLES = {
         Setting(name="part", default="foot", choices=PARTS, title="Part", tooltip="What the player meets the ball "
             "with"),
         Setting(name="side", default="either", choices=EITHER, title="Side", tooltip="Of what there are two"),
-        Setting(name="bone", default="", title="Joint", tooltip="A joint of the library's skeleton by name, in place "
-            "of the part"),
+        Setting(name="bone", default="", title="Joint", tooltip="A joint of the library's skeleton by name, in place of "
+            "the part"),
         Setting(name="tool_length", default=0.66, least=0.05, most=2.0, unit="metres", title="Tool Length",
             tooltip="Metres that the tool goes on beyond the wrist, along the forearm", precision=2),
         Setting(name="tool_radius", default=0.015, least=0.001, most=0.5, unit="metres", title="Tool Radius",
@@ -56,10 +54,10 @@ TABLES = {
             panel_more=dict(min=0.0, max=20.0)),
         Setting(name="clip", default="", title="Like Clip", tooltip="Path below the library of a recording; the strike "
             "most like its own is played. Empty: by kind"),
-        Setting(name="first", default=0.0, least=0.0, unit="seconds", title="From Second",
-            tooltip="Of the stretch of that recording", precision=2),
-        Setting(name="last", default=0.0, least=0.0, unit="seconds", title="To Second",
-            tooltip="Of the stretch of that recording; 0: to its end", precision=2),
+        Setting(name="first", default=0.0, least=0.0, unit="seconds", title="From Second", tooltip="Of the stretch of "
+            "that recording", precision=2),
+        Setting(name="last", default=0.0, least=0.0, unit="seconds", title="To Second", tooltip="Of the stretch of that "
+            "recording; 0: to its end", precision=2),
         Setting(name="actor_cut", default=False, title="Stretch", tooltip="Look at some frames of its motion only, not "
             "at all of it"),
         Setting(name="actor_first", default=1, title="From Frame", tooltip="Scene frame"),
@@ -67,19 +65,18 @@ TABLES = {
         Setting(name="error", default="none", choices=ERRORS, title="Then", tooltip="How it ends"),
     ),
     "passes.weights": (
-        Setting(name="position", default=1.0, least=0.0, most=1000.0, title="Places",
-            tooltip="Of where bones are, where two poses are compared", precision=2, panel_more=dict(max=100.0)),
-        Setting(name="velocity", default=1.0, least=0.0, most=1000.0, title="Velocities",
-            tooltip="Of how bones move, where two poses are compared", precision=2, panel_more=dict(max=100.0)),
-        Setting(name="speed", default=1.0, least=0.0, most=1000.0, title="Top Speed",
-            tooltip="Of the part's highest speed, where two strikes are compared", precision=2,
-            panel_more=dict(max=100.0)),
-        Setting(name="vectors", default=1.0, least=0.0, most=1000.0, title="Movement",
-            tooltip="Of the part's way, where two strikes are compared", precision=2, panel_more=dict(max=100.0)),
+        Setting(name="position", default=1.0, least=0.0, most=1000.0, title="Places", tooltip="Of where bones are, "
+            "where two poses are compared", precision=2, panel_more=dict(max=100.0)),
+        Setting(name="velocity", default=1.0, least=0.0, most=1000.0, title="Velocities", tooltip="Of how bones move, "
+            "where two poses are compared", precision=2, panel_more=dict(max=100.0)),
+        Setting(name="speed", default=1.0, least=0.0, most=1000.0, title="Top Speed", tooltip="Of the part's highest "
+            "speed, where two strikes are compared", precision=2, panel_more=dict(max=100.0)),
+        Setting(name="vectors", default=1.0, least=0.0, most=1000.0, title="Movement", tooltip="Of the part's way, "
+            "where two strikes are compared", precision=2, panel_more=dict(max=100.0)),
         Setting(name="times", default=1.0, least=0.0, most=1000.0, title="Times", tooltip="Of how long each piece of "
             "that way takes, where two strikes are compared", precision=2, panel_more=dict(max=100.0)),
-        Setting(name="bones", default="", title="Bones", tooltip="Weights of single bones where two poses are "
-            "compared, such as: left foot 2, head 0.5; all others count 1"),
+        Setting(name="bones", default="", title="Bones", tooltip="Weights of single bones where two poses are compared, "
+            "such as: left foot 2, head 0.5; all others count 1"),
     ),
     "passes": (
         Setting(name="ball", default="paper", choices=BALLS, title="Ball", tooltip="What kind of ball it is"),
@@ -90,12 +87,10 @@ TABLES = {
         Setting(name="restitution", default=0.7, least=0.0, most=0.95, title="Elasticity",
             tooltip="Share of its downward speed with which a bounce sends it up", precision=2,
             panel_more=dict(max=0.98)),
-        Setting(name="linear_drag", default=0.2, least=0.0, most=2.0, title="Air, Linear",
-            tooltip="Share of its speed that the air takes in a second, as in the paper", precision=3,
-            panel_more=dict(max=5.0)),
-        Setting(name="drag", default=0.0, least=0.0, most=0.5, title="Air, Square",
-            tooltip="Deceleration over the square of the speed, per metre, as air really does", precision=4,
-            panel_more=dict(max=1.0)),
+        Setting(name="linear_drag", default=0.2, least=0.0, most=2.0, title="Air, Linear", tooltip="Share of its speed "
+            "that the air takes in a second, as in the paper", precision=3, panel_more=dict(max=5.0)),
+        Setting(name="drag", default=0.0, least=0.0, most=0.5, title="Air, Square", tooltip="Deceleration over the "
+            "square of the speed, per metre, as air really does", precision=4, panel_more=dict(max=1.0)),
         Setting(name="gravity", default=9.8, least=0.5, most=30.0, unit="m/s²", title="Gravity",
             tooltip="Metres per second squared", precision=2, panel_more=dict(min=0.1)),
         Setting(name="net", default=False, title="Net", tooltip="Every pass across the net goes over it"),
@@ -105,15 +100,15 @@ TABLES = {
             tooltip="Metres", precision=2, panel_more=dict(max=5.0)),
         Setting(name="repeat", default=1, least=1, most=1000, title="Rounds", tooltip="How many times the passes are "
             "played in a row", panel_more=dict(max=100)),
-        Setting(name="serve_from", default="USUAL", choices=SERVES, title="Serve",
-            tooltip="Where the ball comes from first"),
+        Setting(name="serve_from", default="USUAL", choices=SERVES, title="Serve", tooltip="Where the ball comes from "
+            "first"),
         Setting(name="serve", default="", title="Serve By", tooltip="Who serves"),
         Setting(name="serve_at", default=(5.0, 0.0, 1.0), unit="metres", title="Serve At",
             tooltip="Where the ball comes from, metres"),
         Setting(name="missed", default=0.0, least=0.0, most=1.0, title="Missed", tooltip="How likely each ball is "
             "missed", precision=2),
-        Setting(name="dropped", default=0.0, least=0.0, most=1.0, title="Dropped",
-            tooltip="How likely each ball is dropped", precision=2),
+        Setting(name="dropped", default=0.0, least=0.0, most=1.0, title="Dropped", tooltip="How likely each ball is "
+            "dropped", precision=2),
         Setting(name="lead_in", default=1.0, least=0.0, most=60.0, unit="seconds", title="Lead In",
             tooltip="Seconds before the first strike, at least", precision=2),
         Setting(name="lead_out", default=1.5, least=0.0, most=60.0, unit="seconds", title="Lead Out",
@@ -142,10 +137,10 @@ TABLES = {
     "ball.held": (
         Setting(name="how", default="KEEP", choices=HOLDS, title="Hold", tooltip="Where the ball is while it is "
             "carried"),
-        Setting(name="settle", default=4, least=0, title="Settle", tooltip="Frames within which the ball comes to "
-            "where it is carried"),
-        Setting(name="skin", default=0.03, least=0.0, unit="metres", title="Skin",
-            tooltip="Metres from the bone to what touches the ball"),
+        Setting(name="settle", default=4, least=0, title="Settle", tooltip="Frames within which the ball comes to where "
+            "it is carried"),
+        Setting(name="skin", default=0.03, least=0.0, unit="metres", title="Skin", tooltip="Metres from the bone to "
+            "what touches the ball"),
     ),
     "hits": (
         Setting(name="part", default="foot", choices=PARTS, title="Part", tooltip="The part whose strikes are looked "

@@ -24,7 +24,8 @@ class Setting:
         unit: of a number, as a word.
         expected: what an error says a number should be.
         choices: identifiers, or (identifier, title, sentence[, icon, number]) where panels list them.
-        option: flags on the command line with blanks between, "" for none; help: its sentence.
+        option: flags on the command line with blanks between, "" for none; help: its sentence; metavar: what stands for
+            its value there, None: the unit where that is one word.
         option_more: further arguments of `add_argument`; `default`, `least`, `most` where they differ there.
         title, tooltip: of the property in Blender, title None for none; identifier: its own, "" for name.
         precision: decimals that a panel shows.
@@ -36,7 +37,7 @@ class Setting:
     """
 
     name: str
-    default: object
+    default: object = None
     kind: type | None = None
     least: float | None = None
     most: float | None = None
@@ -45,6 +46,7 @@ class Setting:
     choices: tuple = ()
     option: str = ""
     help: str | None = None
+    metavar: str | None = None
     option_more: Mapping = field(default_factory=dict)
     title: str | None = None
     tooltip: str = ""
@@ -64,12 +66,6 @@ class Setting:
     def choice_names(self) -> tuple[str, ...]:
         """The identifiers of the choices."""
         return tuple(choice if isinstance(choice, str) else choice[0] for choice in self.choices)
-
-    @property
-    def metavar(self) -> str | None:
-        """What stands for the value in the command line's help; None: argparse's own."""
-        own = self.unit.upper() if self.unit and " " not in self.unit else None
-        return self.option_more.get("metavar", own)
 
     def limits_text(self, least: float, most: float) -> str:
         """What is expected of a number from least to most."""

@@ -7,8 +7,7 @@ from .choices import EITHER, PARTS
 from .setting import Setting
 
 PROTOCOLS = (
-    ("udp", "UDP", "Frames come as datagrams"),
-    ("tcp", "TCP", "Who sends connects to this port"),
+    ("udp", "UDP", "Frames come as datagrams"), ("tcp", "TCP", "Who sends connects to this port"),
     ("call", "TCP, Call", "Who sends waits on this port, as Axis Neuron and Axis Studio do"),
 )
 
@@ -32,10 +31,10 @@ TABLES = {
             "does"),
     ),
     "stream.send": (
-        Setting(name="form", default="bvh", choices=("bvh", "neuron"), option="--form",
-            help="of the text; neuron has no hierarchy"),
-        Setting(name="fps", kind=float, default=None, least=1.0, most=1000.0, option="--fps",
-            help="frames a second; default: the file's", option_more=dict(metavar="RATE")),
+        Setting(name="form", default="bvh", choices=("bvh", "neuron"), option="--form", help="of the text; neuron has "
+            "no hierarchy"),
+        Setting(name="fps", kind=float, least=1.0, most=1000.0, option="--fps", metavar="RATE", help="frames a second; "
+            "default: the file's"),
         Setting(name="loop", default=False, option="--loop", help="again and again, until Ctrl-C"),
     ),
 }
