@@ -1,1 +1,1 @@
-"""What every feature stands on. `settings`: the table of all settings."""
+"""The base: errors, small numerics and the settings table that every room uses."""

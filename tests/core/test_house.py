@@ -27,6 +27,7 @@ DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc"}
 # A room of the core -> the other rooms it may import. Every room may raise the core's own errors.
 ROOMS = {
     "errors": [],
+    "base": [],
     "motion": [],
     "annotation": ["motion"],
     "plan": ["motion", "annotation"],
@@ -123,7 +124,8 @@ def core_complaint(path, imported):
     if package in BLENDER:
         return "the core knows no Blender"
     if imported.relative:
-        allowed = [CORE] if room == "recipe" else [f"{CORE}.{other}" for other in [room, "errors", *ROOMS[room]]]
+        others = [room, "errors", "base", *ROOMS.get(room, [])]
+        allowed = [CORE] if room == "recipe" else [f"{CORE}.{other}" for other in others]
         return None if any(below(imported.name, prefix) for prefix in allowed) else f"{room} may not import this room"
     if package in sys.stdlib_module_names or package in ARRAYS:
         return None

@@ -1,8 +1,6 @@
 """Settings of an aimed ball."""
 # fmt: off
 
-from __future__ import annotations
-
 from .choices import BALLS, PARTS, SIDES
 from .setting import Setting
 

@@ -1,7 +1,5 @@
 """Choices that settings of several features share: identifier, title, sentence[, icon, number]."""
 
-from __future__ import annotations
-
 PARTS = (
     ("foot", "Foot", "From ankle to toe", "MOD_DYNAMICPAINT", 0), ("head", "Head", "The middle of the head", "USER", 1),
     ("chest", "Chest", "The uppermost joint of the spine", "OUTLINER_OB_ARMATURE", 2),

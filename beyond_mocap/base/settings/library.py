@@ -1,8 +1,6 @@
 """Settings of libraries, of `mirror` and `retarget`, and the preferences."""
 # fmt: off
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .setting import POSITIVE, Setting

@@ -1,8 +1,6 @@
 """Settings of reconstruction from optical markers, and of releases."""
 # fmt: off
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .setting import Setting

@@ -1,8 +1,6 @@
 """Settings of whole matches, and of `touches`."""
 # fmt: off
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .setting import Setting

@@ -1,10 +1,6 @@
 """Settings of passing scenes, of balls that are carried, and of hit analysis."""
 # fmt: off
 
-from __future__ import annotations
-
-from pathlib import Path
-
 from .choices import BALLS, EITHER, HOLDS, PARTS, SIDES
 from .setting import Setting
 

@@ -1,8 +1,6 @@
 """Settings of path editing."""
 # fmt: off
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .setting import POSITIVE, WHOLE, Setting

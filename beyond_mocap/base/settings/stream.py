@@ -1,8 +1,6 @@
 """Settings of live streams."""
 # fmt: off
 
-from __future__ import annotations
-
 from .choices import EITHER, PARTS
 from .setting import Setting
 

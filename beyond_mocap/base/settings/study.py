@@ -1,8 +1,6 @@
 """Settings of studies with raters."""
 # fmt: off
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .setting import Setting

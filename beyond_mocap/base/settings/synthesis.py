@@ -1,10 +1,6 @@
 """Settings of one player's synthesis, of the clock, and of what a result becomes."""
 # fmt: off
 
-from __future__ import annotations
-
-from pathlib import Path
-
 from .gait_choices import gait_choices
 from .setting import BETWEEN, Setting
 
@@ -62,8 +58,10 @@ TABLES = {
             option="--root-window", help="of the window behind which the body is on the track ('path'); default "
             "%(default)g", title="Sway Window", tooltip="Of On the path: the body is on the track when both are seen "
             "through this window; shorter keeps less sway", precision=2, in_preset=True),
-        Setting(name="variety", default=0.0, least=0.0, most=10.0),
-        Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds"),
+        Setting(name="variety", default=0.0, least=0.0, most=10.0, unit="m/s",
+            help="of missed speed that it is worth not to be in step with neighbours in a match"),
+        Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds",
+            help="that a player of a match lags behind the clock, so that neighbours differ"),
         Setting(name="gaits", default=(), option="--gait", metavar="WORD=CLIP", help="the clip that stands for a gait, "
             "such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tooltip="Which clip stands for "
             "which gait, where you choose: walking=folder/walk.bvh; jogging=folder/jog.bvh", convert=gait_choices,

@@ -1,8 +1,6 @@
 """Settings of throws and kicks by networks: synthesis, training, evaluation, examples."""
 # fmt: off
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .choices import SIDES

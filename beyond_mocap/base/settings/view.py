@@ -1,10 +1,6 @@
 """Settings of what is drawn over the 3D view."""
 # fmt: off
 
-from __future__ import annotations
-
-from pathlib import Path
-
 from .setting import Setting
 
 WHOSE = (

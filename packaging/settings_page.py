@@ -1,0 +1,87 @@
+"""docs/settings.md, made from the table of settings: `python packaging/settings_page.py` in the project's folder."""
+
+from __future__ import annotations
+
+import re
+import sys
+from itertools import groupby
+from pathlib import Path
+
+TOP = Path(__file__).resolve().parents[1]
+PAGE = TOP / "docs" / "settings.md"
+HEAD = """# Settings
+
+All settings, by feature. This page is made from the table in `beyond_mocap/base/settings` by
+`python packaging/settings_page.py`; a test checks that it is up to date. Options are those of the command line, panel
+names those in Blender. Files and objects that are only read or written are on the feature's own page.
+"""
+COLUMNS = ("setting", "option", "in Blender", "default", "limits", "meaning")
+
+
+def settings_page() -> str:
+    """The page as text."""
+    from beyond_mocap.base.settings import TABLES
+
+    parts = [HEAD]
+    tables = [(rows[0].feature, group, rows) for group, rows in TABLES.items()]
+    for feature, groups in groupby(tables, key=lambda table: table[0]):
+        parts.append(f"\n## {feature}\n")
+        for _, group, rows in groups:
+            parts.append(f"\n`{group}`\n\n" + _line(COLUMNS) + _line(["---"] * len(COLUMNS)))
+            parts.extend(_line(_cells(row)) for row in rows)
+    return "".join(parts)
+
+
+def _cells(row) -> list[str]:
+    """The cells of a setting."""
+    option = " ".join(f"`{flag}`" for flag in row.option.split())
+    return [f"`{row.name}`", option, row.title or "", _default(row), _limits(row), _meaning(row)]
+
+
+def _default(row) -> str:
+    """The default in code; behind it that of the panel, where it differs."""
+    usual, shown = (_written(value) for value in (row.default, row.panel_more.get("default", row.default)))
+    return usual if usual == shown else f"{usual}; in Blender {shown}"
+
+
+def _written(value) -> str:
+    """A value as users write it."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if value is None or value in ("", ()):
+        return "not set"
+    return f"{value:g}" if isinstance(value, float) else ", ".join(map(str, value if isinstance(value, tuple) else [value]))
+
+
+def _limits(row) -> str:
+    """The choices or the limits, those of option and panel too where they differ."""
+    if row.choices:
+        return ", ".join(f"`{name}`" for name in row.choice_names)
+    asked = (row.least, row.most)
+    places = (
+        ("", asked), ("option ", tuple(row.option_more.get(name, own) for name, own in zip(("least", "most"), asked))),
+        ("Blender ", tuple(row.panel_more.get(name, own) for name, own in zip(("min", "max"), asked))),
+    )
+    shown = [(where, pair) for where, pair in places if pair != (None, None) and (not where or pair != asked)]
+    return "; ".join(where + _range(*pair) for where, pair in shown) + (f" {row.unit}" if row.unit and shown else "")
+
+
+def _range(least, most) -> str:
+    if most is None:
+        return f"{_written(least)} or more"
+    return f"{_written(least)} to {_written(most)}"
+
+
+def _meaning(row) -> str:
+    """The sentence of the panel, else that of the option."""
+    help_text = re.sub(r"[;(] ?default %\(default\)[gs]\)?", "", row.help or "").strip()
+    return row.tooltip or help_text
+
+
+def _line(cells) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(TOP))
+    PAGE.write_text(settings_page(), "utf-8")
