@@ -35,7 +35,7 @@ def settings_page() -> str:
 def _cells(row) -> list[str]:
     """The cells of a setting."""
     option = " ".join(f"`{flag}`" for flag in row.option.split())
-    return [f"`{row.name}`", option, row.title or "", _default(row), _limits(row), _meaning(row)]
+    return [f"`{row.name}`", option, row.title if row.tooltip else "", _default(row), _limits(row), _meaning(row)]
 
 
 def _default(row) -> str:

@@ -49,4 +49,4 @@ def property_values(record: type, properties: bpy.types.PropertyGroup, *groups: 
 
 def _shown(groups: tuple[str, ...]) -> list[Setting]:
     """The settings of groups that panels have."""
-    return [row for group in groups for row in rows_of(group) if row.title is not None]
+    return [row for group in groups for row in rows_of(group) if row.tooltip]

@@ -27,11 +27,10 @@ TABLES = {
         Setting(name="to_unit", kind=float, option="--to-unit", help="metres per unit of SKELETON.bvh", **POSITIVE),
     ),
     "preferences": (
-        Setting(name="cache_folder", default="", title="Cache Folder", tooltip="Where built libraries are kept, each in "
-            "a folder of its own. Empty: beside the recordings, in a folder .beyond_mocap",
-            panel_more=dict(subtype="DIR_PATH")),
-        Setting(name="threads", default=0, least=0, most=256, title="Threads", tooltip="How many recordings are read at "
-            "once when a library is built. 0: as many as there are processor cores. A synthesis itself keeps to one, so "
-            "that the same input always gives the same motion"),
+        Setting(name="cache_folder", default="", tooltip="Where built libraries are kept, each in a folder of its own. "
+            "Empty: beside the recordings, in a folder .beyond_mocap", panel_more=dict(subtype="DIR_PATH")),
+        Setting(name="threads", default=0, least=0, most=256, tooltip="How many recordings are read at once when a "
+            "library is built. 0: as many as there are processor cores. A synthesis itself keeps to one, so that the "
+            "same input always gives the same motion"),
     ),
 }

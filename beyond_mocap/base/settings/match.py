@@ -19,13 +19,12 @@ TABLES = {
             "machine; default: one per core", title="Processes", tooltip="How many work at once, beside Blender; 0: one "
             "for each processor core", panel_more=dict(default=0, min=0)),
         Setting(name="scheduler", default="", option="--scheduler", metavar="ADDRESS", help="of a Dask cluster whose "
-            "workers do it", title="Scheduler", tooltip="Address of a Dask cluster that does the work instead, such as "
-            "tcp://host:8786"),
+            "workers do it", tooltip="Address of a Dask cluster that does the work instead, such as tcp://host:8786"),
     ),
     "match": (
         Setting(name="solve_touches", default=True, option="--no-solve-touches", help="the ball as the feed has it, and "
-            "no touches", title="Solve Touches", tooltip="Find out of the ball's course who touches it and when, and "
-            "have it go as physics has it"),
+            "no touches", tooltip="Find out of the ball's course who touches it and when, and have it go as physics has "
+            "it"),
         Setting(name="annotations", kind=Path, option="--annotations", metavar="DIR", help="words of players as "
             "DIR/ID.txt, not found ones"),
         Setting(name="bvh", default=False, option="--bvh", help="every player as BVH too"),
@@ -36,7 +35,7 @@ TABLES = {
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),
         Setting(name="nearest", default=True, option="--exact", help="a player whose words the library lacks fails, "
             "instead of going on with the nearest it has"),
-        Setting(name="first_frame", default=1, title="First Frame", tooltip="Scene frame on which the stretch begins"),
+        Setting(name="first_frame", default=1, tooltip="Scene frame on which the stretch begins"),
     ),
     "touches": (
         Setting(name="provider", kind=str, option="--provider", metavar="NAME", help="whose form FILE has; default: "

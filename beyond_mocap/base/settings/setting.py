@@ -17,22 +17,19 @@ class Setting:
     """One row of the table.
 
     Args:
-        name: of the field that code reads, unique in its group.
-        kind: type of the value, None: that of the default; tuple: several texts.
+        name: of the field that code reads, unique in its group; kind: type of its value, None: that of the default;
+            tuple: several texts.
         default: in code and, where option_more and panel_more have none, for users; None: not set.
-        least, most: limits; where the default is outside, it stands for "not set".
-        unit: of a number, as a word.
-        expected: what an error says a number should be.
+        least, most: limits; where the default is outside, it stands for "not set". unit: as a word. expected: what an
+            error says a number should be.
         choices: identifiers, or (identifier, title, sentence[, icon, number]) where panels list them.
         option: flags on the command line with blanks between, "" for none; help: its sentence; metavar: what stands for
-            its value there, None: the unit where that is one word.
-        option_more: further arguments of `add_argument`; `default`, `least`, `most` where they differ there.
-        title, tooltip: of the property in Blender, title None for none; identifier: its own, "" for name.
-        precision: decimals that a panel shows.
-        panel_more: further arguments of the bpy property; `default`, `min`, `max` where they differ there.
+            its value there, None: the unit where that is one word; option_more: further arguments of `add_argument`;
+            `default`, `least`, `most` where they differ there.
+        tooltip: of the property in Blender, "" for none; title: None for the name; identifier: "" for the name;
+            precision: decimals; panel_more: further arguments of bpy's; `default`, `min`, `max` where they differ there.
         in_preset: whether presets store it.
-        blank: the choice that is "" in code.
-        convert: from what a user said to the value that code reads.
+        blank: the choice that is "" in code; convert: from what a user said to the value that code reads.
         feature: set by the table.
     """
 
@@ -61,6 +58,7 @@ class Setting:
     def __post_init__(self):
         object.__setattr__(self, "kind", self.kind or type(self.default))
         object.__setattr__(self, "identifier", self.identifier or self.name)
+        object.__setattr__(self, "title", self.title or self.name.replace("_", " ").title())
 
     @property
     def choice_names(self) -> tuple[str, ...]:

@@ -11,17 +11,16 @@ PROTOCOLS = (
 
 TABLES = {
     "stream": (
-        Setting(name="protocol", default="udp", choices=PROTOCOLS, title="Protocol", tooltip="How frames come"),
-        Setting(name="port", default=7001, least=1024, most=65535, option="--port", title="Port",
-            tooltip="Of this machine; nothing from outside gets in"),
-        Setting(name="unit", default=0.0, least=0.0, most=10.0, unit="metres", title="Unit",
-            tooltip="Metres in one unit of the stream; 0: guessed from the body's size", precision=4),
-        Setting(name="part", default="foot", choices=PARTS, title="Part", tooltip="What the user strikes with"),
-        Setting(name="side", default="either", choices=EITHER, title="Side", tooltip="Of what there are two"),
-        Setting(name="threshold", default=0.0, least=0.0, most=5.0, unit="metres", title="Threshold",
-            tooltip="Metres above the ground that the part has to rise in a strike; 0: automatic", precision=2),
-        Setting(name="bounces", default=0, least=0, most=5, title="Bounces", tooltip="Of the ball on its way in Play "
-            "Live"),
+        Setting(name="protocol", default="udp", choices=PROTOCOLS, tooltip="How frames come"),
+        Setting(name="port", default=7001, least=1024, most=65535, option="--port", tooltip="Of this machine; nothing "
+            "from outside gets in"),
+        Setting(name="unit", default=0.0, least=0.0, most=10.0, unit="metres", tooltip="Metres in one unit of the "
+            "stream; 0: guessed from the body's size", precision=4),
+        Setting(name="part", default="foot", choices=PARTS, tooltip="What the user strikes with"),
+        Setting(name="side", default="either", choices=EITHER, tooltip="Of what there are two"),
+        Setting(name="threshold", default=0.0, least=0.0, most=5.0, unit="metres", tooltip="Metres above the ground "
+            "that the part has to rise in a strike; 0: automatic"),
+        Setting(name="bounces", default=0, least=0, most=5, tooltip="Of the ball on its way in Play Live"),
     ),
     "stream.way": (
         Setting(name="tcp", default=False, option="--tcp", help="connect to who listens (default: UDP datagrams)"),

@@ -28,14 +28,14 @@ TABLES = {
     ),
     "throw.ball": (
         Setting(name="kind", kind=str, choices=KINDS, option="--ball-kind", metavar="KIND", help="baseball, tennis, "
-            "handball, volleyball, football, paper", title="Kind", tooltip="What kind of ball it is, in the air",
+            "handball, volleyball, football, paper", tooltip="What kind of ball it is, in the air",
             option_more=dict(choices=None), panel_more=dict(default="usual")),
         Setting(name="ball", kind=Path, option="--ball", metavar="B.csv", help="the ball's way"),
         Setting(name="report", kind=Path, option="--report", metavar="R.json"),
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed", help="another motion with the same "
-            "aim; default %(default)s", title="Seed", tooltip="Another number, another throw at the same target",
+            "aim; default %(default)s", tooltip="Another number, another throw at the same target",
             panel_more=dict(max=None)),
-        Setting(name="side", default="right", choices=SIDES, title="Side", tooltip="With which hand or foot"),
+        Setting(name="side", default="right", choices=SIDES, tooltip="With which hand or foot"),
         Setting(name="frame", default=0, least=0, title="On Frame", tooltip="Scene frame on which the ball leaves hand "
             "or foot, up to half a frame sooner or later; 0: the current frame"),
         Setting(name="library", default=True, title="Run-Up by Library", tooltip="Let the synthesizer find the way into "
