@@ -18,7 +18,7 @@ from .motion.track import SampledTrack, Track, sample
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
 FEET = ("", "left", "right")
 METHODS = setting("synthesis", "method").choice_names
-_USUAL = defaults("synthesis", "player")
+_DEFAULTS = defaults("synthesis", "player")
 _HEIGHT = setting("player", "height")
 
 LATER = {"later": True}
@@ -89,31 +89,18 @@ class SolvedCourse:
 
 @dataclass(frozen=True)
 class Plan:
-    """One player's order.
+    """One player's order. The fields with a default of the settings table mean what is said there.
 
     track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it. timeline: the
-    asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. method: one of
-    METHODS. catch_up: Faustino's logistic catch-up of §3.3.2 (method "distance" only). fps: output frames per second.
-    alpha: weight of annotation against continuity (Faustino eq. 13; for "path" `synthesis.balance`). mirror: whether
-    mirrored clips may be used.
-    nearest: go on with the nearest words where the library lacks a key moment. seed: of every random choice.
-    delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1), 1 or
-    more; 0: by "path" where the recordings' own labels change, else the paper's 4.
-    made: whether made clips may stand in where recordings lack a speed (method "path" only; `library.made`).
-    seam_window: seconds over which a jump at a seam is spread (eq. 25, twice its s; "path" fades over half of it).
-    track_window: seconds of the window that takes the feed's jitter out (`motion.track.smoothed`). root_window: seconds
-    of the window behind which the root is pulled onto the track (method "path" only; the root error is measured with
-    1.5). gaits: (gait word, clip) pairs, which clip stands for which gait (§3.1.1); other gaits are found among all
-    clips.
-    pins: where hands, feet and gaze have to be, in the order of time. height: of the player, m; 0: as tall as the
-    library's skeleton. strong_foot: one of FEET; key moments that name no side take this foot's clips where that costs
-    little. style: words, or names or patterns of folders and clips ("academy", "lmd/*"), whose clips are taken rather
-    than others by style_weight (m/s of missed speed that they are worth).
-    solve_touches: whether key moments move to the touches that the ball's samples tell, and the ball goes as physics
-    has it, touched step by step in dribbles (`known_touches`). variety: m/s of missed speed that
-    it is worth to show clips with this player's own lag against the clock, so that neighbours are not in step (method
-    "path"); lag: which, s (`match.variety.lags`). solved: the ball's course where it is known already,
-    such as from a whole match.
+    asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. pins: where hands,
+    feet and gaze have to be, in the order of time. gaits: (gait word, clip) pairs; other gaits are found among all
+    clips. strong_foot: one of FEET. style: words, or names or patterns of folders and clips ("academy", "lmd/*").
+    solved: the ball's course where it is known already, such as from a whole match.
+
+    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.balance`), delta §3.2.4, omega and gaits
+    §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`, track_window
+    `motion.track.smoothed`, solve_touches `known_touches`, lag `match.variety.lags`; the root error is always measured
+    with a root_window of 1.5.
 
     InputError for a number outside the limits of its setting, and for two pins of one part at one time.
     """
@@ -121,28 +108,28 @@ class Plan:
     track: Track
     timeline: Timeline = field(default_factory=Timeline)
     library: str = ""
-    method: str = _USUAL["method"]
-    catch_up: bool = _USUAL["catch_up"]
-    fps: float = _USUAL["fps"]
-    alpha: float = _USUAL["alpha"]
-    mirror: bool = _USUAL["mirror"]
-    nearest: bool = _USUAL["nearest"]
-    seed: int = _USUAL["seed"]
-    delta: float = _USUAL["delta"]
-    omega: float = _USUAL["omega"]
-    made: bool = _USUAL["made"]
-    seam_window: float = _USUAL["seam_window"]
-    track_window: float = _USUAL["track_window"]
-    root_window: float = _USUAL["root_window"]
+    method: str = _DEFAULTS["method"]
+    catch_up: bool = _DEFAULTS["catch_up"]
+    fps: float = _DEFAULTS["fps"]
+    alpha: float = _DEFAULTS["alpha"]
+    mirror: bool = _DEFAULTS["mirror"]
+    nearest: bool = _DEFAULTS["nearest"]
+    seed: int = _DEFAULTS["seed"]
+    delta: float = _DEFAULTS["delta"]
+    omega: float = _DEFAULTS["omega"]
+    made: bool = _DEFAULTS["made"]
+    seam_window: float = _DEFAULTS["seam_window"]
+    track_window: float = _DEFAULTS["track_window"]
+    root_window: float = _DEFAULTS["root_window"]
     gaits: tuple[tuple[str, str], ...] = ()
     pins: tuple[Pin, ...] = ()
     height: float = 0.0
     strong_foot: str = ""
     style: tuple[str, ...] = ()
-    style_weight: float = _USUAL["style_weight"]
-    solve_touches: bool = field(default=_USUAL["solve_touches"], metadata=LATER)
-    variety: float = field(default=_USUAL["variety"], metadata=LATER)
-    lag: float = field(default=_USUAL["lag"], metadata=LATER)
+    style_weight: float = _DEFAULTS["style_weight"]
+    solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
+    variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
+    lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
     solved: SolvedCourse | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
     def __post_init__(self):

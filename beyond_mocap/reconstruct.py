@@ -18,7 +18,7 @@ from .markers.pose import HeldBall, PoseSettings, Solved, solve
 from .markers.trial import MarkerTrial
 from .motion.motion import Motion
 
-_USUAL = defaults("markers")
+_DEFAULTS = defaults("markers")
 FILTERS = setting("markers", "filter").choice_names
 RELEASES = setting("markers", "release").choice_names
 _SMOOTHNESS = setting("markers", "smoothness")
@@ -32,25 +32,21 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class ReconstructSettings:
-    """What may be chosen. marker_set: whose markers these are; None: the shipped set that fits. weights, limits,
-    smoothness: of the pose (`markers.pose`). filter: one of FILTERS, at `cutoff` hertz. plant: standing feet are held.
-    floor: motion and markers are moved up or down so that the feet stand at height 0.
-    radius: metres of a ball that carries a marker, None where not known. hold_ball: its marker takes part in the pose
-    until the release. ball: its kind, one of `ball.physics.THROWN`. release: whether a throw's release is looked for;
-    "auto": where a marker is on a ball, or the file's name tells a throw's speed."""
+    """What may be chosen; the settings table says what each means. marker_set: None: the shipped set that fits.
+    release: "auto": looked for where a marker is on a ball, or the file's name tells a throw's speed."""
 
     marker_set: object | None = None
-    weights: bool = _USUAL["weights"]
-    limits: bool = _USUAL["limits"]
-    smoothness: float = _USUAL["smoothness"]
-    filter: str = _USUAL["filter"]
-    cutoff: float = _USUAL["cutoff"]
-    plant: bool = _USUAL["plant"]
-    floor: bool = _USUAL["floor"]
-    radius: float | None = _USUAL["radius"]
-    hold_ball: bool = _USUAL["hold_ball"]
-    ball: str = _USUAL["ball"]
-    release: str = _USUAL["release"]
+    weights: bool = _DEFAULTS["weights"]
+    limits: bool = _DEFAULTS["limits"]
+    smoothness: float = _DEFAULTS["smoothness"]
+    filter: str = _DEFAULTS["filter"]
+    cutoff: float = _DEFAULTS["cutoff"]
+    plant: bool = _DEFAULTS["plant"]
+    floor: bool = _DEFAULTS["floor"]
+    radius: float | None = _DEFAULTS["radius"]
+    hold_ball: bool = _DEFAULTS["hold_ball"]
+    ball: str = _DEFAULTS["ball"]
+    release: str = _DEFAULTS["release"]
 
     def __post_init__(self):
         for name, choices in (("filter", FILTERS), ("release", RELEASES)):

@@ -49,7 +49,7 @@ from .polish.path_time import (
 )
 from .polish.underfoot import footing, is_level, mesh_surface, path_surface
 
-_USUAL = defaults("path_editing")
+_DEFAULTS = defaults("path_editing")
 ENDS = setting("path_editing", "end").choice_names
 _SPEED = setting("path_editing", "speed")
 LEANS_FROM = (0.7, 1.5)
@@ -69,26 +69,22 @@ STILL = 0.05
 
 @dataclass(frozen=True)
 class RideSettings:
-    """What a user chooses. fit: kind of the motion's own path, one of `path_fit.KINDS`, a polynomial of `degree`.
-    by_arc_length: as fast as the motion was, else in as much time. speed: times as fast. end: what happens where the
-    path ends before the motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant,
-    lean, slopes: feet are held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends
-    slow the motion (the two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that
-    it begins later. detours: (arc m, width m, offset m to the left) each."""
+    """What a user chooses; the settings table says what each means.
+    detours: (arc m, width m, offset m to the left) each."""
 
-    fit: str = _USUAL["fit"]
-    degree: int = _USUAL["degree"]
-    by_arc_length: bool = _USUAL["by_arc_length"]
-    speed: float = _USUAL["speed"]
-    end: str = _USUAL["end"]
-    cycle: bool = _USUAL["cycle"]
-    frame: str = _USUAL["frame"]
-    plant: bool = _USUAL["plant"]
-    lean: bool = _USUAL["lean"]
-    bends: bool = _USUAL["bends"]
-    slopes: bool = _USUAL["slopes"]
-    climbs: bool = _USUAL["climbs"]
-    delay: float = _USUAL["delay"]
+    fit: str = _DEFAULTS["fit"]
+    degree: int = _DEFAULTS["degree"]
+    by_arc_length: bool = _DEFAULTS["by_arc_length"]
+    speed: float = _DEFAULTS["speed"]
+    end: str = _DEFAULTS["end"]
+    cycle: bool = _DEFAULTS["cycle"]
+    frame: str = _DEFAULTS["frame"]
+    plant: bool = _DEFAULTS["plant"]
+    lean: bool = _DEFAULTS["lean"]
+    bends: bool = _DEFAULTS["bends"]
+    slopes: bool = _DEFAULTS["slopes"]
+    climbs: bool = _DEFAULTS["climbs"]
+    delay: float = _DEFAULTS["delay"]
     detours: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self):

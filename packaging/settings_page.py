@@ -54,28 +54,25 @@ def _written(value) -> str:
 
 
 def _limits(row) -> str:
-    """The choices or the limits, those of option and panel too where they differ."""
+    """The choices or the limits; those of the option and of the panel where they differ."""
     if row.choices:
         return ", ".join(f"`{name}`" for name in row.choice_names)
-    asked = (row.least, row.most)
-    places = (
-        ("", asked), ("option ", tuple(row.option_more.get(name, own) for name, own in zip(("least", "most"), asked))),
-        ("Blender ", tuple(row.panel_more.get(name, own) for name, own in zip(("min", "max"), asked))),
-    )
-    shown = [(where, pair) for where, pair in places if pair != (None, None) and (not where or pair != asked)]
-    return "; ".join(where + _range(*pair) for where, pair in shown) + (f" {row.unit}" if row.unit and shown else "")
+    own, option, panel = (row.least, row.most), row.option_more, row.panel_more
+    asked = (option.get("least", row.least), option.get("most", row.most))
+    shown = (panel.get("min", row.least), panel.get("max", row.most))
+    parts = [_range(own), *(f"{place} {_range(pair)}" for place, pair in (("option", asked), ("Blender", shown))
+                            if pair not in (own, (None, None)))]  # fmt: skip
+    return "; ".join(filter(None, parts)) + (f" {row.unit}" if row.unit and any(parts) else "")
 
 
-def _range(least, most) -> str:
-    if most is None:
-        return f"{_written(least)} or more"
-    return f"{_written(least)} to {_written(most)}"
+def _range(pair: tuple) -> str:
+    least, most = (None if limit is None else _written(limit) for limit in pair)
+    return "" if least is None else f"{least} or more" if most is None else f"{least} to {most}"
 
 
 def _meaning(row) -> str:
     """The sentence of the panel, else that of the option."""
-    help_text = re.sub(r"[;(] ?default %\(default\)[gs]\)?", "", row.help or "").strip()
-    return row.tooltip or help_text
+    return row.tooltip or re.sub(r"[;(] ?default %\(default\)[gs]\)?", "", row.help or "").strip()
 
 
 def _line(cells) -> str:

@@ -19,7 +19,7 @@ ERRORS = ("", "missed", "dropped")
 GROUND = "ground"
 LEAST_APART = 0.5
 """Metres between two players' places."""
-_USUAL = defaults("passes")
+_DEFAULTS = defaults("passes")
 _ROWS = (
     *(setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
     *(setting("passes.pass", name) for name in ("bounces", "seconds")), setting("passes.player", "height"),
@@ -127,11 +127,9 @@ class BallChoice:
 
 @dataclass(frozen=True)
 class PassScene:
-    """What is asked. players; passes in their order, played `repeat` times. fps: of the output. seed: of what is left
-    to chance. serve: where the ball comes from first: a player's name, (x, y, z) m, GROUND, or None: the player who
-    would pass to the first one. missed, dropped: how likely each ball is. transition: seconds from one motion into the
-    next. lead_in, lead_out: s before the first strike, at least, and after the last. directions: 8: strikes turn in
-    steps of 45 degrees; 0: any way. watch: heads follow the ball.
+    """What is asked. players; passes in their order. fps: of the output. serve: where the ball comes from first: a
+    player's name, (x, y, z) m, GROUND, or None: the player who would pass to the first one. directions: 8: strikes turn
+    in steps of 45 degrees; 0: any way. The settings table says what the other fields mean.
 
     InputError for what cannot be: two players on one spot or of one name, a pass to oneself or to somebody unknown,
     passes that do not go on where the one before went, numbers outside LIMITS.
@@ -139,19 +137,19 @@ class PassScene:
 
     players: tuple[Player, ...]
     passes: tuple[Pass, ...]
-    repeat: int = _USUAL["repeat"]
+    repeat: int = _DEFAULTS["repeat"]
     fps: float = 30.0
-    seed: int = _USUAL["seed"]
+    seed: int = _DEFAULTS["seed"]
     ball: BallChoice = BallChoice()
     net: Net | None = None
     serve: str | tuple[float, float, float] | None = None
-    missed: float = _USUAL["missed"]
-    dropped: float = _USUAL["dropped"]
-    transition: float = _USUAL["transition"]
-    lead_in: float = _USUAL["lead_in"]
-    lead_out: float = _USUAL["lead_out"]
+    missed: float = _DEFAULTS["missed"]
+    dropped: float = _DEFAULTS["dropped"]
+    transition: float = _DEFAULTS["transition"]
+    lead_in: float = _DEFAULTS["lead_in"]
+    lead_out: float = _DEFAULTS["lead_out"]
     directions: int = 0
-    watch: bool = _USUAL["watch"]
+    watch: bool = _DEFAULTS["watch"]
     weights: Weights = Weights()
 
     def __post_init__(self):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..base.settings.options import add_options, option_values
 from ..errors import BeyondMocapError, InputError
-from .outputs import Writer, check_outputs
+from .outputs import Writer, check_outputs, named_folder
 from .told import Told
 
 
@@ -23,7 +22,7 @@ def add(verbs):
     verb.add_argument("--events-provider", metavar="NAME", default="", help="whose form the events have; as above")
     verb.add_argument("--provider", metavar="NAME", default="", help="whose form FILE has; default: guessed")
     verb.add_argument("--library", type=Path, required=True)
-    verb.add_argument("--out", type=_named, required=True, metavar="FOLDER", help="is made; goes on where it was left")
+    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made; goes on where it was left")
     add_options(verb, "match.section")
     add_options(verb.add_mutually_exclusive_group(), "match.work")
     add_options(verb, "match")
@@ -91,10 +90,3 @@ def without(arguments: Sequence[str], option: str) -> list[str]:
 def _cores() -> range | set[int]:
     """The cores that this process may use."""
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-
-
-def _named(text: str) -> Path:
-    """A folder that has a name: an empty one would be the folder at hand."""
-    if not text.strip():
-        raise argparse.ArgumentTypeError("no folder is named")
-    return Path(text)

@@ -1,7 +1,9 @@
 """Settings of one player's synthesis, of the clock, and of what a result becomes."""
 # fmt: off
 
-from .gait_choices import gait_choices
+from collections.abc import Iterable
+
+from ...errors import InputError
 from .setting import BETWEEN, Setting
 
 METHODS = (
@@ -17,6 +19,21 @@ FORMS = (
     ("ACTION", "Action", "One action on the body"),
     ("STRIPS", "Strips", "NLA strips on the body, one for each piece of a clip, named by clip and words"),
 )
+
+
+def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    """(gait word, clip) of each text "WORD=CLIP", blanks around either left out; InputError for any other text and for
+    a word that comes twice."""
+    pairs = []
+    for text in texts:
+        word, _, clip = (part.strip() for part in text.partition("="))
+        if not word or not clip:
+            raise InputError("--gait", f"{text!r}", "WORD=CLIP, such as walking=folder/walk.bvh")
+        if word.lower() in dict(pairs):
+            raise InputError("--gait", f"{word!r} twice", "one clip for each gait")
+        pairs.append((word.lower(), clip.replace("\\", "/")))
+    return tuple(pairs)
+
 
 TABLES = {
     "synthesis": (
