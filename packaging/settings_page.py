@@ -50,7 +50,9 @@ def _written(value) -> str:
         return "on" if value else "off"
     if value is None or value in ("", ()):
         return "not set"
-    return f"{value:g}" if isinstance(value, float) else ", ".join(map(str, value if isinstance(value, tuple) else [value]))
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _limits(row) -> str:

@@ -22,7 +22,9 @@ def add(verbs):
     verb.add_argument("--events-provider", metavar="NAME", default="", help="whose form the events have; as above")
     verb.add_argument("--provider", metavar="NAME", default="", help="whose form FILE has; default: guessed")
     verb.add_argument("--library", type=Path, required=True)
-    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made; goes on where it was left")
+    verb.add_argument(
+        "--out", type=named_folder, required=True, metavar="FOLDER", help="is made; goes on where it was left"
+    )
     add_options(verb, "match.section")
     add_options(verb.add_mutually_exclusive_group(), "match.work")
     add_options(verb, "match")

@@ -11,7 +11,6 @@ from ..core.properties import property_values, with_settings
 from ..result import BeyondMocapBefore
 
 
-
 def is_curve(_ride, candidate: bpy.types.Object) -> bool:
     """Whether an object may be picked as the new path."""
     return candidate.type == "CURVE"

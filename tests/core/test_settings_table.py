@@ -19,7 +19,9 @@ from beyond_mocap.plan import Plan
 from beyond_mocap.polish.path_frame import FRAMES
 
 OPTIONS = Path(__file__).resolve().parents[1] / "data" / "options-0.1.txt"
-PROBES = ("", "x", "nan", "-1", "0", "0.001", "0.3", "1", "1.5", "3", "12", "100", "500", "2000", "1e6", "1e10", "1,2,3")
+PROBES = (
+    "", "x", "nan", "-1", "0", "0.001", "0.3", "1", "1.5", "3", "12", "100", "500", "2000", "1e6", "1e10", "1,2,3",
+)  # fmt: skip
 SHARPNESS = Setting(
     name="sharpness", default=0.25, least=0.0, most=1.0, unit="turns", option="--sharpness", help="of corners",
     title="Sharpness", tooltip="How sharp corners are", in_preset=True,
@@ -92,7 +94,8 @@ def test_a_row_is_an_option_with_its_default_and_limits(with_sharpness):
 
 
 def test_a_row_is_on_the_page_of_settings(with_sharpness):
-    assert "| `sharpness` | `--sharpness` | Sharpness | 0.25 | 0 to 1 turns | How sharp corners are |" in settings_page()
+    line = "| `sharpness` | `--sharpness` | Sharpness | 0.25 | 0 to 1 turns | How sharp corners are |"
+    assert line in settings_page()
 
 
 def test_the_page_of_settings_is_up_to_date():

@@ -17,8 +17,8 @@ HANDS = (
 
 TABLES = {
     "markers": (
-        Setting(name="marker_set", kind=str, option="--marker-set", metavar="FILE|NAME", help="whose markers these are; "
-            "default: what fits"),
+        Setting(name="marker_set", kind=str, option="--marker-set", metavar="FILE|NAME", help="whose markers these "
+            "are; default: what fits"),
         Setting(name="subject", kind=str, option="--subject", metavar="NAME", help="whose markers, where a file holds "
             "several bodies"),
         Setting(name="unit", kind=str, option="--unit", metavar="UNIT", help="of the files: m, cm, mm, in; default: as "
@@ -31,8 +31,8 @@ TABLES = {
         Setting(name="filter", default="butterworth", choices=FILTERS, option="--filter", tooltip="How the motion is "
             "smoothed"),
         Setting(name="cutoff", default=13.4, least=0.1, most=1000.0, unit="hertz", option="--cutoff",
-            help="of the filter; default %(default)g", tooltip="Hertz up to which the Butterworth filter lets movements "
-            "through", precision=1, panel_more=dict(min=0.5, max=100.0)),
+            help="of the filter; default %(default)g", tooltip="Hertz up to which the Butterworth filter lets "
+            "movements through", precision=1, panel_more=dict(min=0.5, max=100.0)),
         Setting(name="plant", default=True, option="--no-plant", help="do not hold standing feet", title="Plant Feet",
             tooltip="Hold feet where they stand"),
         Setting(name="floor", default=False, option="--floor", help="move the motion up or down so that the feet stand "

@@ -16,20 +16,20 @@ TABLES = {
     ),
     "match.work": (
         Setting(name="workers", kind=int, least=1, most=256, option="--workers", metavar="N", help="processes on this "
-            "machine; default: one per core", title="Processes", tooltip="How many work at once, beside Blender; 0: one "
-            "for each processor core", panel_more=dict(default=0, min=0)),
+            "machine; default: one per core", title="Processes", tooltip="How many work at once, beside Blender; 0: "
+            "one for each processor core", panel_more=dict(default=0, min=0)),
         Setting(name="scheduler", default="", option="--scheduler", metavar="ADDRESS", help="of a Dask cluster whose "
             "workers do it", tooltip="Address of a Dask cluster that does the work instead, such as tcp://host:8786"),
     ),
     "match": (
-        Setting(name="solve_touches", default=True, option="--no-solve-touches", help="the ball as the feed has it, and "
-            "no touches", tooltip="Find out of the ball's course who touches it and when, and have it go as physics has "
-            "it"),
+        Setting(name="solve_touches", default=True, option="--no-solve-touches", help="the ball as the feed has it, "
+            "and no touches", tooltip="Find out of the ball's course who touches it and when, and have it go as "
+            "physics has it"),
         Setting(name="annotations", kind=Path, option="--annotations", metavar="DIR", help="words of players as "
             "DIR/ID.txt, not found ones"),
         Setting(name="bvh", default=False, option="--bvh", help="every player as BVH too"),
-        Setting(name="scene", kind=Path, option="--scene", metavar="FILE", help="everybody, ball and pitch in one file; "
-            "inside Blender: .blend, .fbx, .glb, .usdc"),
+        Setting(name="scene", kind=Path, option="--scene", metavar="FILE", help="everybody, ball and pitch in one "
+            "file; inside Blender: .blend, .fbx, .glb, .usdc"),
         Setting(name="figures", default=True, option="--no-figures", help="no reports, no provenance, no page"),
         Setting(name="fps", default=30.0, least=1.0, most=480.0, unit="frames per second", option="--fps"),
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),

@@ -25,8 +25,8 @@ TABLES = {
     "passes.player": (
         Setting(name="part", default="foot", choices=PARTS, tooltip="What the player meets the ball with"),
         Setting(name="side", default="either", choices=EITHER, tooltip="Of what there are two"),
-        Setting(name="bone", default="", title="Joint", tooltip="A joint of the library's skeleton by name, in place of "
-            "the part"),
+        Setting(name="bone", default="", title="Joint", tooltip="A joint of the library's skeleton by name, in place "
+            "of the part"),
         Setting(name="tool_length", default=0.66, least=0.05, most=2.0, unit="metres", tooltip="Metres that the tool "
             "goes on beyond the wrist, along the forearm"),
         Setting(name="tool_radius", default=0.015, least=0.001, most=0.5, unit="metres", tooltip="Half as thick as it "
@@ -48,8 +48,8 @@ TABLES = {
             "most like its own is played. Empty: by kind"),
         Setting(name="first", default=0.0, least=0.0, unit="seconds", title="From Second", tooltip="Of the stretch of "
             "that recording"),
-        Setting(name="last", default=0.0, least=0.0, unit="seconds", title="To Second", tooltip="Of the stretch of that "
-            "recording; 0: to its end"),
+        Setting(name="last", default=0.0, least=0.0, unit="seconds", title="To Second", tooltip="Of the stretch of "
+            "that recording; 0: to its end"),
         Setting(name="actor_cut", default=False, title="Stretch", tooltip="Look at some frames of its motion only, not "
             "at all of it"),
         Setting(name="actor_first", default=1, title="From Frame", tooltip="Scene frame"),

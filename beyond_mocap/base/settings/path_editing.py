@@ -32,8 +32,8 @@ TABLES = {
             tooltip="Of the polynomial that is the original path", option_more=dict(default=None),
             panel_more=dict(soft_max=60)),
         Setting(name="by_arc_length", default=True, option="--no-arc-length", help="by time: the path's ends at the "
-            "recording's ends", title="Keep Speed", tooltip="As many metres of path in each frame as the original goes; "
-            "off: the whole motion is spread over the whole path"),
+            "recording's ends", title="Keep Speed", tooltip="As many metres of path in each frame as the original "
+            "goes; off: the whole motion is spread over the whole path"),
         Setting(name="cycle", default=False, option="--cycle --loop", help="repeat the best stretch until the path's "
             "end", tooltip="Repeat the motion's best loop of steps until the path ends, its seams blended"),
         Setting(name="end", default="stop", choices=ENDS, option="--end", help="where the path is shorter",
@@ -41,8 +41,8 @@ TABLES = {
         Setting(name="plant", default=True, option="--no-plant", help="leave the feet as the path carries them",
             title="Plant Feet", tooltip="Feet that stand in the original stand here too"),
         Setting(name="speed", default=1.0, least=0.05, most=20.0, expected="a number from {least} to {most}",
-            option="--speed", metavar="FACTOR", help="of playing; default %(default)g", tooltip="How many times as fast "
-            "the motion plays, steps and all", option_more=dict(least=0.1, most=10.0),
+            option="--speed", metavar="FACTOR", help="of playing; default %(default)g", tooltip="How many times as "
+            "fast the motion plays, steps and all", option_more=dict(least=0.1, most=10.0),
             panel_more=dict(soft_min=0.25, soft_max=4.0)),
         Setting(name="frame", default="path", choices=FRAMES, option="--frame", help="what the recording is taken "
             "relative to: the path (default); its full tangent or the world, to compare", title="Offsets",
@@ -68,8 +68,8 @@ TABLES = {
             "by waiting or going round; may be repeated", option_more=dict(type=Path, action="append")),
         Setting(name="distance", kind=float, least=0.05, most=20.0, unit="metres", option="--distance",
             help="between two bodies' middles, with --avoid; default 0.6"),
-        Setting(name="ground", kind=Path, option="--ground", metavar="HILL.obj", help="a mesh for the feet to stand on: "
-            "metres, Y up"),
+        Setting(name="ground", kind=Path, option="--ground", metavar="HILL.obj", help="a mesh for the feet to stand "
+            "on: metres, Y up"),
         Setting(name="live", default=True, tooltip="Follow the curve and these settings while they are edited"),
         Setting(name="report", kind=Path, option="--report", metavar="R.json"),
         Setting(name="provenance", kind=Path, option="--provenance", metavar="P.csv"),
@@ -80,8 +80,8 @@ TABLES = {
             "curve to ride on; 0: as many as it needs to lie within 3 cm"),
         Setting(name="curve_degree", default=3, least=2, most=5, tooltip="Of a NURBS curve: how smooth it is, and how "
             "far each control point reaches"),
-        Setting(name="curve_kind", default="BEZIER", choices=CURVES, title="Kind", tooltip="Kind of a new curve to ride "
-            "on"),
+        Setting(name="curve_kind", default="BEZIER", choices=CURVES, title="Kind", tooltip="Kind of a new curve to "
+            "ride on"),
         Setting(name="nudge_step", default=0.1, least=0.001, most=10.0, unit="metres", tooltip="Metres that control "
             "points go at each nudge", precision=3, panel_more=dict(step=1)),
     ),

@@ -27,7 +27,7 @@ class Setting:
             its value there, None: the unit where that is one word; option_more: further arguments of `add_argument`;
             `default`, `least`, `most` where they differ there.
         tooltip: of the property in Blender, "" for none; title: None for the name; identifier: "" for the name;
-            precision: decimals; panel_more: further arguments of bpy's; `default`, `min`, `max` where they differ there.
+            precision: decimals; panel_more: further arguments of bpy's; `default`, `min`, `max` where they differ.
         in_preset: whether presets store it.
         blank: the choice that is "" in code; convert: from what a user said to the value that code reads.
         feature: set by the table.

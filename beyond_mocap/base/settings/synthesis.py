@@ -52,8 +52,8 @@ TABLES = {
             tooltip="Key moments move to the touches that the ball's samples tell, within 0.4 s; the ball goes as "
             "physics has it, and is dribbled step by step", in_preset=True),
         Setting(name="alpha", default=0.2, least=0.0, most=1.0, expected=BETWEEN, option="--alpha", metavar="SHARE",
-            help="words against continuity; default %(default)g", title="Word Weight", tooltip="Words asked for against "
-            "smooth transitions: 0 looks only for these, 1 only for the words", in_preset=True),
+            help="words against continuity; default %(default)g", title="Word Weight", tooltip="Words asked for "
+            "against smooth transitions: 0 looks only for these, 1 only for the words", in_preset=True),
         Setting(name="delta", default=0.5, least=0.0, most=100.0, unit="metres", expected=BETWEEN, option="--delta",
             help="travelled distance that may stay wrong ('distance'); default %(default)g", title="Distance Slack",
             tooltip="Of Distance: travelled distance of a stretch that may stay wrong before steps are added or left "
@@ -88,8 +88,8 @@ TABLES = {
             "speed", title="Made Clips", tooltip="Of On the path: make or blend clips where recordings lack a speed, "
             "and kicks on the run", in_preset=True),
         Setting(name="nearest", default=False, option="--nearest", help="go on with the nearest words that the library "
-            "has", title="Nearest Words", tooltip="Where the library lacks a key moment's words, go on with the nearest "
-            "that it has, and say so", in_preset=True),
+            "has", title="Nearest Words", tooltip="Where the library lacks a key moment's words, go on with the "
+            "nearest that it has, and say so", in_preset=True),
     ),
     "player": (
         Setting(name="height", default=0.0, least=0.5, most=3.0, unit="metres", option="--height",
@@ -98,8 +98,9 @@ TABLES = {
         Setting(name="strong_foot", default="any", choices=FEET, option="--strong-foot", tooltip="For key moments "
             "without a side", blank="any", option_more=dict(choices=("left", "right", "any"))),
         Setting(name="style", default=(), option="--style", metavar="NAME", help="a word, or a folder or clip (with * "
-            "and ?), whose clips are taken rather than others; may be repeated", tooltip="Words, folders or clips (with "
-            "* and ?) whose clips are taken rather than others; several with ;", option_more=dict(action="append")),
+            "and ?), whose clips are taken rather than others; may be repeated", tooltip="Words, folders or clips "
+            "(with * and ?) whose clips are taken rather than others; several with ;",
+            option_more=dict(action="append")),
         Setting(name="style_weight", default=0.5, least=0.0, most=10.0, expected=BETWEEN, option="--style-weight",
             metavar="NUMBER", help="m/s of missed speed that a clip of the style is worth; default %(default)g",
             tooltip="Metres per second of missed speed that a clip of the style is worth"),

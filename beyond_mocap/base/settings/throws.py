@@ -16,15 +16,15 @@ TABLES = {
     "throw": (
         Setting(name="limb", kind=str, choices=("left_hand", "right_hand", "left_foot", "right_foot"), option="--limb",
             help="default: what most examples of the model use"),
-        Setting(name="skeleton", kind=Path, option="--skeleton", metavar="S.bvh", help="whose bones throw; default: the "
-            "model's"),
+        Setting(name="skeleton", kind=Path, option="--skeleton", metavar="S.bvh", help="whose bones throw; default: "
+            "the model's"),
         Setting(name="speed", kind=float, least=0.5, most=80.0, unit="m/s", option="--speed", help="of the ball as it "
             "leaves; default: what suits", title="Ball Speed", tooltip="How fast the ball leaves, m/s; 0: as in "
             "examples that are thrown or kicked as far", precision=1, panel_more=dict(default=0.0, min=0.0, max=60.0)),
         Setting(name="time", kind=float, least=-1e5, most=1e5, unit="seconds", expected="seconds", option="--time",
             help="at which it leaves; default: frame 0 is 0 s"),
-        Setting(name="fps", kind=float, least=10.0, most=480.0, expected="{least} to {most} frames per second, in which "
-            "a throw can be seen", option="--fps", help="default: the model's, 30 with --library"),
+        Setting(name="fps", kind=float, least=10.0, most=480.0, expected="{least} to {most} frames per second, in "
+            "which a throw can be seen", option="--fps", help="default: the model's, 30 with --library"),
     ),
     "throw.ball": (
         Setting(name="kind", kind=str, choices=KINDS, option="--ball-kind", metavar="KIND", help="baseball, tennis, "
@@ -38,11 +38,11 @@ TABLES = {
         Setting(name="side", default="right", choices=SIDES, tooltip="With which hand or foot"),
         Setting(name="frame", default=0, least=0, title="On Frame", tooltip="Scene frame on which the ball leaves hand "
             "or foot, up to half a frame sooner or later; 0: the current frame"),
-        Setting(name="library", default=True, title="Run-Up by Library", tooltip="Let the synthesizer find the way into "
-            "the throw and out of it among the clips of the library (step 1); without one the throw is eased into the "
-            "armature's own motion"),
-        Setting(name="live", default=True, title="Follow", tooltip="Make what is shown again when the target is dragged "
-            "or these settings are edited, until it is kept"),
+        Setting(name="library", default=True, title="Run-Up by Library", tooltip="Let the synthesizer find the way "
+            "into the throw and out of it among the clips of the library (step 1); without one the throw is eased into "
+            "the armature's own motion"),
+        Setting(name="live", default=True, title="Follow", tooltip="Make what is shown again when the target is "
+            "dragged or these settings are edited, until it is kept"),
     ),
     "throw.train": (
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action"),
@@ -57,8 +57,8 @@ TABLES = {
             "dropout; default: the config's, else 0"),
         Setting(name="minutes", kind=float, least=0.01, most=1e5, unit="minutes", option="--minutes", metavar="M",
             help="stop after so many minutes with what stands then"),
-        Setting(name="epochs", kind=int, least=0, most=1000000, option="--epochs", metavar="N", help="times through the "
-            "examples; default: the config's"),
+        Setting(name="epochs", kind=int, least=0, most=1000000, option="--epochs", metavar="N",
+            help="times through the examples; default: the config's"),
         Setting(name="half", default=False, option="--half", help="store the weights as 16 bits"),
     ),
     "throw.evaluate": (
@@ -70,8 +70,8 @@ TABLES = {
             "kinematics"),
         Setting(name="as_they_are", default=False, option="--as-they-are", help="do not scale what is asked for by "
             "height"),
-        Setting(name="motions", kind=int, least=1, most=1000000, option="--motions", metavar="N", help="of each subject "
-            "at most, evenly chosen"),
+        Setting(name="motions", kind=int, least=1, most=1000000, option="--motions", metavar="N",
+            help="of each subject at most, evenly chosen"),
     ),
     "throw.examples": (
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action"),

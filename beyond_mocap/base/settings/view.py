@@ -18,8 +18,8 @@ TABLES = {
         Setting(name="players", default="ACTIVE", choices=WHOSE, title="Of", tooltip="Whose takes the overlays are "
             "about"),
         Setting(name="track", default=False, tooltip="The measured track, coloured by how far the body is off it"),
-        Setting(name="footprints", default=False, tooltip="A shoe sole for every step, coloured by how far the standing "
-            "foot slides"),
+        Setting(name="footprints", default=False, tooltip="A shoe sole for every step, coloured by how far the "
+            "standing foot slides"),
         Setting(name="contacts", default=False, tooltip="A disc under each foot that stands at the current frame"),
         Setting(name="seams", default=False, title="Cuts", tooltip="A bar at every cut between two clips, with the "
             "clips' names, and why this clip is played"),
@@ -34,12 +34,12 @@ TABLES = {
             "understood: without corners"),
         Setting(name="path_trackers", default=True, title="Trackers", tooltip="At the current frame, where the body is "
             "on either path and where it heads"),
-        Setting(name="path_residuals", default=False, title="Residuals", tooltip="Lines from either path to the pelvis: "
-            "what of the motion is not the path's"),
+        Setting(name="path_residuals", default=False, title="Residuals", tooltip="Lines from either path to the "
+            "pelvis: what of the motion is not the path's"),
         Setting(name="path_ghost", default=False, title="Original Motion", tooltip="The original as a stick figure at "
             "the current frame"),
-        Setting(name="shots", default=True, title="Ball Ways", tooltip="The ways that aimed and passed balls could take "
-            "and take, strikes and bounces"),
+        Setting(name="shots", default=True, title="Ball Ways", tooltip="The ways that aimed and passed balls could "
+            "take and take, strikes and bounces"),
         Setting(name="ghosts_at", default="STEP", choices=GHOSTS, title="Ghosts", tooltip="Where the figures stand"),
         Setting(name="ghost_step", default=0.5, least=0.05, most=10.0, unit="seconds", title="Seconds",
             tooltip="Time from one figure to the next"),
