@@ -24,7 +24,8 @@ from beyond_mocap.evaluation import played_from_take  # noqa: E402
 from beyond_mocap.evaluation.judged import judged  # noqa: E402
 from beyond_mocap.evaluation.report import cell, evaluate, flat  # noqa: E402
 from beyond_mocap.evaluation.view import View  # noqa: E402
-from beyond_mocap.library.library import Library, build  # noqa: E402
+from beyond_mocap.library.library import Library  # noqa: E402
+from beyond_mocap.library.build import build  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesize import synthesize  # noqa: E402
 

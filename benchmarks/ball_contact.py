@@ -11,7 +11,8 @@ import numpy as np
 from beyond_mocap.ball.contact import striking_surface
 from beyond_mocap.evaluation.report import cell, evaluate
 from beyond_mocap.files.scene_json import read_scene
-from beyond_mocap.library.library import Library, build
+from beyond_mocap.library.library import Library
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.passes import Passes, passes
 from beyond_mocap.plan import Plan

@@ -10,7 +10,7 @@ from beyond_mocap.annotation import read_annotation_csv
 from beyond_mocap.ball.hit_library import HitLibrary
 from beyond_mocap.ball.hits import Hits, analyse
 from beyond_mocap.files import bvh
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.gestures import STRIKES, strike

@@ -12,7 +12,8 @@ import numpy as np
 
 from beyond_mocap.evaluation import evaluate, feet, library_reference, played_from_take, realism, root
 from beyond_mocap.evaluation.view import View
-from beyond_mocap.library.library import Library, build
+from beyond_mocap.library.library import Library
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.gait_tables import at_speed
 from beyond_mocap.plan import Plan
 from beyond_mocap.synthesis import blocks, locomotion

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from beyond_mocap.base.easing import smoothstep
 from beyond_mocap.annotation import Timeline
 from beyond_mocap.library.library import Library
 from beyond_mocap.motion.humanoid import identify
@@ -72,8 +73,7 @@ def _edits(plan: Plan) -> Iterator[tuple[str, Plan]]:
 
 def dragged(track: Track, at: float, aside: Sequence[float] = (0.0, ASIDE), width: float = WIDTH) -> Track:
     """The track with a smooth bump of `aside` (2,) m around second `at`, `width` s to each side."""
-    share = np.clip(1.0 - np.abs(track.times - at) / width, 0.0, 1.0)
-    bump = (share * share * (3.0 - 2.0 * share))[:, None] * np.asarray(aside)
+    bump = smoothstep(1.0 - np.abs(track.times - at) / width)[:, None] * np.asarray(aside)
     return replace(track, positions=track.positions + bump)
 
 

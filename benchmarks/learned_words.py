@@ -26,7 +26,7 @@ from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.library.classify.details import value_of  # noqa: E402
 from beyond_mocap.library.classify.examples import Example  # noqa: E402
 from beyond_mocap.library.classify.train import trained  # noqa: E402
-from beyond_mocap.library.proposals import Proposal  # noqa: E402
+from beyond_mocap.library.proposal import Proposal  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402
 
 from benchmarks.places import DATA  # noqa: E402

@@ -17,7 +17,8 @@ import numpy as np
 from beyond_mocap.evaluation.feet import contact_speeds, foot_joints
 from beyond_mocap.evaluation.jerk import jerk
 from beyond_mocap.files.take_npz import read_player
-from beyond_mocap.library.library import Library, build
+from beyond_mocap.library.library import Library
+from beyond_mocap.library.build import build
 from beyond_mocap.match.crowd import kept_apart, overlap_depths
 from beyond_mocap.match.expand import expanded
 from beyond_mocap.match.folder import read_state

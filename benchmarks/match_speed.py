@@ -15,13 +15,16 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from beyond_mocap.files.tracking import Match, read_match  # noqa: E402
-from beyond_mocap.library.library import Library, build  # noqa: E402
+from beyond_mocap.library.library import Library  # noqa: E402
+from beyond_mocap.library.build import build  # noqa: E402
 from beyond_mocap.motion.track import clean, sample  # noqa: E402
 from beyond_mocap.plan import Plan  # noqa: E402
 from beyond_mocap.synthesis.balance import balanced  # noqa: E402
 from beyond_mocap.synthesis.path_search import PathSearch  # noqa: E402
-from beyond_mocap.synthesis.wanted import wanted  # noqa: E402
-from beyond_mocap.synthesize import synthesize, with_made_gaits  # noqa: E402
+from beyond_mocap.resolve_plan import resolve_plan  # noqa: E402
+from beyond_mocap.synthesis.search_library import search_library  # noqa: E402
+from beyond_mocap.synthesis.wanted import build_order  # noqa: E402
+from beyond_mocap.synthesize import synthesize  # noqa: E402
 
 from benchmarks.effort import seconds  # noqa: E402
 from benchmarks.markdown import head, row  # noqa: E402
@@ -43,8 +46,9 @@ def window_row(library: Library, match: Match, player: str, start: float) -> str
     """One player over one window: the search alone, and everything, per 20 s."""
     track, _ = clean(match.track(player, start, start + WINDOW))
     plan = Plan(track=track, nearest=True)
-    known = with_made_gaits(library, plan, lambda fraction, text: None)
-    order, weights = wanted(known, plan), balanced(plan.alpha)
+    resolved = resolve_plan(plan, library)
+    known = search_library(library, resolved)
+    order, weights = build_order(known, resolved), balanced(plan.alpha)
     searched, _ = seconds(lambda: PathSearch(known, order, weights).run())
     whole, take = seconds(lambda: synthesize(library, plan))
     share = 20.0 / (track.times[-1] - track.times[0])

@@ -18,7 +18,9 @@ import time
 import numpy as np
 
 from beyond_mocap.files.tracking import read_match
-from beyond_mocap.library.library import FPS, Library, build
+from beyond_mocap.library.features import FPS
+from beyond_mocap.library.library import Library
+from beyond_mocap.library.build import build
 from beyond_mocap.match.cut_plan import cut_plan
 from beyond_mocap.match.library_clips import bound
 from beyond_mocap.match.named_edit import NamedEdit, part
@@ -27,9 +29,10 @@ from beyond_mocap.match.splice import spliced
 from beyond_mocap.match.units import units_of
 from beyond_mocap.motion.track import clean
 from beyond_mocap.plan import Plan
+from beyond_mocap.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.offer import RATES, SLOT
 from beyond_mocap.synthesis.path_costs import PathCosts
-from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.synthesis.wanted import build_order
 
 LONG = 3600.0
 LATER = 8.0
@@ -54,7 +57,7 @@ def same(one: NamedEdit, other: NamedEdit) -> np.ndarray:
 def cost(library: Library, plan: Plan, edit: NamedEdit) -> float:
     """What a way costs, per slot: what is missed in each slot of the grid, and its cuts."""
     library = searched_library(library, plan)
-    order, edit = wanted(library, plan), bound(library, edit)
+    order, edit = build_order(library, resolve_plan(plan, library)), bound(library, edit)
     costs, total = PathCosts(library, order), 0.0
     for low in range(0, len(edit) - SLOT, SLOT):
         step = edit.frame[low + 1] - edit.frame[low]

@@ -17,11 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
+from beyond_mocap.base.time_series import interpolate
+from beyond_mocap.base.vectors import distance_along, unit_vector
 from beyond_mocap.annotation import Timeline
 from beyond_mocap.evaluation import jerk
 from beyond_mocap.evaluation.path_ride import figures
 from beyond_mocap.files import bvh
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.arc_length import ArcLength
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.track import Track
@@ -180,7 +182,7 @@ def _level(ax, trial: Trial, colour: str, every: float = 0.5) -> None:
     """Stick figures from the side, every half second, set out along +x."""
     motion = trial.ridden.motion
     way = motion.root_positions[-1, :2] - motion.root_positions[0, :2]
-    way = way / max(np.linalg.norm(way), 1e-9)
+    way = unit_vector(way)
     straight = replace(motion, root_positions=motion.root_positions - [*motion.root_positions[0, :2], 0.0])
     plots.sticks(ax, straight, np.arange(0, len(motion), round(every * motion.fps)), colour, way)
     plots.from_the_side(ax)
@@ -296,8 +298,8 @@ def _prints(ax, trial: Trial) -> None:
 
 
 def _cut(line: np.ndarray, length: float) -> np.ndarray:
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    ends = np.stack([np.interp(length, along, column) for column in line.T])
+    along = distance_along(line)
+    ends = interpolate(length, along, line)
     return np.concatenate([line[along < length], ends[None]]) if along[-1] > length else line
 
 

@@ -165,7 +165,8 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`synthesize`: one player, and what was asked to be written about it."""
     from .annotation import read_timeline, validate
     from .files.pins import read_pins
-    from .files.tables import write_ball, write_provenance, write_report
+    from .files.tables import write_ball, write_report
+    from .synthesis.provenance import write_provenance
     from .files.tracking import read_track_csv
     from .motion.track import clean
     from .synthesize import synthesize
@@ -260,7 +261,8 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from .evaluation.plots import require_matplotlib
     from .evaluation.report import evaluate_played
     from .files import bvh
-    from .files.tables import read_ball, read_provenance, write_report
+    from .files.tables import read_ball, write_report
+    from .synthesis.provenance import read_provenance
     from .files.whole import atomic_write
     from .files.tracking import read_track_csv
     from .motion.track import clean
@@ -306,7 +308,7 @@ def _strangers(clips: tuple[str, ...], library) -> list[str]:
 
 
 def _library(options, told: Told, rebuild: bool = False, seed: int = 0):
-    from .library.library import build
+    from .library.build import build
 
     return build(
         options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,

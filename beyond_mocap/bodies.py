@@ -2,17 +2,16 @@
 between.
 
 The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
-`ball.way` says where he goes and faces; feet are held or step (`lay_out.footed`); his head follows the ball
+`ball.way` says where he goes and faces; feet are held or step (`synthesis.construct`); his head follows the ball
 (`polish.gaze`), and the striking part is brought to it (`polish.strike_at`). The ball is never moved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from .annotation import Timeline, automatic_gaits
 from .annotation.gaze import wanted_offset
@@ -22,8 +21,9 @@ from .ball.contact import WORDS, striking_surface
 from .ball.links import BoneWeights
 from .ball.orders import HitOrder, Stance
 from .ball.way import Placed, needed, placed, way
+from .base.easing import smoothstep
+from .base.time_series import interpolate
 from .errors import InputError, told_time
-from .lay_out import faced, footed, smoothed
 from .library.automatic import automatic_words
 from .library.keys import Key
 from .library.library import Library
@@ -33,16 +33,20 @@ from .motion.motion import Motion
 from .motion.track import BALL_RADIUS, SampledTrack, Track
 from .motion.track.sampling import travel_direction
 from .plan import Plan
+from .resolve_plan import resolve_plan
 from .polish.gaze import CHEST, following
-from .polish.on_track import TURN_WEIGHT, STANDS, root_with_sway
+from .polish.on_track import STANDS, follow_turning
 from .polish.strike import Touch
 from .polish.strike_at import Meeting, Met, met_at
+from .synthesis.construct.construction import Construction
 from .synthesis.footage import Footage, fetch
+from .synthesis.frame_sources import provenance_fields
 from .synthesis.path_costs import Alike
 from .synthesis.path_search import PathSearch
 from .synthesis.wanted import Wanted, WantedKey
-from .synthesize import look_of, sources_shown, words_shown
-from .take import BallPath, Take
+from .synthesize import look_of
+from .motion.track.ball_path import BallPath
+from .take import Take
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""
@@ -68,7 +72,7 @@ class BodySettings:
     weights: BoneWeights = BoneWeights()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PlayerMotion:
     """One player of a passing scene. take: his motion with contacts, provenance and all, as `synthesize` gives it. gaps
     (K,) m between part and ball at each order's strike, NaN where he misses; moved (K,) m that the part was moved for
@@ -149,7 +153,7 @@ class _Body:
         self.start = float(ball.times[0])
         self.hits = placed(library, orders, self.start)
         self.times = self.start + np.arange(count) / fps
-        self.ball = np.stack([np.interp(self.times, ball.times, column) for column in ball.positions.T], axis=1)
+        self.ball = interpolate(self.times, ball.times, ball.positions)
 
     def made(self, progress, cancelled) -> PlayerMotion:
         report = progress or (lambda fraction, text: None)
@@ -162,32 +166,26 @@ class _Body:
             alike=measure,
         ).run()
         index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
-        raw = fetch(self.library, edit, index, self.fps)
+        source = fetch(self.library, edit, index, self.fps)
         track, path = self._track(self.times, self.fps)
-        plan = self._plan(track)
+        asked = self._plan(track)
+        plan = resolve_plan(asked, self.library)
         report(0.75, "Laying out")
-        shown = smoothed(self.library, plan, raw)
-        angle = self._angle(track, path.facing, shown)
-        ground = root_with_sway(path.positions, shown.sway, angle)
-        root = np.column_stack([ground, shown.height])
-        planted, taken = footed(
-            self.library, plan, track, root, faced(shown.pose, angle), shown.standing, self._touches(),
-        )
+        planted, taken = Construction(
+            library=self.library, plan=plan, track=track, source=source, touches=self._touches(),
+            heading=self._heading(track, path.facing, source), planned=True,
+        ).lay_out()
         body = Motion(self.library.skeleton, planted.root, planted.rotations, self.fps)
         body = self._watching(body)
         struck = met_at(body, taken.standing.any(axis=2), self._meetings())
+        ball = BallPath(self.times, self.ball, np.ones(len(self.times), bool))
         take = Take(
-            motion=struck.motion, start_time=self.start, clips=(), clip=raw.clip, clip_frame=raw.clip_frame,
-            mirrored=np.array([self.library.clips[clip].mirrored for clip in raw.clip]),
-            words=words_shown(self.library, raw), contacts=taken.contacts, seams=raw.seams, timeline=Timeline(),
-            keys=(), ball=BallPath(self.times, self.ball, np.ones(len(self.times), bool)), method="path",
-            seed=self.settings.seed, correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped,
-            plan=plan, edit=edit,
+            **provenance_fields(self.library, source), motion=struck.motion, start_time=self.start,
+            contacts=taken.contacts, timeline=Timeline(), keys=(), ball=ball, method="path", seed=self.settings.seed,
+            correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=asked, edit=edit,
         )
         report(1.0, "Done")
-        return PlayerMotion(
-            _with_sources(take, self.library, raw), struck.gap, struck.moved, self._warnings(struck, track)
-        )
+        return PlayerMotion(take=take, gaps=struck.gap, moved=struck.moved, warnings=self._warnings(struck, track))
 
     def _wanted(self, times: np.ndarray) -> Wanted:
         """What the search is asked for, at the library's rate."""
@@ -217,7 +215,7 @@ class _Body:
         """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""
         path = way(self.stance, self.hits, times)
         velocity = np.gradient(path.positions, 1.0 / fps, axis=0)
-        ball = np.stack([np.interp(times, self.times, column) for column in self.ball.T], axis=1)
+        ball = interpolate(times, self.times, self.ball)
         track = SampledTrack(
             times=times, positions=path.positions, raw=path.positions, velocity=velocity,
             speed=np.linalg.norm(velocity, axis=1), direction=travel_direction(velocity, fps),
@@ -232,15 +230,15 @@ class _Body:
             seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False,
         )
 
-    def _angle(self, track: SampledTrack, kept: np.ndarray, shown: Footage) -> np.ndarray:
+    def _heading(self, track: SampledTrack, kept: np.ndarray, source: Footage) -> np.ndarray:
         """(T,) rad: as recorded in his hit motions, and between them the compromise of `on_track.facing`, turning the
         short way round."""
         known = np.flatnonzero(np.isfinite(kept))
         rough = np.interp(np.arange(len(kept)), known, kept[known])
-        own_speed = np.linalg.norm(shown.velocity, axis=1)
+        own_speed = np.linalg.norm(source.velocity, axis=1)
         moving = [np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0) for speed in (track.speed, own_speed)]
         going = moving[0] ** 2 * moving[1] ** 2
-        travel = track.direction - arctan2(shown.velocity[:, 1], shown.velocity[:, 0])
+        travel = track.direction - arctan2(source.velocity[:, 1], source.velocity[:, 0])
         watch = track.direction + wanted_offset(track)
         weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
         goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)
@@ -248,7 +246,7 @@ class _Body:
         goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
         given = np.isfinite(kept)
         goal, trust = np.where(given, kept, goal), np.where(given, 1e6, trust)
-        return _followed(goal, trust, shown.turn)
+        return follow_turning(goal, trust, source.turn)
 
     def _touches(self) -> list[Touch]:
         """The hit motions as stretches in which no steps are added."""
@@ -272,7 +270,7 @@ class _Body:
         for hit in self.hits:
             outside = np.maximum(hit.start - self.times, self.times - hit.end)
             arms *= np.clip(outside / OWN_HEAD, 0.0, 1.0)
-        share, arms = (x * x * (3.0 - 2.0 * x) for x in (share, arms))
+        share, arms = smoothstep(share), smoothstep(arms)
         return following(body, self.ball, look_of(self.library), share, CHEST * arms)
 
     def _meetings(self) -> list[Meeting]:
@@ -298,23 +296,3 @@ class _Body:
             if gap > 0.005:
                 told.append(f"{order.time:.2f} s: the {order.part} is {100.0 * gap:.1f} cm off the ball")
         return tuple(told)
-
-
-def _followed(goal: np.ndarray, trust: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(T,) rad: least squares of sum trust (a - goal)^2 + TURN_WEIGHT (a' - turn)^2, goals without jumps of whole
-    turns."""
-    diagonal, right = trust.copy(), trust * goal
-    diagonal[1:] += TURN_WEIGHT
-    diagonal[:-1] += TURN_WEIGHT
-    right[1:] += TURN_WEIGHT * turn[1:]
-    right[:-1] -= TURN_WEIGHT * turn[1:]
-    band = np.zeros((2, len(goal)))
-    band[0], band[1, :-1] = diagonal, -TURN_WEIGHT
-    return solveh_banded(band, right, lower=True) if len(goal) > 1 else goal
-
-
-def _with_sources(take: Take, library: Library, shown: Footage) -> Take:
-    sources = sources_shown(library, shown)
-    names = tuple(dict.fromkeys(sources))
-    number = {name: i for i, name in enumerate(names)}
-    return replace(take, clips=names, clip=np.array([number[source] for source in sources]))

@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from .ball.released.hand import hand_of
-from .ball.released.hand_ball import usual_centre
+from .motion.hand import hand_of
+from .motion.hand import usual_centre
 from .errors import Cancelled, InputError
 from .evaluation.jerk import jerk
 from .evaluation.throws.compare import kept

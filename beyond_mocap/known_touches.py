@@ -1,6 +1,6 @@
 """Key moments at the touches that the ball's samples tell, and the ball as physics and the feet have it.
 
-    plan = in_force(Plan(track=track, timeline=timeline, solve_touches=True))
+    plan = solve_touches(Plan(track=track, timeline=timeline, solve_touches=True))
 
 What `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search key moments move to solved
 touches; when the body is done, the ball goes through the places where it was met, as solved in between, and in dribbles
@@ -22,6 +22,7 @@ from .plan import Plan, SolvedCourse, Touched
 from .polish.dribble import dribble
 from .polish.meeting import led, lofted
 from .polish.strike import held_frames
+from .synthesis.resolved_plan import ResolvedPlan
 from .take import DribbleTouch, KeyResult, Take
 
 FURTHEST = 0.4
@@ -37,7 +38,7 @@ _TAKING = {"receive", "trap", "catch", "catchb"}
 _SENT, _TAKEN = {"kick", "header", "throw-in", "dribble"}, {"receive", "chest", "hand", "save"}
 
 
-def in_force(plan: Plan, known: SolvedCourse | None = None) -> Plan:
+def solve_touches(plan: Plan, known: SolvedCourse | None = None) -> Plan:
     """The plan with the ball's course solved and its key moments at the touches that they mean; without a course where
     it is not to be solved or has no ball. known: the course, where an earlier take of the same track has it."""
     if not plan.solve_touches:
@@ -141,12 +142,12 @@ def _in_order(keys: list[KeyMoment]) -> list[KeyMoment]:
             keys[number] = replace(keys[number], solved=None)
 
 
-def untouched(take: Take, plan: Plan) -> list[str]:
+def untouched(take: Take, plan: ResolvedPlan) -> list[str]:
     """A line for every key moment that asks for a touch where the ball's course has none, and for every dribble in
-    which no foot touches the ball. take: `with_course`; plan: in force."""
-    if plan.solved is None:
+    which no foot touches the ball. take: `with_course`."""
+    if plan.course is None:
         told = "the touches of the ball are not solved: the track has no ball, or too few samples of it"
-        return [told] if plan.solve_touches else []
+        return [told] if plan.asked.solve_touches else []
     missing = [
         TimedLine(
             f"{key.time:g} s: the ball's course tells of no touch for '{' '.join(key.words)}' within {FURTHEST:g} s, "
@@ -163,15 +164,15 @@ def untouched(take: Take, plan: Plan) -> list[str]:
     ]  # fmt: skip
 
 
-def with_course(take: Take, plan: Plan) -> Take:
+def with_course(take: Take, plan: ResolvedPlan) -> Take:
     """The take with the ball as solved, through the places where it was met, and touched step by step in dribbles; as
-    it is, where nothing is solved. plan: in force."""
-    if plan.solved is None or take.ball is None:
-        return replace(take, solved=plan.solved)
+    it is, where nothing is solved."""
+    if plan.course is None or take.ball is None:
+        return replace(take, solved=plan.course)
     fps, met, times = take.motion.fps, take.ball.positions, take.ball.times
     held = [held_frames(key.frame, len(met)) for key in _touching(take)]
-    turns = [(touch.time - take.start_time) * fps for touch in plan.solved.touches]
-    course, filled = plan.solved.at(times)
+    turns = [(touch.time - take.start_time) * fps for touch in plan.course.touches]
+    course, filled = plan.course.at(times)
     path = np.where(np.isfinite(course), course, met)
     known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
     for number, pair in enumerate(held):
@@ -188,7 +189,7 @@ def with_course(take: Take, plan: Plan) -> Take:
     )
     pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in done.pushes)
     ball = replace(take.ball, positions=done.ball)
-    return replace(take, ball=ball, solved=plan.solved, met_ball=take.ball, dribbled=pushes)
+    return replace(take, ball=ball, solved=plan.course, met_ball=take.ball, dribbled=pushes)
 
 
 def _touching(take: Take) -> list[KeyResult]:

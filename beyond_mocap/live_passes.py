@@ -18,6 +18,7 @@ from .ball.hits import HitMotion
 from .ball.orders import Stance
 from .ball.pass_plan import PassPlan
 from .ball.pass_scene import GROUND, Example, Pass, PassScene
+from .base.easing import smoothstep
 from .bodies import BodySettings, least_seconds, player_motion
 from .errors import InputError
 from .library.library import Library
@@ -25,7 +26,7 @@ from .motion import quaternion
 from .motion.humanoid import heading
 from .motion.motion import Motion
 from .passes import ball_of, ball_path, bone_weights, planned
-from .take import BallPath
+from .motion.track.ball_path import BallPath
 
 LONG = 60.0
 """Seconds that everybody goes on standing, if nobody acts."""
@@ -191,8 +192,7 @@ def _planned(library: Library, scene: PassScene, stance: Stance, lies: np.ndarra
 def _rolled(path: BallPath, lies: np.ndarray, strike: float) -> np.ndarray:
     """The ball's places (T, 3) m, going over from where it lies to where it is struck: a few centimetres."""
     away = lies - path.positions[0]
-    share = np.clip(path.times / max(strike, 1e-6), 0.0, 1.0)
-    return path.positions + (1.0 - share * share * (3.0 - 2.0 * share))[:, None] * away
+    return path.positions + (1.0 - smoothstep(path.times / max(strike, 1e-6)))[:, None] * away
 
 
 def _lasting(motion: Motion) -> Motion:
@@ -218,8 +218,7 @@ def _faded(before: Played, motion: Motion, at: float) -> tuple[np.ndarray, np.nd
     count = min(int(FADE * motion.fps) + 1, len(motion))
     first = round((at - before.start) * motion.fps)
     frames = np.clip(np.arange(first, first + count), 0, len(before.motion) - 1)
-    share = np.arange(count) / max(count - 1, 1)
-    weight = (share * share * (3.0 - 2.0 * share))[:, None]
+    weight = smoothstep(np.arange(count) / max(count - 1, 1))[:, None]
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
     root[:count] = (1.0 - weight) * before.motion.root_positions[frames] + weight * root[:count]
     old = quaternion.signed_like(before.motion.rotations[frames], rotations[:count])

@@ -1,7 +1,7 @@
 """Players who are not as tall as the library's skeleton: all is chosen and laid out in its size, and then scaled.
 
-A player of s times its height who runs 5 m/s moves as the library does at 5 / s m/s. So the track and the ball are
-divided by s, and skeleton and root are multiplied by s in the end: angles, feet that stand and times stay as they are.
+Track and ball are divided by the size in the plan (`resolve_plan`), and skeleton and root are multiplied by it in the
+end: angles, feet that stand and times stay as they are.
 The ball keeps its own size; `lay_out.met` meets it in the player's.
 """
 
@@ -11,29 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from .motion.humanoid import stature
 from .motion.motion import Motion
-from .motion.skeleton import Skeleton
 from .motion.track import BALL_RADIUS
 from .plan import Plan
-from .take import BallPath, Take
+from .motion.track.ball_path import BallPath
+from .take import Take
 
 _EVEN = 1e-9
-
-
-def size_of(plan: Plan, skeleton: Skeleton) -> float:
-    """How many times as tall as the library's skeleton the player is."""
-    return plan.height / stature(skeleton) if plan.height else 1.0
-
-
-def in_library_size(plan: Plan, size: float) -> Plan:
-    """The plan with track and ball as the library's skeleton has to go; its pins and height stay the player's."""
-    if size == 1.0:
-        return plan
-    track = plan.track
-    ball = None if track.ball is None else track.ball / size
-    course = None if plan.solved is None else replace(plan.solved, ball=plan.solved.ball / size)
-    return replace(plan, track=replace(track, positions=track.positions / size, ball=ball), solved=course)
 
 
 def taken_in_library_size(take: Take, size: float) -> Take:
@@ -45,7 +29,7 @@ def taken_in_library_size(take: Take, size: float) -> Take:
     )
     if size == 1.0:
         return take
-    return _scaled(take, 1.0 / size, in_library_size(take.plan, size), lambda ball: ball / size)
+    return _scaled(take, 1.0 / size, take.plan, lambda ball: ball / size)
 
 
 def in_own_size(take: Take, size: float, plan: Plan, before: Take | None = None) -> Take:

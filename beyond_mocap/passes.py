@@ -30,7 +30,8 @@ from .motion.humanoid import stature
 from .motion.motion import Motion
 from .motion.quaternion import multiply
 from .own_size import in_own_size
-from .take import BallPath, Take
+from .motion.track.ball_path import BallPath
+from .take import Take
 
 MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""

@@ -146,18 +146,8 @@ class Plan:
         self._check_pins()
 
     def sampled(self, fps: float) -> SampledTrack:
-        """The track at `fps` frames per second. Where its ball is solved, it has the solved height, and the solved
-        place where the feed has not measured it: where it has, the ball is met within the noise of the measurement."""
-        track = sample(self.track, fps, self.track_window)
-        if self.solved is None:
-            return track
-        ball, filled = self.solved.at(track.times)
-        known = np.isfinite(ball).all(axis=1)
-        measured = track.ball_measured & ~(known & filled)
-        return replace(
-            track, ball=np.where(known[:, None] & (~measured[:, None] | [False, False, True]), ball, track.ball),
-            ball_measured=measured,
-        )  # fmt: skip
+        """The track at `fps` frames per second, as `sample_with_course` has it."""
+        return sample_with_course(self.track, self.solved, fps, self.track_window)
 
     def _check_pins(self):
         for part in PARTS:
@@ -166,3 +156,21 @@ class Plan:
                 if after.time <= before.end:
                     found = f"two pins of {part} at {told_time(after.time)} s"
                     raise InputError("pins", found, "one place at a time", "move one, or shorten the hold before it")
+
+
+def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, window: float) -> SampledTrack:
+    """Sample a track at `fps` frames per second.
+
+    Where its ball is solved, it has the solved height, and the solved place where the feed has not measured it: where
+    it has, the ball is met within the noise of the measurement. window: s that take the feed's jitter out.
+    """
+    sampled = sample(track, fps, window)
+    if course is None:
+        return sampled
+    ball, filled = course.at(sampled.times)
+    known = np.isfinite(ball).all(axis=1)
+    measured = sampled.ball_measured & ~(known & filled)
+    return replace(
+        sampled, ball=np.where(known[:, None] & (~measured[:, None] | [False, False, True]), ball, sampled.ball),
+        ball_measured=measured,
+    )  # fmt: skip

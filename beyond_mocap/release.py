@@ -18,8 +18,10 @@ from .ball.physics import THROWN, Ball
 from .base.settings import setting
 from .ball.released.carry import carried_and_thrown
 from .ball.released.first_guess import by_distance, fastest, speeds
-from .ball.released.hand import Hand, hand_of, sharpened
-from .ball.released.hand_ball import HandBall, ball_in_hand, usual_centre
+from .motion.hand import Hand, hand_of
+from .ball.released.hand import sharpened
+from .ball.released.hand_ball import HandBall, ball_in_hand
+from .motion.hand import usual_centre
 from .ball.released.launch_fit import Held, fit_launch
 from .ball.released.radar import radar_speed
 from .ball.released.without_ball import HOLD, release_by_hand
@@ -29,7 +31,7 @@ from .markers.trial import MarkerTrial
 from .motion.contacts import ground_height
 from .motion.humanoid import identify
 from .motion.motion import Motion, forward_kinematics, resample
-from .take import BallPath
+from .motion.track.ball_path import BallPath
 
 FEWEST = 12
 """Frames without which no throw is looked for."""

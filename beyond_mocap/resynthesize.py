@@ -14,52 +14,43 @@ continuous.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .errors import InputError, told_time
-from .known_touches import in_force
-from .lay_out import aimed, faced, footed, leaning, met, smoothed, touches, towards_ball
 from .library.library import Library
-from .motion import quaternion
 from .motion.motion import Motion
 from .motion.track import SampledTrack
-from .motion.track.sampling import MOVING_SPEED
-from .own_size import in_library_size, size_of, taken_in_library_size
+from .own_size import taken_in_library_size
 from .plan import Plan
 from .polish.hand_over import handed_over, old_share
-from .polish.meeting import eased
-from .polish.on_track import facing, firmness, pulled_to_track, root_with_sway
-from .polish.foot_plant import Planted
 from .polish.smoothing import reaches
-from .polish.steps import Steps
-from .polish.strike import Touch
+from .resolve_plan import resolve_plan
 from .synthesis.balance import balanced
+from .synthesis.construct.construction import Construction
+from .synthesis.construct.key_moments import find_touches, key_results
+from .synthesis.construct.old_motion import OldMotion
 from .synthesis.edit_list import EditList
-from .synthesis.footage import Footage, Shown, fetch, shown
+from .synthesis.footage import Shown, fetch, output_index, shown
+from .synthesis.frame_sources import sources_shown, words_shown
 from .synthesis.offer import SLOT
 from .synthesis.path_search import Between, PathSearch
+from .synthesis.resolved_plan import ResolvedPlan
+from .synthesis.search_library import search_library
 from .synthesis.touched import Stretch, asked_anew, joined, kept_keys, lies_elsewhere, stretches, to_search
 from .synthesis.used import Used, used_in
-from .synthesis.wanted import Wanted, wanted
-from .synthesize import (
-    Progress, finished, key_result, sources_shown, synthesize, with_made_gaits, words_shown,
-)
-from .take import BallPath, KeyResult, Take
+from .synthesis.wanted import Wanted, build_order
+from .synthesize import Progress, finished, synthesize
+from .motion.track.ball_path import BallPath
+from .take import KeyResult, Take
 
 HAND_OVER = 0.5
 """Seconds before and behind a touched stretch in which its motion goes over into the old one."""
 
 CONTEXT = 1.2
 """Seconds further out that are laid out too, so that the ends of windows and solves lie outside what is used."""
-
-MOST_TURN = 1.5 * np.pi
-"""Radians that a body may turn on the spot so as to turn the way it did before."""
-
-OFFSET_SECONDS = 1.0
-"""Seconds within a stretch over which the root forgets how far off the laid-out place the old one was at its end."""
 
 
 @dataclass(frozen=True)
@@ -94,18 +85,18 @@ def resynthesize(
     report = progress or (lambda fraction, text: None)
     if anew is not None:
         _check(plan, before, anew)
+    asking = {"cancelled": cancelled, "hurry": hurry}
     with threadpool_limits(limits=1):
         comparable = _comparable(plan, before)
-        taken = _edited(library, plan, before, report, cancelled, hurry, anew) if comparable else None
+        taken = _edited(library, plan, before, report, **asking, anew=anew) if comparable else None
     used = anew.used if anew is not None else ()
-    return synthesize(library, plan, progress, cancelled, hurry, used) if taken is None else taken
+    return synthesize(library, plan, progress, **asking, used=used) if taken is None else taken
 
 
 def shown_footage(library: Library, take: Take, start: float, end: float) -> tuple[Used, ...]:
     """The footage that a take of method "path" shows from second `start` to second `end`, for `Anew`; nothing where the
     take was made from another library."""
-    take = taken_in_library_size(take, size_of(take.plan, library.skeleton))
-    library = _library_of_both(library, take.plan, take, lambda fraction, text: None)
+    library = search_library(library, resolve_plan(take.plan, library, course=take.solved))
     if take.edit is None or not _made_from(library, take, len(take.edit)):
         return ()
     first, last = (int(round((second - take.start_time) * library.fps)) for second in (start, end))
@@ -131,15 +122,18 @@ def _comparable(plan: Plan, before: Take) -> bool:
 
 
 def _edited(
-    library: Library, plan: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
+    library: Library, asked: Plan, before: Take, report: Progress, *, cancelled, hurry, anew: Anew | None
 ) -> Take | None:
     """The take, or None where it has to be made as a whole; what is made anew is made in the library's size."""
-    size = size_of(plan, library.skeleton)
-    old = in_force(before.plan, before.solved)
-    known = in_force(plan, before.solved if _same_ball(plan, before.plan) else None)
-    small = (in_library_size(which, size) for which in (known, old))
-    found = _updated(library, *small, taken_in_library_size(before, size), report, cancelled, hurry, anew)
-    return None if found is None else finished(found[0], plan, known, library, *found[1:], before)
+    then = resolve_plan(before.plan, library, course=before.solved)
+    same_ball = _same_ball(asked, before.plan)
+    plan = resolve_plan(asked, library, course=before.solved if same_ball else None)
+    small = taken_in_library_size(before, plan.size)
+    found = _updated(library, plan, then, small, report, cancelled=cancelled, hurry=hurry, anew=anew)
+    if found is None:
+        return None
+    take, order, hurried = found
+    return finished(take, plan, library, order, hurried=hurried, before=before)
 
 
 def _same_ball(plan: Plan, old: Plan) -> bool:
@@ -150,13 +144,14 @@ def _same_ball(plan: Plan, old: Plan) -> bool:
 
 
 def _updated(
-    library: Library, plan: Plan, then: Plan, before: Take, report: Progress, cancelled, hurry, anew: Anew | None
+    library: Library, plan: ResolvedPlan, then: ResolvedPlan, before: Take, report: Progress, *, cancelled, hurry,
+    anew: Anew | None,
 ):
-    """The take without pins, made by `plan` where `before` was made by `then`, both in force; its order and the frame
+    """The take without pins, made by `plan` where `before` was made by `then`; its order and the frame
     from which on it was searched in a hurry; None where it has to be made as a whole."""
     clock = [time.perf_counter()]
-    library = _library_of_both(library, plan, before, report)
-    old, new = wanted(library, then), wanted(library, plan)
+    library = _library_of_both(library, (plan, then), report)
+    old, new = build_order(library, then), build_order(library, plan)
     if not _made_from(library, before, len(old)):
         return None
     again = to_search(library, before.edit, old, new, SLOT)
@@ -172,13 +167,16 @@ def _updated(
         def tell(fraction, text, number=number):
             report(0.8 * (number + fraction) / len(again), text)
 
-        search = PathSearch(library, new, balanced(plan.alpha), tell, cancelled, hurry, Between(edit, first, end), used)
+        search = PathSearch(
+            library, new, balanced(plan.asked.alpha), tell, cancelled, hurry=hurry, between=Between(edit, first, end),
+            used=used,
+        )
         edit = search.run()
         hurried += [search.hurried] if search.hurried is not None else []
     clock.append(time.perf_counter())
     report(0.8, "Constructing")
     track = new.track if plan.fps == library.fps else plan.sampled(plan.fps)
-    update = _Update(library, plan, before, track, edit, new)
+    update = _Update(library, plan, before, track=track, edit=edit, order=new)
     moved = np.interp(update.index, np.arange(len(new)), lies_elsewhere(old, new).astype(float)) > 0.0
     for stretch in update.stretches(again, moved):
         update.make(stretch)
@@ -188,10 +186,10 @@ def _updated(
     return replace(update.take(), seconds=seconds), new, min(hurried, default=None)
 
 
-def _library_of_both(library: Library, plan: Plan, before: Take, report: Progress) -> Library:
-    """The library with made clips where the new plan or the old take needs them."""
-    for which in (plan, before.plan):
-        suited = with_made_gaits(library, which, report)
+def _library_of_both(library: Library, plans: Iterable[ResolvedPlan], report: Progress) -> Library:
+    """The library with made clips where the first plan or else the second needs them."""
+    for which in plans:
+        suited = search_library(library, which, report)
         if len(suited.clips) > len(library.clips):
             break
     return suited
@@ -202,14 +200,9 @@ def _made_from(library: Library, before: Take, count: int) -> bool:
     edit, fps = before.edit, before.plan.fps
     if edit is None or len(edit) != count or edit.clip.max() >= len(library.clips):
         return False
-    what = shown(library, edit, _index(len(before.motion), library, fps, count))
+    what = shown(library, edit, output_index(len(before.motion), library, fps, count))
     paths = np.array(sources_shown(library, what)) == np.array(before.clips)[before.clip]
     return bool(np.all(paths) and np.allclose(what.clip_frame, before.clip_frame, rtol=0.0, atol=1e-6))
-
-
-def _index(frames: int, library: Library, fps: float, count: int) -> np.ndarray:
-    """(frames,) output frames at the library's rate."""
-    return np.minimum(np.arange(frames) * (library.fps / fps), count - 1)
 
 
 def _outside(keys, order: Wanted, again: list[Stretch]):
@@ -221,10 +214,12 @@ def _outside(keys, order: Wanted, again: list[Stretch]):
 class _Update:
     """A take in the making: the old one's arrays, with one stretch after the other made anew."""
 
-    def __init__(self, library: Library, plan: Plan, before: Take, track: SampledTrack, edit: EditList, order: Wanted):
+    def __init__(
+        self, library: Library, plan: ResolvedPlan, before: Take, *, track: SampledTrack, edit: EditList, order: Wanted
+    ):
         self.library, self.plan, self.before = library, plan, before
         self.track, self.edit, self.order = track, edit, order
-        self.index = _index(len(track), library, plan.fps, len(edit))
+        self.index = output_index(len(track), library, plan.fps, len(edit))
         self.shown = shown(library, edit, self.index)
         self.root, self.rotations = before.motion.root_positions.copy(), before.motion.rotations.copy()
         kept = before.contacts, before.correction, before.ik_miss
@@ -233,11 +228,8 @@ class _Update:
         self.stepped = none if before.stepped is None else before.stepped.copy()
         self.ball = track.ball.copy() if before.ball is None else before.ball.positions.copy()
         self.anew = np.zeros(len(track), bool)
-        self.keys = self._keys()
-
-    def _keys(self) -> tuple[KeyResult, ...]:
-        count = range(len(self.order.keys))
-        return tuple(key_result(self.library, self.plan, self.order, self.edit, self.shown, number) for number in count)
+        self.keys = key_results(library, plan.fps, order, edit, self.shown)
+        self.touches = find_touches(library, plan.fps, edit, self.keys)
 
     def stretches(self, again: list[Stretch], moved: np.ndarray) -> list[Stretch]:
         """Output frames (first, end) that are laid out anew: what was searched, where the track moved (T,), and the
@@ -256,18 +248,19 @@ class _Update:
         return stretches(touched, int(round((2 * HAND_OVER + 0.3) * self.plan.fps)))
 
     def _spread(self, seams: np.ndarray) -> set[tuple[int, float]]:
-        longest = 0.5 * self.plan.seam_window * self.plan.fps
+        longest = 0.5 * self.plan.asked.seam_window * self.plan.fps
         return set(zip(seams.tolist(), reaches(seams, len(self.index), longest).tolist()))
 
     def make(self, stretch: Stretch) -> None:
         """Makes output frames first .. end anew and hands over to the old ones around them."""
         hand, context = (int(round(seconds * self.plan.fps)) for seconds in (HAND_OVER, HAND_OVER + CONTEXT))
         low, high = max(0, stretch[0] - context), min(len(self.index), stretch[1] + context)
-        window = _Window(self, low, high, (stretch[0] - low, stretch[1] - low), hand)
-        planted, taken = window.planted()
-        planted, ball = window.met(planted, taken.standing)
+        inner = stretch[0] - low, stretch[1] - low
+        construction = self._construction(low, high, inner, old_share(high - low, inner, hand))
+        planted, taken = construction.lay_out()
+        planted, ball = construction.meet_ball(planted, taken)
         made = slice(max(0, stretch[0] - hand - low), min(high, stretch[1] + hand) - low)
-        at, share = slice(made.start + low, made.stop + low), window.share[made]
+        at, share = slice(made.start + low, made.stop + low), construction.old.share[made]
         new, old = (planted.root[made], planted.rotations[made]), (self.root[at], self.rotations[at])
         self.root[at], self.rotations[at] = handed_over(
             self.library.skeleton, new, old, share, taken.standing[made], self.plan.fps
@@ -277,6 +270,21 @@ class _Update:
         inside = np.arange(*stretch)
         self.correction[inside], self.miss[inside] = planted.correction[inside - low], planted.miss[inside - low]
         self.anew[at] = True
+
+    def _construction(self, low: int, high: int, stretch: Stretch, share: np.ndarray) -> Construction:
+        """Frames low .. high, of which those within `stretch` (counted from low) are free and the others are given by
+        the old motion; share (W,) of it in what comes out."""
+        window = slice(low, high)
+        old = OldMotion(
+            root=self.root[window], rotation=self.rotations[window, 0], stepped=self.stepped[window], share=share,
+            stretch=stretch,
+        )
+        source = fetch(self.library, self.edit, self.index[window], self.plan.fps)
+        touches = [replace(t, frame=t.frame - low) for t in self.touches if low <= round(t.frame) < high]
+        return Construction(
+            library=self.library, plan=self.plan, track=self.track.frames(low, high), source=source, touches=touches,
+            old=old,
+        )
 
     def take(self) -> Take:
         """The take as it now is."""
@@ -304,7 +312,7 @@ class _Update:
             correction=self.correction,
             ik_miss=self.miss,
             stepped=self.stepped,
-            plan=self.plan,
+            plan=self.plan.asked,
             edit=self.edit,
         )
 
@@ -324,89 +332,6 @@ class _Update:
                 left.remove(old)
             out.append(key if old is None or self.anew[near] else replace(old, asked=key.asked))
         return tuple(out)
-
-
-class _Window:
-    """Frames low .. high of an update, of which those within `stretch` (counted from low) are free and the others are
-    given by the old motion; share (W,) of the old motion in what comes out."""
-
-    def __init__(self, update: _Update, low: int, high: int, stretch: Stretch, hand: int):
-        self.update, self.low, self.high, self.stretch = update, low, high, stretch
-        self.track = update.track.frames(low, high)
-        self.footage: Footage = fetch(update.library, update.edit, update.index[low:high], update.plan.fps)
-        self.share = old_share(high - low, stretch, hand)
-
-    def planted(self) -> tuple[Planted, Steps]:
-        """The motion laid on the ground between what stays, feet planted, and the steps they take."""
-        update, plan, track = self.update, self.update.plan, self.track
-        smooth, stays = smoothed(update.library, plan, self.footage), self.share > 0.0
-        rotation = update.rotations[self.low : self.high, 0]
-        kept = quaternion.yaw(quaternion.multiply(rotation, quaternion.inverse(smooth.pose[:, 0])))
-        kept[~stays] = np.nan
-        firm = firmness(smooth.standing, smooth.height, plan.fps)
-        angle = facing(track.direction, track.speed, smooth.velocity, smooth.turn, kept, firm, aimed(track))
-        direction = self._same_way_round(angle, np.unwrap(quaternion.yaw(rotation)))
-        if direction is not None:
-            aim = aimed(replace(track, direction=direction))
-            angle = facing(direction, track.speed, smooth.velocity, smooth.turn, kept, firm, aim)
-        angle = angle + (1.0 - self.share) * towards_ball(update.library, track, smooth, angle, self._strikes())
-        ground = self._pulled(root_with_sway(track.positions, smooth.sway, angle))
-        root = np.concatenate([ground, smooth.height[:, None]], axis=1)
-        pose = leaning(update.library, plan, track, smooth, faced(smooth.pose, angle))
-        stepped = self._stepped()
-        return footed(update.library, plan, track, root, pose, smooth.standing, self._strikes(), self.share, stepped)
-
-    def _stepped(self) -> np.ndarray:
-        """(W, 2) bool: the steps of the old motion that are taken, in whole or in part, where it stays."""
-        old, stays = self.update.stepped[self.low : self.high], self.share > 0.0
-        kept = np.zeros_like(old)
-        for side in range(old.shape[1]):
-            number = np.cumsum(np.diff(old[:, side], prepend=False)) * old[:, side]
-            kept[:, side] = old[:, side] & np.isin(number, number[stays & old[:, side]])
-        return kept
-
-    def _same_way_round(self, angle: np.ndarray, old: np.ndarray) -> np.ndarray | None:
-        """The track's direction (W,) with which a body that now turns the other way round than it did, where it is so
-        slow that both ways will do, turns as it did; None where that is not so. angle, old: (W,) facing now and then,
-        unwrapped.
-        """
-        first, end = max(self.stretch[0] - 1, 0), min(self.stretch[1], len(angle) - 1)
-        turns = np.round((angle[end] - angle[first] - old[end] + old[first]) / (2.0 * np.pi))
-        slow = self.track.speed < MOVING_SPEED
-        middle = first + int(np.argmin(self.track.speed[first : end + 1]))
-        if turns == 0 or not slow[middle]:
-            return None
-        fast = np.flatnonzero(~slow[first : end + 1]) + first
-        low, high = max(fast[fast < middle], default=first), min(fast[fast > middle], default=end)
-        if abs(angle[high] - angle[low] - 2.0 * np.pi * turns) > MOST_TURN:
-            return None
-        ramp = eased((np.arange(len(angle)) - low) / max(high - low, 1), np.ones(len(angle)))
-        return self.track.direction - 2.0 * np.pi * turns * ramp
-
-    def _pulled(self, laid: np.ndarray) -> np.ndarray:
-        """(W, 2) the laid-out root on the track; near the given frames it sets out from where the old one is."""
-        plan, old, stays = self.update.plan, self.update.root[self.low : self.high, :2], self.share > 0.0
-        first, end = self.stretch
-        at, fade = np.arange(len(laid)), max(1.0, min(OFFSET_SECONDS * plan.fps, end - first))
-        root = laid.copy()
-        for edge in [edge for edge in (first - 1, end) if 0 <= edge < len(laid)]:
-            near = eased(1.0 - np.abs(at - edge) / fade, np.ones(len(at)))[:, None]
-            root += np.where(stays[:, None], 0.0, near * (old - laid)[edge])
-        root = np.where(stays[:, None], old, root)
-        pulled = pulled_to_track(root, self.track.raw, plan.fps, plan.root_window)
-        return pulled + self.share[:, None] * (old - pulled)
-
-    def met(self, planted: Planted, standing: np.ndarray) -> tuple[Planted, np.ndarray]:
-        """The same with the ball met at the key moments in the window, and the ball's path (W, 3) m; standing (W, 2, 2)
-        bool."""
-        struck = met(self.update.library, self.update.plan, self.track, standing, planted, self._strikes())
-        return replace(planted, root=struck.root, rotations=struck.rotations), struck.ball
-
-    def _strikes(self) -> list[Touch]:
-        """The touches in the window, their frames counted from its first."""
-        update = self.update
-        played = touches(update.library, update.plan, update.edit, update.keys)
-        return [replace(t, frame=t.frame - self.low) for t in played if self.low <= round(t.frame) < self.high]
 
 
 def _ball_between(new: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:

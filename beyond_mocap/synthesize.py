@@ -5,8 +5,8 @@
     take = synthesize(library, Plan(track=track, timeline=read_timeline("player.txt", 30.0)))
 
 The plan is put into frames (`synthesis.wanted`), a search picks what is shown (`synthesis.path_search`, or
-`synthesis.blocks` with `synthesis.locomotion`), the frames are fetched (`synthesis.footage`) and laid on the ground
-(`lay_out`).
+`synthesis.blocks` with `synthesis.locomotion`), the frames are fetched (`synthesis.footage`) and laid on the track
+(`synthesis.construct`).
 """
 
 from __future__ import annotations
@@ -18,34 +18,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .annotation import LOCOMOTION_WORDS, avoided_per_frame, spoken
+from .annotation import LOCOMOTION_WORDS, avoided_per_frame
 from .errors import InputError, TimedLine, told_time
 from .evaluation.give_way import give_way
 from .evaluation.played import played_from_take
-from .known_touches import in_force, untouched, with_course
-from .lay_out import as_far, chained, faced, footed, leaning, met, on_track, smoothed, touches
-from .library.chosen import with_chosen_gaits
+from .known_touches import untouched, with_course
 from .library.library import Library
 from .motion.motion import Motion, at_frames
 from .motion.runs import runs
-from .motion.track import SampledTrack, sample
-from .own_size import in_library_size, in_own_size, size_of
+from .own_size import in_own_size
 from .plan import METHODS, Plan
 from .polish.foot_plant import Planted
 from .polish.pins import look_axis, pinned
 from .polish.steps import Steps
-from .polish.strike import Touch
+from .resolve_plan import resolve_plan
 from .synthesis.balance import balanced
 from .synthesis.blocks import BlockSearch
+from .synthesis.construct.construction import Construction
+from .synthesis.construct.key_moments import find_touches, key_results
+from .synthesis.construct.thesis_methods import lay_out_blocks
 from .synthesis.distance import exact_keys, straight_edit, warped_edit
 from .synthesis.dragged import left_out
 from .synthesis.edit_list import EditList
-from .synthesis.footage import Footage, Shown, fetch
+from .synthesis.footage import fetch, output_index
+from .synthesis.frame_sources import provenance_fields
 from .synthesis.locomotion import match_distance
 from .synthesis.path_search import PathSearch
+from .synthesis.resolved_plan import ResolvedPlan
+from .synthesis.search_library import search_library
 from .synthesis.used import Used
-from .synthesis.wanted import Wanted, wanted
-from .take import BallPath, KeyResult, PinResult, Take
+from .synthesis.wanted import Wanted, build_order
+from .motion.track.ball_path import BallPath
+from .take import PinResult, Take
 
 NEAR_KEY = 1.5
 """Seconds around a key moment in which its own words may be shown, whoever avoids them."""
@@ -68,6 +72,10 @@ class Found:
     travelled: np.ndarray | None = None
     hurried: int | None = None
 
+    def travelled_at(self, index: np.ndarray) -> np.ndarray | None:
+        """(N,) metres travelled at fractional frames `index` (N,) of the edit list."""
+        return None if self.travelled is None else np.interp(index, np.arange(len(self.travelled)), self.travelled)
+
 
 def synthesize(
     library: Library,
@@ -76,6 +84,7 @@ def synthesize(
     cancelled: Callable[[], bool] | None = None,
     hurry: Callable[[], bool] | None = None,
     used: tuple[Used, ...] = (),
+    narrow: bool = False,
 ) -> Take:
     """A player's motion for `plan` out of `library`.
 
@@ -83,186 +92,114 @@ def synthesize(
     plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so,
     method "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on;
     before anything is found, and by the other methods, that is Cancelled too. used: footage that another solution is to
-    do without where it can (method "path"; the others differ by their seed). The same library, plan and numpy give the
-    same bits: linear algebra is held to one thread, since more add up in another order.
+    do without where it can (method "path"; the others differ by their seed). narrow: whether method "path" searches
+    quickly from the start. The same library, plan and numpy give the same bits: linear algebra is held to one thread,
+    since more add up in another order.
     """
     if plan.method not in METHODS:
         raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        return _synthesize(library, plan, progress or (lambda fraction, text: None), cancelled, hurry, used)
+        asking = {"cancelled": cancelled, "hurry": hurry, "used": used, "narrow": narrow}
+        return _synthesize(library, plan, progress or (lambda fraction, text: None), **asking)
 
 
-def _synthesize(library: Library, asked: Plan, report: Progress, cancelled, hurry, used: tuple[Used, ...]) -> Take:
+def _synthesize(library: Library, asked: Plan, report: Progress, **asking) -> Take:
     begun = time.perf_counter()
-    known = in_force(asked)
-    solving = {} if known.solved is None else {"solve": time.perf_counter() - begun}
-    plan = in_library_size(known, size_of(asked, library.skeleton))
-    recordings, library = library, with_made_gaits(library, plan, report)
+    plan = resolve_plan(asked, library)
+    solving = {} if plan.course is None else {"solve": time.perf_counter() - begun}
+    recordings, library = library, search_library(library, plan, report)
     begun = time.perf_counter()
-    order = wanted(library, plan)
-    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), cancelled, hurry, used)
+    order = build_order(library, plan)
+    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), **asking)
     seconds = {"search": time.perf_counter() - begun}
     take, laid = _laid_out(library, plan, order, found, report)
-    return finished(
-        replace(take, seconds={**seconds, **laid, **solving}), asked, known, recordings, order, found.hurried
-    )
+    take = replace(take, seconds={**seconds, **laid, **solving})
+    return finished(take, plan, recordings, order, hurried=found.hurried)
 
 
-def constructed(library: Library, known: Plan, edit: EditList, progress: Progress | None = None) -> Take:
+def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: Progress | None = None) -> Take:
     """The take of method "path" that shows `edit`: all that `synthesize` does behind its search.
 
-    known: the plan with its key moments and its ball as they are in force (`known_touches.in_force`). edit: at the
-    library's rate, from the track's first time on; its clips are those of `library`, which has made ones
+    edit: at the library's rate, from the track's first time on; its clips are those of `library`, which has made ones
     (`Library.extended`) where it shows them. What gave way is not told in its warnings: it may be a part of a longer
     take, of which `evaluation.evaluate` tells it. The same arguments and numpy give the same bits.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        plan = in_library_size(known, size_of(known, library.skeleton))
-        order = wanted(library, plan)
+        order = build_order(library, plan)
         take, seconds = _laid_out(library, plan, order, Found(edit), progress or (lambda fraction, text: None))
-        return finished(replace(take, seconds=seconds), known, known, library, order, None, judged=False)
+        return finished(replace(take, seconds=seconds), plan, library, order, judged=False)
 
 
 def _laid_out(
-    library: Library, plan: Plan, order: Wanted, found: Found, report: Progress
+    library: Library, plan: ResolvedPlan, order: Wanted, found: Found, report: Progress
 ) -> tuple[Take, dict[str, float]]:
     """What was found, fetched and laid on the ground, in the library's size; and what that took, in seconds."""
     clock = [time.perf_counter()]
     report(0.8, "Constructing")
     track = order.track if plan.fps == library.fps else plan.sampled(plan.fps)
     edit = exact_keys(library, found.edit, order)
-    index = np.minimum(np.arange(len(track.times)) * (library.fps / plan.fps), len(edit) - 1)
-    footage = fetch(library, edit, index, plan.fps)
-    keys = tuple(key_result(library, plan, order, edit, footage, number) for number in range(len(order.keys)))
+    index = output_index(len(track.times), library, plan.fps, len(edit))
+    source = fetch(library, edit, index, plan.fps)
+    keys = key_results(library, plan.fps, order, edit, source)
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
-    strikes = touches(library, plan, edit, keys)
-    planted, taken = _polished(library, plan, track, footage, found, index, strikes)
-    if plan.method == "path":
-        struck = met(library, plan, track, taken.standing, planted, strikes)
-        planted = replace(planted, root=struck.root, rotations=struck.rotations)
-        track = replace(track, ball=struck.ball)
-    take = _take(library, plan, order, track, edit, footage, keys, planted, taken)
+    touches = find_touches(library, plan.fps, edit, keys)
+    construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
+    planted, taken, ball = _body(construction, found.travelled_at(index))
+    motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
+    take = Take(
+        **provenance_fields(library, source), motion=motion, start_time=float(track.times[0]), contacts=taken.contacts,
+        timeline=order.timeline, keys=keys, ball=ball, method=plan.method, seed=plan.asked.seed,
+        correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=plan.asked, edit=edit,
+    )
     clock.append(time.perf_counter())
     report(1.0, "Done")
     return take, dict(zip(("construct", "polish"), np.diff(clock).tolist()))
 
 
-def with_made_gaits(library: Library, plan: Plan, report: Progress) -> Library:
-    """The library that a plan is made from: with made clips, where recordings lack what its track asks for, and with
-    the chosen gaits."""
-    if plan.method == "path" and plan.made and _lacks(library, plan):
-        report(0.0, "Making what the recordings lack")
-        library = library.extended
-    return with_chosen_gaits(library, dict(plan.gaits))
-
-
-def _lacks(library: Library, plan: Plan) -> bool:
-    """Whether the recordings lack speeds that the track asks for, or touches as fast as its key moments."""
-    track = sample(plan.track, library.fps, plan.track_window)
-    moments = np.array([key.in_force for key in plan.timeline.keys])
-    takes = np.array(["receive" in key.words for key in plan.timeline.keys], bool)
-    return library.lacks(track.speed, np.interp(moments, track.times, track.speed), takes)
-
-
 def _search(
-    library: Library, plan: Plan, order: Wanted, report: Progress, cancelled, hurry, used: tuple[Used, ...]
+    library: Library, plan: ResolvedPlan, order: Wanted, report: Progress, *, cancelled, hurry, used, narrow
 ) -> Found:
     if plan.method == "path":
-        search = PathSearch(library, order, balanced(plan.alpha), report, cancelled, hurry, used=used)
+        more = {"hurry": hurry, "used": used, "narrow": narrow}
+        search = PathSearch(library, order, balanced(plan.asked.alpha), report, cancelled, **more)
         return Found(search.run(), hurried=search.hurried)
     stops = [stop for stop in (cancelled, hurry) if stop]
-    search = BlockSearch(library, order, plan.alpha, report, lambda: any(stop() for stop in stops))
+    search = BlockSearch(library, order, plan.asked.alpha, report, lambda: any(stop() for stop in stops))
     blocks = search.run()
     if plan.method == "blocks":
         return Found(straight_edit(search, blocks))
-    return Found(*warped_edit(search, match_distance(search, blocks, plan.delta), plan.catch_up))
+    return Found(*warped_edit(search, match_distance(search, blocks, plan.asked.delta), plan.asked.catch_up))
 
 
-def _polished(
-    library: Library, plan: Plan, track: SampledTrack, footage: Footage, found: Found, index, strikes: list[Touch]
-) -> tuple[Planted, Steps]:
-    """Seams smoothed, laid on the ground, and, by `path`, feet held where they stand or stepping where they would
-    slide."""
-    smooth = smoothed(library, plan, footage)
-    if plan.method == "blocks":
-        angle, ground = chained(library, footage, smooth, track)
-    elif plan.method == "distance":
-        travelled = np.interp(index, np.arange(len(found.travelled)), found.travelled)
-        angle, ground = as_far(track, smooth, travelled)
+def _body(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps, BallPath | None]:
+    """The body, its steps and the ball; travelled: (T,) m by method "distance"."""
+    track, ball = construction.track, construction.track.ball
+    if construction.plan.method == "path":
+        planted, taken = construction.lay_out()
+        planted, ball = construction.meet_ball(planted, taken)
     else:
-        angle, ground = on_track(library, plan, track, smooth, strikes)
-    pose = faced(smooth.pose, angle)
-    root = np.concatenate([ground, smooth.height[:, None]], axis=1)
-    if plan.method == "path":
-        pose = leaning(library, plan, track, smooth, pose)
-        return footed(library, plan, track, root, pose, footage.standing, strikes)
-    none = np.zeros((len(root), 2))
-    return Planted(root, pose, none, none), Steps.none(pose, footage.standing)
-
-
-def _take(
-    library: Library, plan: Plan, order: Wanted, track: SampledTrack, edit: EditList, footage: Footage,
-    keys: tuple[KeyResult, ...], planted: Planted, taken: Steps,
-) -> Take:
-    clips = library.clips
-    sources = sources_shown(library, footage)
-    names = tuple(dict.fromkeys(sources))
-    number = {name: i for i, name in enumerate(names)}
-    ball = None
-    if np.any(np.isfinite(track.ball[:, :2])):
-        ball = BallPath(track.times, track.ball, track.ball_measured)
-    return Take(
-        motion=Motion(library.skeleton, planted.root, planted.rotations, plan.fps),
-        start_time=float(track.times[0]),
-        clips=names,
-        clip=np.array([number[source] for source in sources]),
-        clip_frame=footage.clip_frame,
-        mirrored=np.array([clips[clip].mirrored for clip in footage.clip]),
-        words=words_shown(library, footage),
-        contacts=taken.contacts,
-        seams=footage.seams,
-        timeline=order.timeline,
-        keys=keys,
-        ball=ball,
-        method=plan.method,
-        seed=plan.seed,
-        correction=planted.correction,
-        ik_miss=planted.miss,
-        stepped=taken.stepped,
-        plan=plan,
-        edit=edit,
-    )
-
-
-def sources_shown(library: Library, shown: Shown) -> tuple[str, ...]:
-    """The files, below the library, that hold every shown frame: recordings, or what was made behind their end."""
-    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
-    return tuple(library.clips[clip].source_at(frame) for clip, frame in frames)
-
-
-def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
-    """The words that every shown frame's clip carries there."""
-    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
-    return tuple(spoken(library.clips[clip].words_at(frame)) for clip, frame in frames)
+        planted, taken = lay_out_blocks(construction, travelled)
+    known = np.any(np.isfinite(ball[:, :2]))
+    return planted, taken, BallPath(track.times, ball, track.ball_measured) if known else None
 
 
 def finished(
-    take: Take, asked: Plan, plan: Plan, recordings: Library, order: Wanted, hurried: int | None,
+    take: Take, plan: ResolvedPlan, recordings: Library, order: Wanted, *, hurried: int | None = None,
     before: Take | None = None, judged: bool = True,
 ) -> Take:
-    """A take out of the library's size in the player's, with its pins, its ball and its warnings. plan: `asked` as it
-    is in force; before: the finished take that it is an edit of; judged: as `with_warnings` has it."""
-    take = with_pins(in_own_size(take, size_of(asked, recordings.skeleton), asked, before), recordings)
+    """A take out of the library's size in the player's, with its pins, its ball and its warnings. before: the finished
+    take that it is an edit of; hurried, judged: as `with_warnings` has them."""
+    take = with_pins(in_own_size(take, plan.size, plan.asked, before), recordings)
     begun = time.perf_counter()
     take = with_course(take, plan)
-    if plan.solved is not None:
+    if plan.course is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - begun})
-    return with_warnings(take, recordings, order, hurried, untouched(take, plan), judged)
+    return with_warnings(take, recordings, order, hurried, more=untouched(take, plan), judged=judged)
 
 
 def with_pins(take: Take, recordings: Library) -> Take:
@@ -291,7 +228,8 @@ def look_of(library: Library) -> np.ndarray:
 
 
 def with_warnings(
-    take: Take, recordings: Library, order: Wanted, hurried: int | None, more: Sequence[str] = (), judged: bool = True
+    take: Take, recordings: Library, order: Wanted, hurried: int | None, *, more: Sequence[str] = (),
+    judged: bool = True,
 ) -> Take:
     """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
     library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
@@ -353,24 +291,6 @@ def _pins_missed(take: Take) -> list[str]:
         elif result.pin.part != "gaze" and result.miss > PIN_MISSED:
             told.append(TimedLine(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
     return told
-
-
-def key_result(library: Library, plan: Plan, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
-    """How key moment `number` came out: where its clip's key frame is played, or what stands in for it."""
-    key = order.keys[number]
-    at = key.frame * plan.fps / library.fps
-    near = int(np.clip(round(at), 0, len(played.clip) - 1))
-    clip, shown = int(played.clip[near]), float(played.clip_frame[near])
-    placed = next((p for p in edit.keys if p.wanted == number and p.key.clip == clip), None)
-    words = spoken(placed.key.words if placed else library.clips[clip].words_at(shown))
-    if placed is not None:
-        inside = np.flatnonzero(played.piece == played.piece[near])
-        if len(inside) > 1 and np.all(np.diff(played.clip_frame[inside]) > 0):
-            at = float(np.interp(placed.key.frame, played.clip_frame[inside], inside))
-        shown = placed.key.frame
-    source = library.clips[clip]
-    instead = words if key.used_instead and not key.choices else key.used_instead
-    return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
 
 
 def _gave_way(library: Library, plan: Plan, take: Take) -> list[str]:

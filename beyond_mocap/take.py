@@ -9,19 +9,9 @@ import numpy as np
 from .annotation import KeyMoment, Timeline
 from .motion.motion import Motion
 from .motion.striking import meeting_words
+from .motion.track.ball_path import BallPath
 from .plan import Pin, Plan, SolvedCourse
 from .synthesis.edit_list import EditList
-
-
-@dataclass(frozen=True, eq=False)
-class BallPath:
-    """The ball at the output's rate: times (T,) s on the track's clock, positions (T, 3) m of its centre, measured (T,)
-    bool; rotations (T, 4) of its body, None where nobody knows how it turns."""
-
-    times: np.ndarray
-    positions: np.ndarray
-    measured: np.ndarray
-    rotations: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

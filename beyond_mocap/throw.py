@@ -36,7 +36,7 @@ from .synthesis.phase_network.chains import EFFECTORS
 from .synthesis.phase_network.limb_limits import LimbLimits
 from .synthesis.phase_network.model import ThrowModel
 from .synthesis.phase_network.plan import Planned, Wish, planned, unlike
-from .take import BallPath
+from .motion.track.ball_path import BallPath
 
 KINDS: dict[str, Ball] = {**BALLS, **THROWN}
 """Balls by name."""
@@ -546,7 +546,7 @@ class _Work:
 
 def within(thrown: Thrown, motion: Motion, start: float, release: float, first: int) -> Thrown:
     """The throw as part of a longer motion that begins at `start` s and shows the throw from its frame `first` on,
-    which the ball leaves at `release` s: as `joined_throw.laid_into` says. The ball is held, or lies, all the time
+    which the ball leaves at `release` s: as `throws.join_throw` says. The ball is held, or lies, all the time
     before."""
     launch = replace(thrown.launch, time=release)
     flight = fly(launch, thrown.ball, thrown.flight.end - thrown.launch.time + motion.duration)

@@ -131,7 +131,7 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
     @staticmethod
     def work(order, progress, cancelled, _hurry):
         """Build it, and list its clips; where it cannot be built they are listed all the same, to be given words."""
-        from ..beyond_mocap.library.library import build
+        from ..beyond_mocap.library.build import build
         from ..beyond_mocap.library.listing import listed, scanned
 
         files = watch.look(order.folder) or {}

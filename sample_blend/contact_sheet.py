@@ -19,10 +19,12 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
+from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.motion.body import MATERIALS, BodyMesh, deformed, low_poly_body  # noqa: E402
 from beyond_mocap.motion.humanoid import heading  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, place, pose_kinematics  # noqa: E402
+from beyond_mocap.motion.quaternion import turned_about_up  # noqa: E402
 
 COLOURS = {
     "skin": (0.60, 0.36, 0.24),
@@ -117,7 +119,7 @@ def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None
 def add_ribbon(points: np.ndarray, colour, width: float = 0.07, height: float = 0.012) -> None:
     """A path (N, 2) in metres as a flat ribbon on the grass."""
     way = np.gradient(np.asarray(points, dtype=float), axis=0)
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+    way = unit_vectors(way)
     side = 0.5 * width * np.stack([-way[:, 1], way[:, 0]], axis=-1)
     left, right = points + side, points - side
     rows = np.concatenate([np.c_[left, np.full(len(left), height)], np.c_[right, np.full(len(right), height)]])
@@ -240,7 +242,7 @@ def strip(
         scene = new_scene(width, int(width * 2.2 / (spacing * len(frames))), samples)
         add_bodies(Actor(row), frames, moved)
         if ball is not None:
-            centres = np.stack([place_point(b, turned - facing) for b in np.asarray(ball)])
+            centres = np.stack([turned_about_up(b, turned - facing) for b in np.asarray(ball)])
             add_ball(centres + moved)
         middle = np.array([stand[-1] / 2, 0.0, 0.93])
         look(scene, middle + np.array([0.0, -30.0, 4.0]), middle, wide=spacing * len(frames))
@@ -248,12 +250,6 @@ def strip(
         pictures.append(render(scene, part))
         part.unlink()
     save(np.concatenate(pictures, axis=0), out)
-
-
-def place_point(point: np.ndarray, angle: float) -> np.ndarray:
-    """A point (3,) turned about Z."""
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.array([cos * point[0] - sin * point[1], sin * point[0] + cos * point[1], point[2]])
 
 
 def main(arguments: list[str]) -> None:

@@ -87,7 +87,7 @@ def synthesize(load, settings, steps) -> list[dict]:
     quality, recipe = load("scene.quality"), load("beyond_mocap.synthesize")
     steps.enter("Library")
     begun = time.perf_counter()
-    clips = load("beyond_mocap.library.library").build(settings.library_folder, progress=steps.progress)
+    clips = load("beyond_mocap.library.build").build(settings.library_folder, progress=steps.progress)
     library_seconds = time.perf_counter() - begun
     session.keep_library(clips, None)
     settings.library_holds = load("operators.build_library").summary(clips)

@@ -18,9 +18,11 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.errors import InputError  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
-from beyond_mocap.files.tables import read_ball, read_provenance  # noqa: E402
+from beyond_mocap.files.tables import read_ball  # noqa: E402
+from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
 from beyond_mocap.motion.body import deformed, low_poly_body  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, pose_kinematics  # noqa: E402
 
@@ -79,7 +81,7 @@ def _body(draw, view: View, skin, quads, material, balls) -> None:
     flat, depth = view(skin)
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    normal = unit_vectors(normal, least=1e-12)
     light = 0.5 + 0.5 * np.clip(normal @ SUN, -0.4, 1.0)
     colour = (COLOURS[material] * light[:, None]).astype(int)
     colour[corners[..., 2].mean(axis=1) < -0.01] = BELOW

@@ -17,11 +17,14 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
+from beyond_mocap.base.time_series import hann_smooth, interpolate  # noqa: E402
+from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.motion.gait import gait  # noqa: E402
 from beyond_mocap.motion.gestures import Gesture, dribble, strike  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402
+from beyond_mocap.motion.runs import equal_runs  # noqa: E402
 from beyond_mocap.motion.moves import celebration, getting_up, header, throw_in  # noqa: E402
 
 FPS = 30.0
@@ -176,9 +179,8 @@ def _by_speed(motion: Motion) -> list[Span]:
     smooth = np.stack([np.convolve(padded[:, a], window / window.sum(), mode="valid") for a in (0, 1)], axis=-1)
     velocity = np.gradient(smooth, 1.0 / motion.fps, axis=0)
     names = np.searchsorted([limit for _, limit in _GAITS], np.linalg.norm(velocity, axis=1), side="right")
-    edges = np.flatnonzero(np.diff(names)) + 1
     spans: list[list] = []
-    for begin, end in zip(np.r_[0, edges], np.r_[edges, len(names)]):
+    for begin, end in equal_runs(names):
         word = _GAITS[names[begin]][0]
         if spans and (end - begin < 0.4 * motion.fps or spans[-1][2] == word):
             spans[-1][1] = end
@@ -205,9 +207,7 @@ def _profile(rows) -> np.ndarray:
 
 
 def _eased(values: np.ndarray) -> np.ndarray:
-    half = int(0.3 * FPS)
-    window = np.hanning(2 * half + 3)[1:-1]
-    return np.convolve(np.pad(values, half, mode="edge"), window / window.sum(), mode="valid")
+    return hann_smooth(values, int(0.3 * FPS))
 
 
 def _breeze(seconds: float, seed: int) -> np.ndarray:
@@ -323,12 +323,9 @@ def true_paths() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
 def _rounded(rows, times: np.ndarray) -> np.ndarray:
     """A path (N, 2) through waypoints, its corners in space and speed rounded by a Hann window of 1.2 s, twice."""
     table = np.array(rows, dtype=float)
-    path = np.stack([np.interp(times, table[:, 0], table[:, axis]) for axis in (1, 2)], axis=-1)
-    half = 60
-    window = np.hanning(2 * half + 3)[1:-1]
+    path = interpolate(times, table[:, 0], table[:, 1:3])
     for _ in range(2):
-        padded = np.pad(path, ((half, half), (0, 0)), mode="edge")
-        path = np.stack([np.convolve(padded[:, a], window / window.sum(), mode="valid") for a in (0, 1)], axis=-1)
+        path = np.stack([hann_smooth(column, 60) for column in path.T], axis=-1)
     return path
 
 
@@ -376,7 +373,7 @@ def _dribbled(times: np.ndarray, path: np.ndarray, begin: float, end: float) -> 
         ],
         -1,
     )
-    way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
+    way = unit_vectors(way, least=1e-6)
     since = ((end - times) / 0.75) % 1.0
     running = np.clip((times - begin) / 0.8, 0.0, 1.0) * np.minimum(speed, 3.5)
     ahead = 0.46 + 0.16 * running * np.sin(np.pi * since) ** 1.5

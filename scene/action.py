@@ -10,6 +10,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.vectors import unit_vectors
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
 from ..beyond_mocap.motion.motion import Motion, at_frames
@@ -125,7 +126,7 @@ def _rotation(bone: bpy.types.PoseBone, curves: dict, frames: np.ndarray) -> np.
     if bone.rotation_mode == "AXIS_ANGLE":
         angle, *axis = _values(bone, "rotation_axis_angle", curves, frames).T
         axis = np.stack(axis, axis=1)
-        return quaternion.about_axis(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9), angle)
+        return quaternion.about_axis(unit_vectors(axis), angle)
     # Blender names the axes in the order in which they are applied to a point, the core as nested frames: the reverse
     order = bone.rotation_mode[::-1]
     turns = _values(bone, "rotation_euler", curves, frames)

@@ -54,7 +54,7 @@ def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection
     data.display_type = "WIRE"
     body = bpy.data.objects.new(name, data)
     scene.collection.objects.link(body)
-    places, tails = rest_positions(skeleton), _tails(skeleton)
+    places, tails = skeleton.rest_positions, _tails(skeleton)
     places = places - [0.0, 0.0, min(places[:, 2].min(), (places + tails)[:, 2].min())]
     with _editing(context, body):
         for joint, joint_name in enumerate(skeleton.names):
@@ -94,15 +94,6 @@ def skeleton_of(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
     size = max(1.0, float(np.abs(kept.offsets).max()))
     same = same_parents and np.allclose(derived.offsets[order], kept.offsets, atol=1e-5 * size)
     return kept if same else derived
-
-
-def rest_positions(skeleton: Skeleton) -> np.ndarray:
-    """Where the joints are while none is rotated, metres from the root: (J, 3)."""
-    places = np.zeros((len(skeleton), 3))
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            places[joint] = places[parent] + skeleton.offsets[joint]
-    return places
 
 
 def placement(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:

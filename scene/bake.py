@@ -5,8 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.time_series import interpolate
 from ..beyond_mocap.motion.track import sample
-from ..beyond_mocap.take import BallPath, Take
+from ..beyond_mocap.motion.track.ball_path import BallPath
+from ..beyond_mocap.take import Take
 from . import action, armature, ball, body, channels, curve, stage
 from .measure import frames_per_second, whole_frames
 from .session import Made
@@ -101,7 +103,7 @@ def lengthen(scene: bpy.types.Scene, last: float) -> None:
 def _places(take: Take, seconds: np.ndarray) -> np.ndarray:
     """Where the player is on the ground at times on the track's clock: (N, 2) metres."""
     times = take.start_time + np.arange(len(take.motion)) / take.motion.fps
-    return np.stack([np.interp(seconds, times, take.motion.root_positions[:, axis]) for axis in range(2)], axis=1)
+    return interpolate(seconds, times, take.motion.root_positions[:, :2])
 
 
 def _smooth(places: np.ndarray, fps: float) -> np.ndarray:

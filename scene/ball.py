@@ -6,8 +6,9 @@ import bmesh
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.time_series import interpolate
 from ..beyond_mocap.motion import quaternion
-from ..beyond_mocap.take import BallPath
+from ..beyond_mocap.motion.track.ball_path import BallPath
 from . import channels
 from .material import colour
 from .measure import frames_per_second, units_per_metre, whole_frames
@@ -41,7 +42,7 @@ def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start:
     seconds = path.times - path.times[0]
     frames = whole_frames(start, float(seconds[-1]), fps)
     at = (frames - start) / fps
-    places = np.stack([np.interp(at, seconds, path.positions[:, axis]) for axis in range(3)], axis=1)
+    places = interpolate(at, seconds, path.positions)
     group = "Object Transforms"
     curves = {
         "location": (group, places * units_per_metre(scene)),

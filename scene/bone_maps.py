@@ -6,7 +6,6 @@ A map is a dict part -> bone name, the parts as PARTS has them. Control rigs (Ri
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.digest import hex_digest
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
 from ..beyond_mocap.motion.humanoid import Humanoid, identify, roles_of, side_and_part
@@ -173,7 +173,7 @@ def check(rig: bpy.types.Object, table: dict[str, str]) -> None:
 def fingerprint(rig: bpy.types.Object) -> str:
     """A short hash of all bones' names and parents: the same for every copy of a skeleton."""
     lines = sorted(f"{bone.name}<{bone.parent.name if bone.parent else ''}" for bone in rig.data.bones)
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+    return hex_digest("\n".join(lines))
 
 
 def kept_folder(create: bool = False) -> Path | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.vectors import distance_along
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion.humanoid import identify
 from ..beyond_mocap.motion.track import Track
@@ -49,7 +50,7 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
     if drawn.type == "CURVE":
         found = line_of(scene, drawn)
         level = found.line[:, :2]
-        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(level, axis=0), axis=1))])
+        way = distance_along(level)
         return along(level, way[found.at], found.speeds, found.waits, start, f"curve {drawn.name}")
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")

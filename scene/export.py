@@ -15,6 +15,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.vectors import nearest_axis
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.files.whole import beside
 from ..beyond_mocap.motion import quaternion
@@ -233,20 +234,15 @@ def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
     heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
     lie = np.array(rig.matrix_world.to_3x3())
     hips = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"])
-    up = _axis(hips - 0.5 * (heads["left foot"] + heads["right foot"]))
+    up = nearest_axis(hips - 0.5 * (heads["left foot"] + heads["right foot"]))
     across = heads["left upper_leg"] - heads["right upper_leg"]
-    left = _axis(across - (across @ up) * up)
+    left = nearest_axis(across - (across @ up) * up)
     size = np.cbrt(abs(np.linalg.det(lie)))
     turn = np.stack([np.cross(left, up), left, up]) * size
     out = np.eye(4)
     out[:3, :3] = turn
     out[:3, 3] = -turn @ (hips - (hips @ up) * up)
     return out
-
-
-def _axis(vector: np.ndarray) -> np.ndarray:
-    number = int(np.argmax(np.abs(vector)))
-    return np.eye(3)[number] * np.sign(vector[number])
 
 
 def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:

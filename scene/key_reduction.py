@@ -12,6 +12,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.vectors import unit_vectors
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
 from . import channels, rig_bake
@@ -125,7 +126,7 @@ def as_turns(values: np.ndarray, mode: str) -> np.ndarray:
     if mode == "QUATERNION":
         return quaternion.normalized(values)
     if mode == "AXIS_ANGLE":
-        axis = values[:, 1:] / np.maximum(np.linalg.norm(values[:, 1:], axis=1, keepdims=True), 1e-9)
+        axis = unit_vectors(values[:, 1:])
         return quaternion.about_axis(axis, values[:, 0])
     order = mode[::-1]  # see `action`: Blender names the axes in the order in which they are applied
     return quaternion.from_euler(values[:, ["XYZ".index(letter) for letter in order]], order)

@@ -101,7 +101,7 @@ def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How,
 
 def work(order: Order, library: "Library | None", progress, cancelled, hurry) -> Result:
     """Make what is ordered, out of the library, which is built where it is None. Never touches bpy."""
-    from ..beyond_mocap.library.library import build
+    from ..beyond_mocap.library.build import build
 
     clips = library or build(
         order.folder, unit=order.unit, **order.build, progress=progress, cancelled=lambda: cancelled() or hurry()
@@ -130,7 +130,7 @@ def _single(order: Order, clips, progress, cancelled, hurry) -> One:
         step = {"start": how.start, "end": how.end, "used": [asdict(piece) for piece in used]}
         steps = [*steps, step] if same and steps else None
     elif how.kind == "quick" and plan.method == "path" and not _same_span(plan, order.before):
-        take, steps = synthesize(clips, plan, progress, cancelled, _AfterFirst(hurry)), None
+        take, steps = synthesize(clips, plan, progress, cancelled, hurry, narrow=True), None
     elif how.kind in ("update", "quick") and order.before is not None:
         take = resynthesize(clips, plan, order.before, *asked)
         steps = steps if same else None
@@ -150,18 +150,6 @@ def _same_span(plan: Plan, before: Take | None) -> bool:
     whole."""
     old = before.plan.track if before is not None and before.plan is not None else None
     return old is not None and np.array_equal(plan.track.times[[0, -1]], old.times[[0, -1]])
-
-
-class _AfterFirst:
-    """Says "hurry" from the third question on: a search that is hurried from its second slot on has one to begin
-    with."""
-
-    def __init__(self, hurry):
-        self.asked, self.hurry = 0, hurry
-
-    def __call__(self) -> bool:
-        self.asked += 1
-        return self.asked > 2 or self.hurry()
 
 
 def _variants(order: Order, clips, progress, cancelled, hurry) -> tuple[One, ...]:

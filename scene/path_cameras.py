@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
+from ..beyond_mocap.base.time_series import gaussian_smooth
 from ..beyond_mocap.errors import InputError
 from . import channels
 from .measure import frames_per_second, units_per_metre
@@ -109,7 +110,7 @@ def followed(route: Route, fps: float) -> tuple[np.ndarray, np.ndarray]:
     step = np.linalg.norm(np.diff(route.origin, axis=0), axis=1)
     starts = np.flatnonzero(step > JUMP) + 1
     pieces = [
-        (_smooth(place, SECONDS * fps / 2.0), _smooth(turn, SECONDS * fps))
+        (gaussian_smooth(place, SECONDS * fps / 2.0), gaussian_smooth(turn, SECONDS * fps))
         for place, turn in zip(np.split(route.origin, starts), np.split(np.unwrap(route.heading)[:, None], starts))
     ]
     return np.concatenate([place for place, _ in pieces]), np.concatenate([turn[:, 0] for _, turn in pieces])
@@ -254,13 +255,3 @@ def _hang(scene: bpy.types.Scene, collection: bpy.types.Collection, camera: bpy.
     camera.matrix_parent_inverse.identity()
     turn = Euler((math.pi / 2.0 - math.radians(TILTS["BEHIND"]), 0.0, -math.pi / 2.0))
     camera.matrix_basis = Matrix.LocRotScale([units * part for part in BEHIND], turn, None)
-
-
-def _smooth(values: np.ndarray, width: float) -> np.ndarray:
-    """Values (T, n) through a bell of standard deviation `width` frames, their ends held."""
-    reach = int(3.0 * width)
-    if reach < 1 or len(values) < 2:
-        return values
-    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    held = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    return np.stack([np.convolve(column, bell / bell.sum(), "valid") for column in held.T], axis=1)

@@ -19,7 +19,7 @@ from . import lanes, lay_strips
 from .clip_annotation import RATE
 
 if TYPE_CHECKING:
-    from ..beyond_mocap.library.proposals import Proposal
+    from ..beyond_mocap.library.proposal import Proposal
     from ..beyond_mocap.library.word_sources import Sources
 
 SAME = 0.1

@@ -8,7 +8,6 @@ W_j the core's world rotation of a joint and R_j its bone's rotation at rest, th
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from dataclasses import dataclass, field
@@ -16,9 +15,11 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from ..beyond_mocap.base.digest import hex_digest
+from ..beyond_mocap.base.vectors import nearest_axis
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion import quaternion
-from ..beyond_mocap.motion.motion import Motion, forward_kinematics
+from ..beyond_mocap.motion.motion import Motion, forward_kinematics, local_rotations
 from ..beyond_mocap.motion.skeleton import Skeleton
 from . import action, armature, bone_maps, channels
 from .measure import units_per_metre
@@ -163,9 +164,9 @@ class Driven:
         faces +X."""
         legs = self._heads("left upper_leg", "right upper_leg")
         feet = self._heads("left foot", "right foot")
-        up = _nearest_axis(legs.mean(axis=0) - feet.mean(axis=0))
+        up = nearest_axis(legs.mean(axis=0) - feet.mean(axis=0))
         across = legs[0] - legs[1]
-        left = _nearest_axis(across - (across @ up) * up)
+        left = nearest_axis(across - (across @ up) * up)
         return quaternion.from_matrix(np.stack([np.cross(left, up), left, up]))
 
     def _metres(self, vectors: np.ndarray) -> np.ndarray:
@@ -212,11 +213,6 @@ class Driven:
             return max(level, 0.0)  # the armature's origin lies on the floor
         tails = [self._metres(np.array(self.rig.data.bones[self.bone(part)].tail_local))[2] for part in ends]
         return float(np.clip(level - min(tails), 0.0, 0.16 * leg))
-
-
-def _nearest_axis(vector: np.ndarray) -> np.ndarray:
-    axis = int(np.argmax(np.abs(vector)))
-    return np.eye(3)[axis] * np.sign(vector[axis])
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,13 +324,13 @@ def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
     body = identify(source)
     if body.head is None or body.head not in source.end_parents or "Head" not in skeleton.names:
         return skeleton
-    rest = armature.rest_positions(source)
+    rest = source.rest_positions
     crown = source.end_offsets[source.end_parents.index(body.head)]
     across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
     trunk = rest[body.head] - 0.5 * (rest[body.left.upper_leg] + rest[body.right.upper_leg])
     if min(np.linalg.norm(v) for v in (crown, across, trunk)) < 1e-3:
         return skeleton
-    up = _nearest_axis(trunk)
+    up = nearest_axis(trunk)
     ahead = np.cross(across - (across @ up) * up, up)
     lean = np.arctan2(crown @ ahead / np.linalg.norm(ahead), crown @ up)
     if trunk @ up < 0.9 * np.linalg.norm(trunk) or abs(lean) > _MOST_LEAN:
@@ -580,12 +576,12 @@ def is_as_baked(rig: bpy.types.Object) -> bool:
 
 
 def _digest(rig: bpy.types.Object) -> str:
-    digest = hashlib.sha256()
+    parts = []
     for place, curve in sorted(channels.curves(*channels.playing(rig)).items()):
         points = np.empty(2 * len(curve.keyframe_points), np.float32)
         curve.keyframe_points.foreach_get("co", points)
-        digest.update(repr(place).encode() + points.tobytes())
-    return digest.hexdigest()
+        parts += [repr(place), points]
+    return hex_digest(*parts, digits=64)
 
 
 def _keep_own(rig: bpy.types.Object) -> list[str]:
@@ -688,7 +684,5 @@ def evaluated(body: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray
     poses = np.array(rows)
     turn = poses[:, :, :3, :3] / np.linalg.norm(poses[:, :, :3, :3], axis=2, keepdims=True)
     world = quaternion.multiply(quaternion.from_matrix(turn), quaternion.inverse(rest))
-    local = world.copy()
-    parents = list(skeleton.parents[1:])
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents]), world[:, 1:])
+    local = local_rotations(skeleton, world)
     return Motion(skeleton, poses[:, 0, :3, 3] / units_per_metre(scene), local, frames_per_second(scene))

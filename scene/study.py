@@ -12,7 +12,7 @@ import numpy as np
 
 from ..beyond_mocap.files.whole import beside, whole_folder
 from ..beyond_mocap.motion.motion import Motion
-from ..beyond_mocap.take import BallPath
+from ..beyond_mocap.motion.track.ball_path import BallPath
 from . import action, armature, ball, body, channels
 from .aside import scene_aside
 from .material import colour

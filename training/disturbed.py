@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from beyond_mocap.base.vectors import skew_matrix
 from beyond_mocap.synthesis.phase_network.chains import Chains
 from beyond_mocap.synthesis.phase_network.kinematics import Pose, places_and_turns
 
@@ -38,9 +39,7 @@ def disturbed(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> Pose
 def small_turns(vectors, xp=np):
     """Rotations (..., 3, 3) by rotation vectors (..., 3) in radians (Rodrigues)."""
     angle = xp.sqrt(xp.sum(vectors**2, -1) + 1e-12)[..., None, None]
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    zero = xp.zeros_like(x)
-    skew = xp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*vectors.shape[:-1], 3, 3)
+    skew = skew_matrix(vectors, xp)
     return (
         np.eye(3, dtype=vectors.dtype) + xp.sin(angle) / angle * skew + (1 - xp.cos(angle)) / angle**2 * (skew @ skew)
     )

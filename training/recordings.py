@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from beyond_mocap.base.digest import hex_digest
 from beyond_mocap.errors import InputError
 from beyond_mocap.synthesis.phase_network.answers import network_output
 from beyond_mocap.synthesis.phase_network.chains import Chains
@@ -34,10 +34,7 @@ class Recordings(NamedTuple):
     @property
     def digest(self) -> str:
         """A short hash of all numbers in them."""
-        digest = hashlib.sha256(repr(self.lengths).encode())
-        for one in (self.pose.root, self.pose.local, *self.window):
-            digest.update(np.ascontiguousarray(one).tobytes())
-        return digest.hexdigest()[:16]
+        return hex_digest(repr(self.lengths), self.pose.root, self.pose.local, *self.window)
 
 
 def recordings(examples: Sequence[Example], reference: np.ndarray | None = None) -> Recordings:

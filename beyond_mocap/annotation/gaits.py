@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..motion.runs import equal_runs
 
 LOCOMOTION = ("standing", "walking", "jogging", "running", "sprinting")
 """The words that speed alone decides, slow to fast; "dribble" goes with any of them when the ball is at the feet."""
@@ -90,9 +91,7 @@ def without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
     """Kinds (T,) of gait or direction with every run shorter than `frames` given to a neighbour, shortest first."""
     if not len(gaits):
         return gaits
-    edges = np.flatnonzero(np.diff(gaits)) + 1
-    starts = [0, *edges.tolist()]
-    runs = [[stop - start, int(gaits[start])] for start, stop in zip(starts, [*starts[1:], len(gaits)])]
+    runs = [[stop - start, int(gaits[start])] for start, stop in equal_runs(gaits)]
     while len(runs) > 1:
         short = min(range(len(runs)), key=lambda i: runs[i][0])
         if runs[short][0] >= frames:

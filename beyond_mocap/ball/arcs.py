@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from . import batch
 from .aim import CLOSE, aim
 from .physics import Ball, length
 
-_TIMES = 28
+_TIMES = 28  # flight times tried, evenly spaced in their logarithm
 _ELEVATIONS = np.radians(np.arange(0.0, 76.0, 5.0))  # above the line to the target
 _SLACK = 1.03  # on a speed, for what lies between elevations
 _LONGEST = 2.0  # times the flight of the slowest launch where there is no air: sqrt(2 far / gravity)
@@ -32,7 +33,7 @@ class Arcs:
 
     def at(self, speed: float) -> np.ndarray:
         """(3,) m/s: the launch of that speed, as far as there is one."""
-        return np.array([np.interp(speed, self.speeds, column) for column in self.velocities.T])
+        return interpolate(speed, self.speeds, self.velocities)
 
 
 def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | None = None) -> Arcs:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vector, unit_vectors
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
@@ -25,7 +26,7 @@ WORDS = {"foot": "foot", "head": "head", "chest": "chest", "hand": "throw"}
 JOINT_RADIUS = 0.06
 """Metres around a joint that strikes, where it is none of PARTS."""
 
-_SECONDS = 1.0 / 120.0
+_SECONDS = 1.0 / 120.0  # to either side, over which a part's speed is measured
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def _tool(skeleton: Skeleton, side: str, tool: Tool) -> Surface:
     hand = getattr(identify(skeleton), side).hand
     if hand is None:
         raise InputError("part", f"a tool in the {side} hand, which the skeleton lacks", "a skeleton with hands")
-    along = skeleton.offsets[hand] / max(np.linalg.norm(skeleton.offsets[hand]), 1e-9)
+    along = unit_vector(skeleton.offsets[hand])
     ends = ((hand, far * along) for far in (tool.length - tool.reach, tool.length))
     return Surface("tool", side, tool.radius, *ends)
 
@@ -115,7 +116,7 @@ def ball_centre(struck: StruckFrom, normal: np.ndarray, ball_radius: float = BAL
     along = 0.5 * (struck.end - struck.start)
     half = np.linalg.norm(along, axis=-1)
     unit = along / np.maximum(half, 1e-9)[:, None]
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+    normal = unit_vectors(normal)
     slope = np.abs(np.sum(normal * unit, axis=-1))
     apart = struck.radius + ball_radius
     beside = apart / np.maximum(np.sqrt(np.maximum(1.0 - slope**2, 0.0)), 1e-9)

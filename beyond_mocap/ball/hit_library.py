@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from hashlib import sha256
 
 import numpy as np
 
-from ..library.library import Clip, Library
+from ..base.digest import hex_digest
+from ..library.clip import Clip
+from ..library.library import Library
 from ..motion.striking import striking_part
 from . import kept
 from .contact import Tool
@@ -58,7 +59,7 @@ class HitLibrary:
     def of(library: Library, part: str = "foot", tool: Tool | None = None) -> "HitLibrary":
         """The hit motions of all clips of a library; kept beside its cache. Where words say what a clip shows, only
         what they call a touch of this part counts. InputError for a part that the skeleton lacks."""
-        name = f"hits_{sha256(repr((part, tool)).encode()).hexdigest()[:16]}"  # joints may be called Head, or a/b
+        name = f"hits_{hex_digest(repr((part, tool)))}"  # joints may be called Head, or a/b
         arrays = kept.load(library, name)
         if arrays is not None:
             return HitLibrary(part, _restored(part, arrays))

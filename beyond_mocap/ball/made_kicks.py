@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.adult import adult_skeleton
 from ..motion.arctangent import arctan2
-from ..motion.gait_tables import LEG
+from ..motion.adult import LEG
 from ..motion.kicks import BEFORE, KICKS, KickStyle, contact, kicked
 from ..motion.motion import Motion, place
 from ..motion.neutral import Neutral, neutral_stance
@@ -109,9 +110,9 @@ class _Aim:
         up, side = float(np.arctan2(target[2] - self.ball.radius + fallen, away)), 0.0
         near = False
         for number in range(_ROUNDS + 2):
-            way = _between(up, self.rising, self.ways)
+            way = interpolate(up, self.rising, self.ways)
             exact = near or number >= _ROUNDS
-            launch = self.launches_of(way[None])[0] if exact else _between(up, self.rising, self.launches)
+            launch = self.launches_of(way[None])[0] if exact else interpolate(up, self.rising, self.launches)
             centre, velocity, spin = np.split(launch, 3)
             rate = speed / float(np.linalg.norm(velocity))
             turn = float(np.arctan2(target[1], target[0]) - np.arctan2(velocity[1], velocity[0])) + side
@@ -135,11 +136,6 @@ class _Aim:
 def _slopes(ends: np.ndarray) -> np.ndarray:
     """Sines (N,) of how steeply feet with ends (N, 2, 3) point down."""
     return (ends[:, 0, 2] - ends[:, 1, 2]) / np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
-
-
-def _between(value: float, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """The row (C,) at `value`, linear between `rows` (N, C) at rising `values` (N,)."""
-    return np.array([np.interp(value, values, column) for column in rows.T])
 
 
 def _touching(ends: np.ndarray, velocity: np.ndarray, radius: float) -> np.ndarray:

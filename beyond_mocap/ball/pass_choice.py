@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
@@ -23,14 +24,14 @@ from .pass_costs import (
     TIMES, TRUNK_TO, UPRIGHT, against_the_part, arrivals, cost_of_moments, lasting, misses, rising, spun, through_body,
     ways_of, wished,
 )  # fmt: skip
-from .pass_court import ON_TARGET, Court, Link, Natural, Site, turned, unit
+from .pass_court import ON_TARGET, Court, Link, Natural, Site, turned
 from .pass_scene import GROUND, Pass
 from .strike_moments import StrikeMoments, launched_from
 
 TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Radians by which a body may face beside where its motion sends the ball by itself."""
 
-EIGHTH = 0.25 * np.pi
+EIGHTH = 0.25 * np.pi  # rad: an eighth of a whole turn
 MOST_OPTIONS, MOST_OF_A_HIT, MOST_TIMES = 8, 2, 4
 CHANCE, AGAIN = 0.4, 0.6
 """m/s by which chance tells hit motions apart that are as good, and what each use before by the same player costs."""
@@ -183,8 +184,8 @@ def _tried(
     """Flights from `option` (N,) that take `seconds` (N,), and what each costs."""
     site, one, receiver = court.sites[number], court.passes[number], court.sites[number + 1]
     natural = wished(options.velocities(), site.kind)
-    starts = options.centres(site, unit(natural), court.ball.radius)[option]
-    target = court.ball_on(number + 1, after, unit(-natural[0] * [1.0, 1.0, 0.0]))
+    starts = options.centres(site, unit_vectors(natural), court.ball.radius)[option]
+    target = court.ball_on(number + 1, after, unit_vectors(-natural[0] * [1.0, 1.0, 0.0]))
     spin = spun(starts, target, seconds, court.ball, site.kind)
     aimed = aim(starts, target, court.ball, seconds, one.bounces, spin, fastest=court.fastest(number))
     flights = (starts, aimed.velocity, spin, seconds)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import cross_level
 from .batch import after, launched
 from .pass_scene import Net
 from .physics import Ball, rolling_spin
@@ -49,8 +50,8 @@ TRUNK_TO = {"head": 1.35, "chest": 0.0}
 UPRIGHT = 1.7
 """Metres up to which a ball stays clear of the body of who strikes it, by what he strikes with, else UPRIGHT."""
 
-A_MOMENT = 1e-3
-_STEPS = 30
+A_MOMENT = 1e-3  # s before a ball arrives at which its speed is read
+_STEPS = 30  # pieces into which a flight is cut
 
 
 def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarray) -> np.ndarray:
@@ -148,7 +149,7 @@ def clears_net(ways: np.ndarray, radius: float, net: Net) -> np.ndarray:
     """(N,) bool: whether balls of `radius` m on their ways (N, S, 3) m go over the net wherever they cross it."""
     start, end = np.array(net.start), np.array(net.end)
     along = end - start
-    aside = _cross(along, ways[..., :2] - start) / np.linalg.norm(along)
+    aside = cross_level(along, ways[..., :2] - start) / np.linalg.norm(along)
     crosses = (aside[:, :-1] > 0.0) != (aside[:, 1:] > 0.0)
     share = aside[:, :-1] / np.where(crosses, aside[:, :-1] - aside[:, 1:], 1.0)
     at = ways[:, :-1] + np.clip(share, 0.0, 1.0)[..., None] * (ways[:, 1:] - ways[:, :-1])
@@ -156,7 +157,3 @@ def clears_net(ways: np.ndarray, radius: float, net: Net) -> np.ndarray:
     width = radius / np.linalg.norm(along)
     hit = crosses & (on > -width) & (on < 1.0 + width) & (at[..., 2] < net.height + radius)
     return ~hit.any(axis=1)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -171,11 +171,6 @@ class Court:
         return out
 
 
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of length 1."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
-
-
 def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
     """Vectors (N, 3) turned by `angle` rad about the vertical."""
     return quaternion.rotate(quaternion.about_up(np.array([angle])), vectors)

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from .aim import aim
 from .flight import Launch
 from .pass_costs import arrivals, spun
-from .pass_court import LONGEST_SERVE, ON_TARGET, Court, Link, turned, unit
+from .pass_court import LONGEST_SERVE, ON_TARGET, Court, Link, turned
 from .pass_scene import GROUND
 
 BESIDE = 0.45
@@ -45,7 +46,8 @@ class Flown:
 
 def laid(court: Court, chain: Sequence[Link]) -> tuple[np.ndarray, np.ndarray]:
     """Places m and normals (K, 3) of the balls as if each part pushed its ball the way that it moves."""
-    return _laid(court, chain, np.array([unit(turned(link.moment.struck.velocity, link.facing))[0] for link in chain]))
+    ways = np.array([turned(link.moment.struck.velocity, link.facing)[0] for link in chain])
+    return _laid(court, chain, unit_vectors(ways))
 
 
 def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) -> tuple[list[Link], Flown]:
@@ -55,11 +57,11 @@ def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) ->
     for _ in range(ROUNDS):
         leaving, spin, missed = _between(court, chain, places)
         _, arriving = _arriving(court, chain, places, (first, serving), leaving, spin)
-        places, _ = _laid(court, chain, unit(np.concatenate([leaving, np.zeros((1, 3))]) - arriving))
+        places, _ = _laid(court, chain, unit_vectors(np.concatenate([leaving, np.zeros((1, 3))]) - arriving))
         chain = _within_reach(court, chain, places, missed)
     leaving, spin, missed = _between(court, chain, places, last=True)
     serve, arriving = _arriving(court, chain, places, (first, serving), leaving, spin)
-    normals = unit(np.concatenate([leaving, np.zeros((1, 3))]) - arriving)
+    normals = unit_vectors(np.concatenate([leaving, np.zeros((1, 3))]) - arriving)
     return chain, Flown(serve, places, normals, arriving, leaving, spin, missed)
 
 

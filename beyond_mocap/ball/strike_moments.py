@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..library.library import Library
 from ..motion import quaternion
 from .contact import StruckFrom, Tool, ball_centre, in_world, struck_from, striking_surface
@@ -60,7 +61,7 @@ class StrikeMoments:
         back = np.sum(normal * along, axis=-1, keepdims=True)
         spare = np.where(long > 1e-6, np.minimum(back + _BACK_ON_LIMB, 0.0), 0.0)
         out = normal - spare * along
-        return out / np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-9)
+        return unit_vectors(out)
 
 
 def strike_moments(
@@ -97,6 +98,6 @@ def launched_from(moments: StrikeMoments, place: np.ndarray, facing: np.ndarray,
     """Places (N, 3) m and velocities (N, 3) m/s with which a ball naturally leaves the parts of a body at `place` (2,)
     that faces `facing` (N,) rad: off the part's surface where it goes, as fast as the part."""
     velocity = moments.struck.velocity
-    own = moments.ball(velocity / np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-9), radius)
+    own = moments.ball(unit_vectors(velocity), radius)
     return in_world(own, place, facing), quaternion.rotate(quaternion.about_up(facing), velocity)
 

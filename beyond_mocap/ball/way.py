@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions
@@ -125,7 +126,7 @@ class Placed:
         own = own * self.library.fps / self._fps
         own = np.clip(own, 0.0, frames.count[clip] - 1.0)
         inside = values[frames.first[clip] : frames.first[clip] + frames.count[clip]]
-        return np.stack([np.interp(own, np.arange(len(inside)), column) for column in inside.T], axis=1)
+        return interpolate(own, np.arange(len(inside)), inside)
 
 
 def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[Placed]:

@@ -30,7 +30,7 @@ def add(verbs):
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`passes`: plays the scene and writes its players, its ball and what came of it."""
     from ..files.scene_json import read_scene
-    from ..library.library import build
+    from ..library.build import build
     from ..passes import ball_of, passes
 
     begun = time.perf_counter()
@@ -130,7 +130,8 @@ def _of_player(player) -> dict:
 def _write(folder: Path, played, table: list[dict], report: dict) -> None:
     from ..files import bvh
     from ..files.strikes_csv import write_strikes
-    from ..files.tables import write_ball, write_provenance, write_report
+    from ..files.tables import write_ball, write_report
+    from ..synthesis.provenance import write_provenance
 
     folder.mkdir(exist_ok=True)
     for player in played.players:

@@ -89,7 +89,8 @@ def _unit(clip, options) -> str:
 
 
 def _write_tables(options, take, report: dict | None) -> None:
-    from ..files.tables import write_provenance, write_report
+    from ..synthesis.provenance import write_provenance
+    from ..files.tables import write_report
 
     if options.provenance:
         write_provenance(options.provenance, take)

@@ -165,7 +165,7 @@ class _Player:
         """Library, track and annotations read."""
         from ..annotation import Timeline, read_timeline
         from ..files.tracking import read_track_csv
-        from ..library.library import build
+        from ..library.build import build
         from ..motion.track import clean
         from ..plan import Plan
 
@@ -198,15 +198,17 @@ class _Player:
 
     def joined(self, thrown, told: Told):
         """The throw within the player's motion, and lines for people."""
-        from ..joined_throw import EDGE, laid_into, run_up_and_recovery, without_waiting
         from ..throw import within
+        from ..throws.join_throw import join_throw, trim_waiting
+        from ..throws.run_up import EDGE, construct_run_up
 
-        motion, release = without_waiting(thrown.motion, thrown.release, EDGE)
+        motion, release = trim_waiting(thrown.motion, thrown.release, EDGE)
         first = round((thrown.release - release) * thrown.motion.fps)
         shift = thrown.shift[first : first + len(motion)]
         thrown = replace(thrown, motion=motion, release=release, shift=shift)
-        way = run_up_and_recovery(
-            self.library, self.plan, thrown.motion, thrown.release, self.at, self.action, told.progress, told.cancelled
+        way = construct_run_up(
+            self.library, self.plan, thrown.motion, thrown.release, self.at, action=self.action,
+            progress=told.progress, cancelled=told.cancelled,
         )
-        laid = laid_into(way.motion, way.start, thrown.motion, thrown.release, self.at)
+        laid = join_throw(way.motion, way.start, thrown.motion, thrown.release, at=self.at)
         return within(thrown, laid.motion, laid.start, laid.release, laid.first), [*way.warnings, *laid.warnings]

@@ -35,7 +35,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.tables import write_ball, write_report
     from ..files.touches_csv import write_touches
     from ..solve_ball import solve_ball
-    from ..take import BallPath
+    from ..motion.track.ball_path import BallPath
 
     begun = time.perf_counter()
     check_outputs(options.out, options.ball, options.report, never=(options.input, options.meta))

@@ -9,13 +9,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..base.time_series import time_derivative
 from ..motion import contacts as foot_contacts
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.track import zero_phase_hann
 from . import feet, jerk, root
 
-MISSED = 0.005
+MISSED = 0.005  # m beside its target from which a limb counts as not having reached it
 _DENSE = 0.01  # metres between the places of the path that a pelvis is compared with
 _MOVING = 0.3  # m/s below which a body stands, and no speed is kept
 
@@ -93,7 +94,7 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
         free &= np.abs(there - seam) > 0.75 * fps
     path = np.abs(step[free] / asked[free] - 1.0)
     speeds = [
-        np.linalg.norm(root.velocity(zero_phase_hann(p[:, :2], rate, root.ROOT_WINDOW), rate), axis=1)
+        np.linalg.norm(time_derivative(zero_phase_hann(p[:, :2], rate, root.ROOT_WINDOW), rate), axis=1)
         for p, rate in ((pelvis, fps), (own, source.motion.fps))
     ]
     mine, his = speeds[0][:-1][free], speeds[1][frames][:-1][free]

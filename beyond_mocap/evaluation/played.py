@@ -15,7 +15,8 @@ from ..library.made import MADE_FOLDER
 from ..motion import contacts as foot_contacts
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, forward_kinematics
-from ..take import BallPath, KeyResult, Take
+from ..motion.track.ball_path import BallPath
+from ..take import KeyResult, Take
 from .feet import foot_joints
 
 

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.time_series import time_derivative
 from ..library.features import feature_joints, raw_features
+from ..motion import quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions
 from ..motion.skeleton import Skeleton
-from .root import nearest_known, speed_class, velocity
+from .root import nearest_known, speed_class
 
-VELOCITY_SECONDS = 0.12
-_ROWS_AT_ONCE = 512
+VELOCITY_SECONDS = 0.12  # weighs m/s against metres, as `library.features.HORIZON`
+_ROWS_AT_ONCE = 512  # of distances, which bounds the memory
 
 
 def local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
@@ -30,9 +32,7 @@ def ground_point(positions: np.ndarray, joint: int) -> np.ndarray:
 
 def turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Vectors (T, J, 3) turned about Z by one angle per frame (T,) radians; float32."""
-    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([c * x - s * y, s * x + c * y, vectors[..., 2]], axis=-1).astype(np.float32)
+    return quaternion.turned_about_up(vectors, angle[:, None]).astype(np.float32)
 
 
 def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: int) -> np.ndarray:
@@ -43,7 +43,7 @@ def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: i
     then the root mean square over joints.
     """
     places = local_positions(skeleton, positions, hips)
-    moves = turned(velocity(positions, fps), -heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
+    moves = turned(time_derivative(positions, fps), -heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
     both = np.concatenate([places, moves], axis=1).reshape(len(positions), -1)
     return both / np.float32(np.sqrt(len(skeleton)))
 

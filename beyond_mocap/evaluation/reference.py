@@ -16,7 +16,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..errors import InputError
-from ..library.library import Clip, Library
+from ..library.clip import Clip
+from ..library.library import Library
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
 from . import feet, jerk, realism, root

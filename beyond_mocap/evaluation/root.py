@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.time_series import interpolate, time_derivative
+from ..base.vectors import unit_vectors
 from ..motion.track import Track, zero_phase_hann
 
-ROOT_WINDOW = 1.5
-TRAVEL_WINDOW = 1.0
-STANDING = 0.5
-SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)
+ROOT_WINDOW = 1.5  # s
+TRAVEL_WINDOW = 1.0  # s
+STANDING = 0.5  # m/s: slower counts as standing
+SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `speed_class`
 
 
 def track_at(track: Track, at: np.ndarray) -> np.ndarray:
@@ -25,7 +27,7 @@ def track_at(track: Track, at: np.ndarray) -> np.ndarray:
     known = track.measured
     if not known.any():
         return np.full((len(at), 2), np.nan)
-    return np.stack([np.interp(at, track.times[known], track.positions[known, axis]) for axis in (0, 1)], axis=-1)
+    return interpolate(at, track.times[known], track.positions[known])
 
 
 def root_error(pelvis: np.ndarray, track: np.ndarray, fps: float) -> np.ndarray:
@@ -46,16 +48,9 @@ def sway(pelvis: np.ndarray, fps: float) -> np.ndarray:
     return pelvis_error(pelvis, zero_phase_hann(pelvis, fps, ROOT_WINDOW))
 
 
-def velocity(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Central differences (one-sided at the ends) of positions (T, ...) m: (T, ...) m/s; zero for a single frame."""
-    if len(positions) < 2:
-        return np.zeros_like(positions)
-    return np.gradient(positions, axis=0) * fps
-
-
 def travel_speed(pelvis: np.ndarray, fps: float) -> np.ndarray:
     """Speed (T,) m/s of a pelvis or track (T, 2) behind a 1 s Hann window: how fast the body gets about."""
-    return np.linalg.norm(velocity(zero_phase_hann(pelvis, fps, TRAVEL_WINDOW), fps), axis=-1)
+    return np.linalg.norm(time_derivative(zero_phase_hann(pelvis, fps, TRAVEL_WINDOW), fps), axis=-1)
 
 
 def speed_class(speed: np.ndarray) -> np.ndarray:
@@ -69,9 +64,9 @@ def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
     The path's direction is that of the velocity behind the same window. Its rms guards against buying still feet with a
     surging pelvis.
     """
-    speed = velocity(pelvis, fps)
+    speed = time_derivative(pelvis, fps)
     course = zero_phase_hann(speed, fps, ROOT_WINDOW)
-    course = course / np.maximum(np.linalg.norm(course, axis=-1, keepdims=True), 1e-9)
+    course = unit_vectors(course)
     along = np.sum(speed * course, axis=-1, keepdims=True)
     return (along - zero_phase_hann(along, fps, ROOT_WINDOW))[:, 0]
 

@@ -11,9 +11,8 @@ unrotated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Mapping
 
 import numpy as np
 
@@ -22,48 +21,17 @@ from ..motion import quaternion
 from ..motion.humanoid import Humanoid, heading
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
+from ..motion.structure import below
 from . import bvh_scale, bvh_text
+from .bvh_form import BvhForm, RootAbove
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import document
 from .whole import beside
 
-_STILL_METRES = 1e-3
-_STILL_ROTATION = np.cos(np.radians(0.1) / 2)
-_LARGEST_METRES = 1e6
-_NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]
-
-
-@dataclass(frozen=True)
-class RootAbove:
-    """A joint that stood above the hips, from the file's root down.
-
-    moves: whether it travelled with the body (LAFAN1's SimulationBone) instead of standing still (Bandai's joint_Root).
-    position: (3,) metres, rotation: (4,), relative to the joint above it; constant, of the first frame where it moves.
-    heading: radians from the body's facing to this joint's, where it moves. carries: (3,) metres, the hips' place in
-    it, where it stands right above hips that have no position channels of their own.
-    """
-
-    name: str
-    channels: tuple[str, ...]
-    moves: bool
-    position: np.ndarray
-    rotation: np.ndarray
-    heading: float = 0.0
-    carries: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
-class BvhForm:
-    """What writing back needs beyond the motion.
-
-    channels: each joint's channel names in order. above: joints above the hips. unit: metres per file unit, and up: "Y"
-    or "Z", as read (files are always written in centimetres with Y up).
-    """
-
-    channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    above: tuple[RootAbove, ...] = ()
-    unit: float = 0.01
-    up: str = "Y"
+_STILL_METRES = 1e-3  # what moves less is written as still
+_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a turn by a tenth of a degree
+_LARGEST_METRES = 1e6  # larger numbers are a wrong unit or a broken file
+_NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
 
 
 @dataclass(frozen=True)
@@ -89,7 +57,7 @@ def read(path, unit: float | None = None) -> BvhClip:
     scale = bvh_scale.guess(text, unit)
     channels = _Channels(text, scale)
     hips = _top_of_body(text, scale.body)
-    kept = _below(text.parents, hips)
+    kept = below(text.parents, hips)
     root, root_rotations, above = _folded(channels, hips)
     skeleton, drift = _skeleton(channels, kept)
     rotations = np.stack([root_rotations.T] + [channels.rotation(joint) for joint in kept[1:]])
@@ -130,7 +98,7 @@ class BvhRows:
         self.scale = bvh_scale.guess(text, unit)
         channels = _Channels(text, self.scale)
         self.hips = _top_of_body(text, self.scale.body)
-        self.kept = _below(text.parents, self.hips)
+        self.kept = below(text.parents, self.hips)
         self.skeleton = _skeleton(channels, self.kept)[0]
 
     def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -171,17 +139,8 @@ def _top_of_body(text: BvhText, body: Humanoid | None) -> int:
     """The joint that becomes the root: the hips where both legs hang on them, else the file's root."""
     if body is None:
         return 0
-    below = set(_below(text.parents, body.hips))
-    return body.hips if {body.left.upper_leg, body.right.upper_leg} <= below else 0
-
-
-def _below(parents: tuple[int, ...], top: int) -> list[int]:
-    """`top` and every joint that hangs on it, in file order."""
-    below = {top}
-    for joint, parent in enumerate(parents):
-        if parent in below:
-            below.add(joint)
-    return sorted(below)
+    hanging = set(below(text.parents, body.hips))
+    return body.hips if {body.left.upper_leg, body.right.upper_leg} <= hanging else 0
 
 
 def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[RootAbove, ...]]:

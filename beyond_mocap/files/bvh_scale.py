@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from ..errors import InputError
 from ..motion.humanoid import Humanoid, identify, leg_length
 from ..motion.motion import pose_kinematics
@@ -15,11 +16,11 @@ from .bvh_text import POSITIONS, BvhText
 # a file axis -> our axis and the sign of a turn about it; a file with Y up is laid back by a quarter turn about X
 TURNS = {"Y": {"X": (0, 1.0), "Y": (2, 1.0), "Z": (1, -1.0)}, "Z": {"X": (0, 1.0), "Y": (1, 1.0), "Z": (2, 1.0)}}
 _HIP_HEIGHT = (0.75, 1.15)  # metres, adults standing
-_LEG_LENGTH = 0.88
+_LEG_LENGTH = 0.88  # m, an adult's of 1.80 m
 # centimetres, metres, inches, CMU's (1 inch / 0.45 in hundredths of it), millimetres, feet, decimetres
 _USUAL_UNITS = (0.01, 1.0, 0.0254, 0.05644, 0.001, 0.3048, 0.1)
-_UPRIGHT = np.cos(np.radians(35.0))
-_SAMPLES = 64
+_UPRIGHT = np.cos(np.radians(35.0))  # height of a unit vector from the feet to the head of a body that stands
+_SAMPLES = 64  # frames that are looked at
 
 
 @dataclass(frozen=True)
@@ -105,12 +106,12 @@ def _sampled(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
 
 def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
     """ "Y" or "Z" from posed (N, J, 3) and rest (J, 3) positions that were turned as if Y were up."""
-    top = next(j for j in (body.head, body.neck, body.chest) if j is not None)
+    top = body.head_or_neck
     feet = [body.left.foot, body.right.foot]
     votes = {"Y": 0.0, "Z": 0.0}
     for positions, weight in ((posed, 1.0), (rest, 0.5)):
         rise = positions[..., top, :] - positions[..., feet, :].mean(axis=-2)
-        rise = rise / np.maximum(np.linalg.norm(rise, axis=-1, keepdims=True), 1e-9)
+        rise = unit_vectors(rise)
         votes["Y"] += weight * np.mean(rise[..., 2] > _UPRIGHT)
         votes["Z"] += weight * np.mean(-rise[..., 1] > _UPRIGHT)
     return "Z" if votes["Z"] > votes["Y"] else "Y"

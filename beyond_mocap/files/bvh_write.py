@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Iterator
+from typing import Iterator
 
 import numpy as np
 
@@ -11,10 +11,8 @@ from ..motion import quaternion
 from ..motion.humanoid import heading
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
+from .bvh_form import BvhForm, RootAbove
 from .bvh_text import POSITIONS, ROTATIONS
-
-if TYPE_CHECKING:
-    from .bvh import BvhForm, RootAbove
 
 _CENTIMETRES = 100.0
 _ZXY = ("Zrotation", "Xrotation", "Yrotation")
@@ -39,7 +37,7 @@ class _Joint:
     added: tuple[str, ...]
 
 
-def document(motion: Motion, form: "BvhForm") -> tuple[Iterator[str], tuple[str, ...]]:
+def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, ...]]:
     """The file's text in pieces, and a note per joint that needed more channels than `form` gives it."""
     joints = _above(motion, form.above)
     root, rotation = _hips_below(motion, form.above)
@@ -110,7 +108,7 @@ def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
         waiting += [(child, depth + 1) for child in reversed(children[joint])]
 
 
-def _chain(motion: Motion, above: tuple["RootAbove", ...]) -> list[tuple[np.ndarray, np.ndarray]]:
+def _chain(motion: Motion, above: tuple[RootAbove, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Positions (T, 3) and rotations (T, 4) in the world of the joints above the hips, and of what they stand in first.
 
     The topmost one that moved is put below the hips, turned to the body's facing; the others keep their places on it.
@@ -137,7 +135,7 @@ def _relative(world, parent) -> tuple[np.ndarray, np.ndarray]:
     return quaternion.rotate(back, world[0] - parent[0]), quaternion.multiply(back, world[1])
 
 
-def _above(motion: Motion, above: tuple["RootAbove", ...]) -> list[_Joint]:
+def _above(motion: Motion, above: tuple[RootAbove, ...]) -> list[_Joint]:
     """The joints that stood above the hips, put back."""
     worlds, out = _chain(motion, above) if above else [], []
     for depth, (joint, parent, world) in enumerate(zip(above, worlds, worlds[1:])):
@@ -147,7 +145,7 @@ def _above(motion: Motion, above: tuple["RootAbove", ...]) -> list[_Joint]:
     return out
 
 
-def _hips_below(motion: Motion, above: tuple["RootAbove", ...]) -> tuple[np.ndarray, np.ndarray]:
+def _hips_below(motion: Motion, above: tuple[RootAbove, ...]) -> tuple[np.ndarray, np.ndarray]:
     """The hips' positions (T, 3) and rotations (T, 4) relative to the joints above them."""
     hips = (motion.root_positions, motion.rotations[:, 0])
     return _relative(hips, _chain(motion, above)[-1]) if above else hips

@@ -12,99 +12,35 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
 from ..errors import InputError
 from ..motion.skeleton import frozen_array
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
 from .content import content
 from .whole import atomic_write
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
-PROVENANCE_COLUMNS = (
-    "frame", "time_s", "clip", "clip_frame", "mirrored", "labels", "contact_left", "contact_right",
-)  # fmt: skip
 _FARTHEST = 1e4  # metres
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ": "spaces"}
 _WITH_COMMA = re.compile(r"^([+-]?\d*),(\d*(?:[eE][+-]?\d+)?)$")
 _LATEST = 1e11  # seconds: feeds count from kick-off, some from 1970
 
 
-@dataclass(frozen=True, eq=False)
-class Provenance:
-    """Where each of T output frames came from: times (T,) s; clip, T paths as below the library; clip_frame (T,)
-    fractional, in the clip's own rate; mirrored (T,) bool; words, T tuples; contacts (T, 2) bool, left and right foot
-    on the ground."""
-
-    times: np.ndarray
-    clip: tuple[str, ...]
-    clip_frame: np.ndarray
-    mirrored: np.ndarray
-    words: tuple[tuple[str, ...], ...]
-    contacts: np.ndarray
-
-    def __post_init__(self):
-        for name, kind in (("times", float), ("clip_frame", float), ("mirrored", bool), ("contacts", bool)):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), kind))
-
-    def __len__(self) -> int:
-        return len(self.times)
-
-
-def provenance_of(take: Take) -> Provenance:
-    """The provenance that a take carries."""
-    return Provenance(
-        times=take.start_time + np.arange(len(take.motion)) / take.motion.fps,
-        clip=tuple(take.clips[index] for index in take.clip),
-        clip_frame=take.clip_frame,
-        mirrored=take.mirrored,
-        words=tuple(map(tuple, take.words)),
-        contacts=take.contacts,
-    )
-
-
-def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
-    """Writes `frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right`, one row per output frame."""
-    table = provenance_of(take) if isinstance(take, Take) else take
-    columns = zip(
-        (f"{time:.6f}" for time in table.times),
-        table.clip,
-        (f"{frame:.4f}" for frame in table.clip_frame),
-        table.mirrored.astype(int),
-        (" ".join(words) for words in table.words),
-        *table.contacts.astype(int).T,
-    )
-    atomic_write(path, _csv_text(PROVENANCE_COLUMNS, ((i, *row) for i, row in enumerate(columns))))
-
-
-def read_provenance(path: str | os.PathLike) -> Provenance:
-    """The table that `write_provenance` wrote; InputError with the line of a row that is not of that form."""
-    rows = list(read_rows(path, PROVENANCE_COLUMNS))
-    return Provenance(
-        times=_column(rows, "time_s"),
-        clip=tuple(row["clip"] for _, row in rows),
-        clip_frame=_column(rows, "clip_frame"),
-        mirrored=_flags(rows, "mirrored"),
-        words=tuple(tuple(row["labels"].split()) for _, row in rows),
-        contacts=np.column_stack([_flags(rows, "contact_left"), _flags(rows, "contact_right")]),
-    )
-
-
 def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
     """Writes `time_s,x_m,y_m,z_m,measured`; a position that is not known leaves its cells empty."""
     rows = zip(ball.times, *np.asarray(ball.positions).T, np.asarray(ball.measured).astype(int))
-    text = _csv_text(BALL_COLUMNS, ((f"{t:.6f}", _metres(x), _metres(y), _metres(z), m) for t, x, y, z, m in rows))
+    text = format_csv(BALL_COLUMNS, ((f"{t:.6f}", _metres(x), _metres(y), _metres(z), m) for t, x, y, z, m in rows))
     atomic_write(path, text)
 
 
 def read_ball(path: str | os.PathLike) -> BallPath:
     """The table that `write_ball` wrote; InputError with the line of a row that is not of that form."""
     rows = list(read_rows(path, BALL_COLUMNS))
-    positions = np.column_stack([_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
-    times, measured = _column(rows, "time_s"), _flags(rows, "measured")
+    positions = np.column_stack([parse_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
+    times, measured = parse_column(rows, "time_s"), parse_flags(rows, "measured")
     return BallPath(frozen_array(times), frozen_array(positions), frozen_array(measured, bool))
 
 
@@ -223,11 +159,23 @@ def _check_header(names: list[str], required: Sequence[str], path) -> None:
         raise InputError(f"{path}:1", "a column twice", "each column once")
 
 
-def _column(rows, name: str, blank: bool = False) -> np.ndarray:
+def parse_column(rows, name: str, blank: bool = False) -> np.ndarray:
     return np.array([number(row[name], name, place, blank) for place, row in rows], dtype=float)
 
 
-def _flags(rows, name: str) -> np.ndarray:
+def parse_flags(rows, name: str) -> np.ndarray:
+    """Reads a column of 0 and 1.
+
+    Args:
+        rows: (place, row) pairs as `read_rows` yields them.
+        name: of the column.
+
+    Returns:
+        (N,) bool.
+
+    Raises:
+        InputError: where a cell holds anything else.
+    """
     for place, row in rows:
         if row[name] not in ("0", "1"):
             raise InputError(place, f"{name} {row[name]!r}", "0 or 1")
@@ -238,7 +186,7 @@ def _metres(value: float) -> str:
     return f"{value:.4f}" if math.isfinite(value) else ""
 
 
-def _csv_text(header: Sequence[str], rows: Iterable[Sequence]) -> str:
+def format_csv(header: Sequence[str], rows: Iterable[Sequence]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)

@@ -7,7 +7,6 @@ processes that build at once do no harm: the later one wins with the same conten
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import tempfile
@@ -17,9 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import ClipAnnotation
+from ..base.digest import byte_digest
 from ..errors import InputError
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
+from .clip import Clip
 from .clusters import Clusters
 from .features import Frames
 from .repair import Mended
@@ -35,14 +36,14 @@ _FRAME_ARRAYS = (
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
     """A hash of names and contents of all files that a build reads, the options, and this file's VERSION."""
-    digest = hashlib.blake2b(json.dumps([VERSION, str(np.__version__), options], sort_keys=True).encode())
+    parts = [json.dumps([VERSION, str(np.__version__), options], sort_keys=True)]
     for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
-        digest.update(os.fsencode(os.path.relpath(path, folder)) + b"\0")
+        parts.append(os.fsencode(os.path.relpath(path, folder)) + b"\0")
         try:
-            digest.update(hashlib.blake2b(Path(path).read_bytes()).digest())
+            parts.append(byte_digest(Path(path).read_bytes(), size=64))
         except OSError:
-            digest.update(b"unreadable")
-    return digest.hexdigest()[:32]
+            parts.append(b"unreadable")
+    return byte_digest(*parts, size=64).hex()[:32]
 
 
 def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
@@ -61,7 +62,7 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
 
 def own_folder(base: Path, folder: Path) -> Path:
     """The folder below `base` in which the library of `folder` is kept apart from all others."""
-    return base / hashlib.blake2b(str(folder.absolute()).encode()).hexdigest()[:16]
+    return base / byte_digest(str(folder.absolute()), size=64).hex()[:16]
 
 
 def save(place: Path, key: str, library, name: str = "library") -> bool:
@@ -112,8 +113,17 @@ def _header(key: str, library) -> dict:
     }
 
 
-def load(place: Path, key: str, name: str = "library"):
-    """The cached library, or None where there is none, it belongs to other content, or it is damaged."""
+def load(place: Path, key: str, name: str = "library") -> dict | None:
+    """Reads the fields of a cached library.
+
+    Args:
+        place: the cache's folder.
+        key: fingerprint of the content that it must belong to.
+        name: of the file, without its ending.
+
+    Returns:
+        The fields of a `Library` but its folder, or None where the cache is missing, damaged or of other content.
+    """
     try:
         with np.load(place / f"{name}.npz", allow_pickle=False) as arrays:
             header = json.loads(arrays["header"].tobytes())
@@ -124,9 +134,8 @@ def load(place: Path, key: str, name: str = "library"):
         return None
 
 
-def _restore(header: dict, arrays: dict):
-    from .library import Clip, Library
-
+def _restore(header: dict, arrays: dict) -> dict:
+    """The fields of a library but its folder."""
     skeleton = Skeleton(
         header["names"], header["parents"], arrays["offsets"], header["end_parents"], arrays["end_offsets"]
     )
@@ -145,4 +154,7 @@ def _restore(header: dict, arrays: dict):
         length: Clusters(length, *(arrays[f"clusters.{length}.{name}"] for name in ("start", "label", "medoid")))
         for length in header["lengths"]
     }
-    return Library("", skeleton, tuple(clips), frames, clusters, header["fps"], tuple(header["notes"]))
+    return {
+        "skeleton": skeleton, "clips": tuple(clips), "frames": frames, "clusters": clusters, "fps": header["fps"],
+        "notes": tuple(header["notes"]),
+    }  # fmt: skip

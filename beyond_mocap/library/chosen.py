@@ -14,7 +14,8 @@ import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION
 from ..errors import InputError
-from .library import Clip, Library, gait_word
+from .clip import Clip
+from .library import Library, gait_word
 
 _WHERE = "--gait"
 

@@ -13,15 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.time_series import time_derivative
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import at_frames, pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 
-HORIZON = 0.12
-ENERGY = 0.98
-SMOOTH_SECONDS = 0.7
+FPS = 30.0  # of every library
+HORIZON = 0.12  # s: weighs m/s and m/s^2 against metres
+ENERGY = 0.98  # share of the variance that the principal components keep
+SMOOTH_SECONDS = 0.7  # Hann window that takes the sway out of the root's path
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +87,8 @@ def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.n
     The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided
     by the root of K, so that a distance is the root mean square over joints.
     """
-    velocity = _gradient(positions, fps)
-    acceleration = _gradient(velocity, fps)
+    velocity = time_derivative(positions, fps)
+    acceleration = time_derivative(velocity, fps)
     relative = positions.copy()
     relative[:, :, :2] -= positions[:, :1, :2]
     turn = quaternion.about_up(-heading)[:, None]
@@ -97,13 +99,6 @@ def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.n
     ]
     flat = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
     return flat[:, 2:] / np.sqrt(positions.shape[1])
-
-
-def _gradient(values: np.ndarray, fps: float) -> np.ndarray:
-    """Central differences over time, one-sided at the ends: (T, ...) -> (T, ...) per second."""
-    if len(values) < 2:
-        return np.zeros_like(values)
-    return np.gradient(values, axis=0) * fps
 
 
 def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np.ndarray, np.ndarray]:
@@ -138,7 +133,7 @@ def describe(
             positions[:, 0],
             facing,
             path,
-            quaternion.turned_level(_gradient(path, fps), -facing),
+            quaternion.turned_level(time_derivative(path, fps), -facing),
             _feet(positions, toes, path, facing),
             most_jerk(positions, fps),
             raw_features(positions[:, joints], facing, fps).astype(np.float32),

@@ -17,7 +17,8 @@ from ..annotation import ClipAnnotation, spoken
 from ..errors import InputError
 from . import cache
 from .converted import Conversions, is_foreign
-from .library import Clip, Library
+from .clip import Clip
+from .library import Library
 from .scan import Annotations, own_recordings
 
 GOOD, FAIR, POOR, UNKNOWN = range(4)

@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
+from ..base.vectors import cross
 from ..motion import contacts, gestures, quaternion
 from ..motion.arctangent import arctan2
 from ..motion.course import GaitStyle
@@ -34,7 +35,7 @@ from ..motion.gait import gait
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics
 from ..motion.phase_blend import Strides, blend, strides
-from ..motion.runs import runs
+from ..motion.runs import equal_runs, runs
 from ..polish.foot_plant import plant
 from .features import Frames
 from .scan import CACHE_FOLDER
@@ -43,17 +44,17 @@ MADE_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # how names of blends, of kicks and of taken balls begin, below it
 BLENDED, KICKED, TAKEN = "blend_", "kick_", "receive_"
 KICK, TAKE = frozenset({"kick"}), frozenset({"receive", "foot"})
-FPS = 60.0
-FASTEST = 9.4
+FPS = 60.0  # of synthetic clips
+FASTEST = 9.4  # m/s
 # made running begins here, m/s: slower it is left to blends; and taking a ball on the run
 _RUNS_FROM, TAKES_FROM = 2.4, 1.7
 # how far from its own speed a clip is played, and the seconds that have to reach a speed for it not to be a gap
 _WARP = (0.875, 1.125)
-_ENOUGH_SECONDS = 1.5
-_GRID = 1.03
+_ENOUGH_SECONDS = 1.5  # of recording at a speed, above which nothing is added there
+_GRID = 1.03  # ratio of neighbouring speeds
 # speeds of blends and of touches lie so far apart
 _BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
-_PAIRS = 3
+_PAIRS = 3  # of recordings mixed into each gap at most
 _STEADY = 0.15
 _GAITS = ("walking", "jogging", "running", "sprinting")
 # m/s of gaits that no recording shows
@@ -164,14 +165,14 @@ def _elbow_and_lean(motion: Motion) -> np.ndarray:
         if None not in (arm.upper_arm, arm.lower_arm, arm.hand)
     ]
     facing = heading_from_positions(motion.skeleton, places)
-    trunk = places[:, body.chest if body.neck is None else body.neck] - places[:, body.hips]
+    trunk = places[:, body.neck_or_chest] - places[:, body.hips]
     lean = arctan2(quaternion.turned_level(trunk[:, :2], -facing)[:, 0], trunk[:, 2])
     return np.array([np.mean(bends) if bends else 0.0, np.mean(lean)])
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The angle (T,) in radians between vectors (T, 3)."""
-    return arctan2(np.linalg.norm(quaternion.cross(a, b), axis=1), np.sum(a * b, axis=1))
+    return arctan2(np.linalg.norm(cross(a, b), axis=1), np.sum(a * b, axis=1))
 
 
 def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: dict[str, float]) -> Iterator[Made]:
@@ -260,10 +261,7 @@ def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotat
     """Rows that name the gait of every frame by its speed (T,), with the thresholds by which tracks are annotated."""
     words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
     band = np.searchsorted(gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
-    edges = [0, *(np.flatnonzero(np.diff(band)) + 1), len(speed)]
-    return tuple(
-        ClipAnnotation(int(a), int(b) - 1, None, (words[band[a]], "front")) for a, b in zip(edges[:-1], edges[1:])
-    )
+    return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in equal_runs(band))
 
 
 def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold: bool = False) -> Made:

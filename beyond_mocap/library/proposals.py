@@ -26,9 +26,10 @@ from ..motion import contacts, quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
-from ..motion.runs import runs
+from ..motion.runs import equal_runs, runs
 from ..motion.striking import surfaces
 from .library import Library
+from .proposal import Proposal
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 GAITS = (("standing", 0.0), ("walking", 0.4), ("jogging", 2.0), ("running", 4.0), ("sprinting", 5.5))
 """Each gait and the speed in m/s from which on it holds, where no library says its own."""
 
-RULES, LEARNED = "rules", "learned"
 
 _WAYS = ("front", "left", "back", "right")
 _GAIT_SECONDS, _SHORTEST = 0.5, 0.5  # over which speed is averaged; of a stretch
@@ -51,17 +51,6 @@ _NOD = 1.0  # m/s of the head against the chest, forward: jumps without a ball h
 _TURN_RATE, _TURN = np.radians(45.0), np.radians(50.0)
 _TURN_SPEED = 2.0  # m/s: a body that travels faster goes round a curve
 _LYING, _UP = 0.45, 0.85  # of the leg's length: the pelvis of a body on the ground, of one that has got up
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """Words for a stretch of a recording, in its own frames; confidence: 0 to 1; why: what was seen, for a person;
-    source: RULES, or LEARNED from annotated clips."""
-
-    annotation: ClipAnnotation
-    confidence: float
-    why: str
-    source: str = RULES
 
 
 def propose(
@@ -104,7 +93,7 @@ class _Seen:
         body = identify(motion.skeleton)
         places, world = forward_kinematics(motion)
         path = _velocity(places[:, body.hips, :2], motion.fps, _GAIT_SECONDS / 4.0)
-        trunk = places[:, body.neck if body.neck is not None else body.chest] - places[:, body.hips]
+        trunk = places[:, body.neck_or_chest] - places[:, body.hips]
         upright = trunk[:, 2] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9)
         facing = np.unwrap(heading_from_positions(motion.skeleton, places))
         floor = contacts.ground_height(motion)
@@ -136,9 +125,8 @@ def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
     quarter = without_short_runs(np.round(off / (np.pi / 2.0)).astype(int) % 4, int(_SHORTEST * fps))
     way = np.where(np.array([words[g] == "standing" for g in gait]), -1, quarter)
     kind = without_short_runs(gait * 5 + way + 1, int(_SHORTEST * fps))
-    edges = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
     out = []
-    for start, stop in zip(edges, edges[1:]):
+    for start, stop in equal_runs(kind):
         number, facing = divmod(int(kind[start]), 5)
         said = (words[number],) if facing == 0 else (words[number], _WAYS[facing - 1])
         speed = float(seen.speed[start:stop].mean())

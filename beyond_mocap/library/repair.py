@@ -19,9 +19,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 from scipy.ndimage import minimum_filter1d
 
+from ..base.banded_least_squares import BandedLeastSquares
 from ..motion import contacts, quaternion
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
@@ -39,9 +39,9 @@ _POP_SECONDS = 0.04  # longer than a pop
 _SLIDES, _SLIDES_SHARE = 0.13, 0.065
 # stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
 _LOW_SECONDS, _DRIFT = 1.5, 0.13
-_FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2
+_FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2  # how slowly the floor's height and the sliding may change
 _FLOOR_MOST = 0.02  # metres of drift that are left alone: no floor is that even, and soles lie a little differently
-_KEEP_SPEED = 0.005
+_KEEP_SPEED = 0.005  # weight of no change of speed against a foot that stands
 _SINKS = 0.10  # metres that a suit's pelvis may be too high above its feet
 _BALL = 0.7  # of the way from ankle to the foot's tip
 
@@ -253,13 +253,11 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
 
     seconds: how slowly it can change; the stiffness is its fourth power.
     """
-    count, stencil = len(pushed), (1.0, -2.0, 1.0)
-    band = np.zeros((3, count))
-    band[0] = weight.sum(axis=1) + pull
-    for i in range(3 if count > 2 else 0):
-        for j in range(i + 1):
-            band[i - j, j : j + count - 2] += (seconds * fps) ** 4 * stencil[i] * stencil[j]
-    return solveh_banded(band, pushed.sum(axis=1), lower=True)
+    squares = BandedLeastSquares(len(pushed), reach=2)
+    squares.add_value(weight.sum(axis=1) + pull)
+    squares.add_difference(2, (seconds * fps) ** 4)
+    squares.right += pushed.sum(axis=1)
+    return squares.solve()[:, 0]
 
 
 def told(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:

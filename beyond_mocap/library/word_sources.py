@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..annotation import ClipAnnotation, clip_annotations, parse_timeline
 from ..annotation.text import read_text
-from .proposals import LEARNED, RULES
+from .proposal import LEARNED, RULES
 
 Found = dict[ClipAnnotation, tuple[str, float]]
 Sources = Mapping[ClipAnnotation, tuple[str, float]]

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import skew_matrix
 from ..motion.motion import Motion
 from ..motion import quaternion
 
@@ -252,7 +253,7 @@ class Adjustment:
             while joint >= 0:
                 if not body.held[joint]:
                     arm = markers[:, marker] - joints[:, joint]
-                    pose[:, at, 3 + 3 * joint : 6 + 3 * joint] = weight * _skew(-arm)
+                    pose[:, at, 3 + 3 * joint : 6 + 3 * joint] = weight * skew_matrix(-arm)
                 parent = body.parents[joint]
                 for axis in np.flatnonzero(columns.offset[joint] >= 0):
                     shape[:, at, columns.offset[joint, axis]] = weight[..., 0] * world[:, parent, :, axis]
@@ -306,10 +307,3 @@ class _Columns:
 def _joined(blocks: np.ndarray) -> np.ndarray:
     """(F, A, B) as (F A, B)."""
     return blocks.reshape(-1, blocks.shape[-1])
-
-
-def _skew(v: np.ndarray) -> np.ndarray:
-    """(..., 3) -> (..., 3, 3): the matrix that makes cross products with v."""
-    zero = np.zeros(v.shape[:-1])
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    return np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)

@@ -12,19 +12,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from ..errors import InputError
 from ..motion import quaternion
 from .frames import mean_rotation, rigid_fit
 from .template import LANDMARK_PLACES, PLACES, TIPS
 
-MARKER_RADIUS = 0.007
+MARKER_RADIUS = 0.007  # m
 HALF_WIDTHS = {"knee": 0.052, "ankle": 0.036, "elbow": 0.036}
 """Half the breadth of a joint in metres, of an adult of 1.80 m; a marker's radius comes on top."""
 SIGMAS = {"both": 0.006, "one side": 0.012, "hip": 0.007, "shoulder": 0.015, "alone": 0.02, "trunk": 0.02}
 """How uncertain a predicted centre is, metres: the errors that the sources give, rounded."""
+_unit = partial(unit_vector, least=1e-12)  # metres: shorter ones have no direction
 _STRAIGHT = 0.14  # sine of the angle of an elbow (8 degrees) below which its plane says nothing
 _UPRIGHT = 0.35  # radians between the trunk and the vertical that still count as standing
 
@@ -109,15 +112,10 @@ def _on(fit, place: np.ndarray, size: float) -> np.ndarray:
     return rotation @ (size * np.asarray(place)) + shift
 
 
-def unit(vector: np.ndarray) -> np.ndarray:
-    """The vector (3,) at length one."""
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)
-
-
 def frame_along(axis: str, along: np.ndarray, second: str, towards: np.ndarray) -> np.ndarray:
     """The right-handed axes (3, 3) whose `axis` is exactly `along` and whose `second` lies nearest to `towards`."""
-    columns = {axis: unit(along)}
-    columns[second] = unit(towards - (towards @ columns[axis]) * columns[axis])
+    columns = {axis: _unit(along)}
+    columns[second] = _unit(towards - (towards @ columns[axis]) * columns[axis])
     third = next(letter for letter in "XYZ" if letter not in columns)
     turns = {"X": ("Y", "Z"), "Y": ("Z", "X"), "Z": ("X", "Y")}[third]
     columns[third] = np.cross(columns[turns[0]], columns[turns[1]])
@@ -217,12 +215,12 @@ def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarra
     if lateral is None and medial is None:
         return None
     if lateral is not None and medial is not None:
-        return 0.5 * (lateral + medial), unit(lateral - medial), SIGMAS["both"]
+        return 0.5 * (lateral + medial), _unit(lateral - medial), SIGMAS["both"]
     marker, inwards = (lateral, -1.0) if medial is None else (medial, 1.0)
     half = out.size * HALF_WIDTHS[joint] + MARKER_RADIUS
     length = max(float(np.linalg.norm(above - marker)), 1e-6)
     up = (above - marker) / length
-    outwards = unit(hint - (hint @ up) * up)
+    outwards = _unit(hint - (hint @ up) * up)
     sine = min(half / length, 0.9)  # so that the centre lies square below the joint above
     return marker + half * (sine * up + inwards * np.sqrt(1.0 - sine**2) * outwards), outwards, SIGMAS["one side"]
 
@@ -251,9 +249,9 @@ def _knee_outwards(out, points, side, sign, standing) -> np.ndarray:
     wand, lateral = points.get(f"{side}_thigh"), points.get(f"{side}_knee_lateral")
     if wand is None or lateral is None:
         return pelvis
-    up = unit(out.places[f"{side.capitalize()}UpLeg"] - lateral)
+    up = _unit(out.places[f"{side.capitalize()}UpLeg"] - lateral)
     away = (wand - lateral) - ((wand - lateral) @ up) * up
-    return unit(away) + (2.0 * unit(pelvis - (pelvis @ up) * up) if standing else 0.0)
+    return _unit(away) + (2.0 * _unit(pelvis - (pelvis @ up) * up) if standing else 0.0)
 
 
 def _foot(out: Centres, points: Mapping[str, np.ndarray], side: str, ankle, standing: bool) -> None:
@@ -326,7 +324,7 @@ def _wrist(points, side) -> tuple[np.ndarray | None, np.ndarray | None]:
     """The wrist's centre and the direction from its ulnar to its radial side; None for what is not marked."""
     radial, ulnar = points.get(f"{side}_wrist_radial"), points.get(f"{side}_wrist_ulnar")
     if radial is not None and ulnar is not None:
-        return 0.5 * (radial + ulnar), unit(radial - ulnar)
+        return 0.5 * (radial + ulnar), _unit(radial - ulnar)
     lone = [points[x] for x in (f"{side}_wrist", f"{side}_wrist_radial", f"{side}_wrist_ulnar") if x in points]
     return (lone[0], None) if lone else (None, None)
 
@@ -369,7 +367,7 @@ def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:
 
     Two planes do; in one of them the joint bends the right way: (upper x lower bone) x sign points to the marker.
     """
-    line = unit(below - above)
+    line = _unit(below - above)
     away = (marker - above) - ((marker - above) @ line) * line
     distance = float(np.linalg.norm(away))
     if distance < half * 1.001:
@@ -379,7 +377,7 @@ def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:
     aside = np.sqrt(1.0 - cosine**2) * np.cross(line, away)
     for normal in (cosine * away + aside, cosine * away - aside):
         place = marker - half * normal
-        fold = sign * np.cross(unit(place - above), unit(below - place))
+        fold = sign * np.cross(_unit(place - above), _unit(below - place))
         if fold @ normal > 0.0:
             return normal if np.linalg.norm(fold) > _STRAIGHT else None
     return None

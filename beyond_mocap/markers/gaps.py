@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.easing import hermite
 from ..motion.runs import runs
 from .carriers import Carried, carried, helpers_of
 from .cluster_shape import Shape, mean_shape
@@ -161,9 +162,8 @@ def bridge(way: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | No
     if before is None or after is None:
         return None
     span = end - first + 1
-    s = (np.arange(1, span) / span)[:, None]
-    p, q, u, v = way[first - 1], way[end], -before * span, after * span
-    return (2 * s**3 - 3 * s**2 + 1) * p + (s**3 - 2 * s**2 + s) * u + (3 * s**2 - 2 * s**3) * q + (s**3 - s**2) * v
+    share = (np.arange(1, span) / span)[:, None]
+    return hermite(share, way[first - 1], -before * span, way[end], after * span)
 
 
 def _edge(way, fps):

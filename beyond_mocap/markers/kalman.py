@@ -16,12 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.banded_least_squares import BandedLeastSquares
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion
 from .butterworth import CUTOFF, Filtered, check_numbers, unfit
 
-_ORDER = 3
+_ORDER = 3  # of the difference that is noise: the jerk
 _LEAST_WORTH = 1e-4  # an unseen frame's: the system stays solvable where few are seen
 
 
@@ -66,14 +67,8 @@ def jerk_price(fps: float, cutoff: float) -> float:
 def smoothed(seen: np.ndarray, worth: np.ndarray, price: float) -> np.ndarray:
     """The course (T, K) that minimizes sum worth |x - seen|^2 + price |its third difference|^2; seen (T, K), worth
     (T,) above 0."""
-    from scipy.linalg import solveh_banded
-
-    stencil = np.array([-1.0, 3.0, -3.0, 1.0])
-    band = np.zeros((_ORDER + 1, len(seen)))
-    band[0] = worth
-    pieces = len(seen) - _ORDER
-    for i, a in enumerate(stencil):
-        for j, b in enumerate(stencil[: i + 1]):
-            band[i - j, j : j + pieces] += price * a * b
     origin = seen.mean(axis=0)  # what is far from the origin loses no digits
-    return solveh_banded(band, worth[:, None] * (seen - origin), lower=True) + origin
+    squares = BandedLeastSquares(len(seen), reach=_ORDER, columns=seen.shape[1])
+    squares.add_value(worth, goal=seen - origin)
+    squares.add_difference(_ORDER, price)
+    return squares.solve() + origin

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.easing import smoothstep
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.humanoid import Limb, identify
@@ -108,16 +109,11 @@ def hold(place: np.ndarray, spans: list[tuple[int, int]], ease: int) -> tuple[np
     share, frames = np.zeros(len(place)), np.arange(len(place))
     for first, end in spans:
         gone = np.maximum(np.maximum(first - frames, frames - (end - 1)), 0) / (ease + 1)
-        own = bezier(1.0 - np.minimum(gone, 1.0))
+        own = smoothstep(1.0 - np.minimum(gone, 1.0))
         shift += own[:, None] * (place[first:end].mean(axis=0) - place)
         share += own
         weight = np.maximum(weight, own)
     return shift / np.maximum(share, 1.0)[:, None], weight
-
-
-def bezier(u: np.ndarray) -> np.ndarray:
-    """The cubic Bezier curve from 0 to 1 with level ends, at u (...,) from 0 to 1."""
-    return u * u * (3.0 - 2.0 * u)
 
 
 def _covered(spans: list[tuple[int, int]], count: int) -> np.ndarray:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion, forward_kinematics
 from .planted_body import adult_share
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # m/s^2
 _GRIP = (0.012, 0.105, -0.036)  # of a left hand in a T-pose: between the fingers, on the palm's side
 _MARKER = (0.25, 0.15, -0.95)  # where the marker sits on a held ball, as seen from its centre
 _FINE = 1e-3  # s between places from which the velocity at release is read, and steps through air
@@ -115,4 +116,4 @@ def _flight(position: np.ndarray, velocity: np.ndarray, after: np.ndarray, drag:
         places[step] = position
         pull = fall - drag * np.linalg.norm(velocity) * velocity
         position, velocity = position + _FINE * velocity + 0.5 * _FINE**2 * pull, velocity + _FINE * pull
-    return np.stack([np.interp(after, steps * _FINE, places[:, axis]) for axis in range(3)], axis=1)
+    return interpolate(after, steps * _FINE, places)

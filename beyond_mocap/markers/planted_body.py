@@ -14,7 +14,7 @@ from ..motion import quaternion
 from ..motion.anatomy import Anatomy, head_chain, study
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import Limb, identify_posed
-from ..motion.motion import Motion, forward_kinematics, pose_kinematics
+from ..motion.motion import Motion, forward_kinematics, local_rotations, pose_kinematics
 from ..motion.skeleton import Skeleton
 
 _X, _Y, _Z = np.eye(3)
@@ -94,9 +94,8 @@ def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: d
     ends = [name for name in names if name.removeprefix("Left").removeprefix("Right") in _TIPS]
     tips = np.array([_tip(name, motion, named[name], turns[name], leg) for name in ends]).reshape(-1, 3)
     skeleton = Skeleton(names, parents, offsets, [names.index(name) for name in ends], tips)
-    local = world.copy()
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents[1:]]), world[:, 1:])
-    return Motion(skeleton, places[:, named["Hips"]], quaternion.normalized(local), motion.fps)
+    local = quaternion.normalized(local_rotations(skeleton, world))
+    return Motion(skeleton, places[:, named["Hips"]], local, motion.fps)
 
 
 def _tip(name: str, motion: Motion, joint: int, turn: np.ndarray, leg: float) -> np.ndarray:

@@ -38,7 +38,7 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
         before = multiply(world[parent], lean[joint])
         near = np.flatnonzero(np.isfinite(distance[joint]))
         share = weights[near] * _BEYOND ** distance[joint][near][:, None]
-        arms = rest[near] - _joint_rest(chain)[joint]
+        arms = rest[near] - chain.skeleton.rest_positions[joint]
         world.append(_about(arms, seen[near] - joints[joint], share, before))
         local[joint] = multiply(world[parent] * np.array([1.0, -1.0, -1.0, -1.0])[:, None], world[joint])
         if not chain.turning[joint]:
@@ -46,15 +46,6 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
             local[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T
             world[joint] = multiply(world[parent], local[joint])
     return Poses(root, local, angles)
-
-
-def _joint_rest(chain: Chain) -> np.ndarray:
-    """Where joints stand in the rest pose, (J, 3) m from the root."""
-    out = np.zeros((len(chain.skeleton), 3))
-    for joint, parent in enumerate(chain.skeleton.parents):
-        if parent >= 0:
-            out[joint] = out[parent] + chain.skeleton.offsets[joint]
-    return out
 
 
 def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
@@ -65,7 +56,7 @@ def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         while joint >= 0:
             distance[joint, marker] = steps
             joint, steps = chain.skeleton.parents[joint], steps + 1
-    return _joint_rest(chain)[chain.joint] + chain.places, distance
+    return chain.skeleton.rest_positions[chain.joint] + chain.places, distance
 
 
 def _mean(points: np.ndarray, share: np.ndarray) -> np.ndarray:

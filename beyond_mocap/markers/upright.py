@@ -8,12 +8,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
+
 HIGH = re.compile(r"HD$|HEAD|^C7$|^T[1-4]$|CLAV|STRN|^MAN|SHO?U?L?D?E?R?$|ACR|SJN", re.I)
 MIDDLE = re.compile(r"ASI|PSI|SACR", re.I)
 LOW = re.compile(r"HEE|TOE|ANK|MAL|CALC|FOOT|MT\d?$|MFS|^[LR]?MT|MET", re.I)
 FRONT, BACK = re.compile(r"TOE|MT\d?$|ASI", re.I), re.compile(r"HEE|CALC|PSI|SACR", re.I)
 _DECISIVE = 0.7  # of the way from feet to head along one axis, in the median frame
 _FRAMES = 400  # looked at
+_TINY = 1e-300  # of any unit: only points that coincide have no direction
 _SURE = 0.25  # sine volume of the three directions
 
 
@@ -52,7 +55,7 @@ def handedness(labels: Sequence[str], positions: np.ndarray) -> float:
     if ahead is None or up is None or not sides:
         return 0.0
     few = _few(positions)
-    left = _unit(_mean(few[:, [i for i, _ in sides]] - few[:, [j for _, j in sides]], axis=1))
+    left = unit_vectors(_mean(few[:, [i for i, _ in sides]] - few[:, [j for _, j in sides]], axis=1), np.nan, _TINY)
     with np.errstate(invalid="ignore"):
         volume = np.einsum("ti,ti->t", np.cross(ahead, left), up)
     told = volume[np.abs(volume) > _SURE]
@@ -73,7 +76,7 @@ def _few(positions: np.ndarray) -> np.ndarray:
 def _between(labels, positions, start: re.Pattern, end: re.Pattern) -> np.ndarray | None:
     """(t, 3) unit directions from the middle of some markers to that of others; None where there are none."""
     apart = _apart(labels, positions, start, end)
-    direction = None if apart is None else _unit(apart)
+    direction = None if apart is None else unit_vectors(apart, np.nan, _TINY)
     return None if direction is None or not np.isfinite(direction).any() else direction
 
 
@@ -99,9 +102,3 @@ def _mean(values: np.ndarray, axis: int) -> np.ndarray:
     count = seen.sum(axis=axis)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(count > 0, np.where(seen, values, 0).sum(axis=axis) / count, np.nan)
-
-
-def _unit(values: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(values, axis=-1, keepdims=True)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(length > 0, values / length, np.nan)

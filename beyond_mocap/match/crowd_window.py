@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..library.library import FPS, Library
+from ..library.features import FPS
+from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.striking import surfaces
 from ..polish.crowd.correction import CURVES, Correction, applied

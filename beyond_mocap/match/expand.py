@@ -15,15 +15,18 @@ import numpy as np
 
 from ..errors import InputError
 from ..library.chosen import with_chosen_gaits
-from ..library.library import FPS, Library
+from ..library.features import FPS
+from ..library.library import Library
 from ..library.made import MADE_FOLDER
 from ..plan import Plan
 from ..polish.hand_over import handed_over
 from ..polish.meeting import eased
 from ..synthesis.edit_list import EditList, at_times
 from ..synthesis.footage import shown
+from ..resolve_plan import resolve_plan
 from ..synthesize import constructed
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
+from ..take import Take
 from .cut_plan import cut_plan
 from .joined_takes import one_take, own_part
 from .library_clips import bound
@@ -123,7 +126,8 @@ class _Layout:
         first, end = max(0, low - around), min(self.count, high + around)
         plan = cut_plan(self.plan, self._time(first), self._time(end - 1))
         shown_here = self._shown(plan, first * FPS / self.fps)
-        take = constructed(self.library, plan, shown_here)
+        resolved = resolve_plan(plan, self.library, touches_solved=True)
+        take = constructed(self.library, resolved, shown_here)
         return _Window(low, high, first, take, self._standing(shown_here, take))
 
     def _shown(self, plan: Plan, at: float) -> EditList:

@@ -11,7 +11,8 @@ from ..evaluation.played import Played, played_from_take
 from ..evaluation.report import evaluate, rounded
 from ..library.library import Library
 from ..motion.track import Track
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
+from ..take import Take
 
 _MOST, _LEAST, _SUMMED = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
 

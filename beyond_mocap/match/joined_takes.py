@@ -11,7 +11,8 @@ from ..annotation import Span, Timeline
 from ..errors import spans_of
 from ..motion.motion import concatenate
 from ..plan import Plan
-from ..take import BallPath, DribbleTouch, Take
+from ..motion.track.ball_path import BallPath
+from ..take import DribbleTouch, Take
 
 _SAME_TIME = 1e-6
 

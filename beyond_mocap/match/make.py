@@ -22,9 +22,10 @@ from ..files.match_data import Match
 from ..files.tables import write_ball
 from ..files.tracking import read_match
 from ..files.whole import atomic_write
-from ..library.library import Library, build
+from ..library.library import Library
+from ..library.build import build
 from ..solve_ball import solve_ball
-from ..take import BallPath
+from ..motion.track.ball_path import BallPath
 from . import stages
 from .folder import MatchFolder, check_folder, file_names, opened, read_state
 from .match_ball import ball_plan, course, met

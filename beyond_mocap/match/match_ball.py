@@ -7,11 +7,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..ball.tracked.solve import SolvedBall
+from ..base.time_series import interpolate
 from ..files.match_data import Match
 from ..known_touches import course_of
 from ..motion.track import Track, clean
 from ..plan import Plan
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
+from ..take import Take
 
 _STEP = 1e-4  # m, to which places are rounded, as files have them
 
@@ -30,7 +32,7 @@ def ball_plan(match: Match, solved: SolvedBall | None, start: float, end: float,
 def course(plan: Plan, times: np.ndarray) -> BallPath:
     """The ball of a plan at `times` (T,) s as nobody has met it yet: solved where that is known, else as sampled."""
     sampled = plan.sampled(plan.fps)
-    place = np.stack([np.interp(times, sampled.times, column, np.nan, np.nan) for column in sampled.ball.T], axis=1)
+    place = interpolate(times, sampled.times, sampled.ball, outside=np.nan)
     near = np.clip(np.searchsorted(sampled.times, times - 0.5 / plan.fps), 0, len(sampled) - 1)
     measured = sampled.ball_measured[near]
     if plan.solved is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..known_touches import in_force
+from ..known_touches import solve_touches
 from ..motion.track import Track
 from ..plan import Plan, SolvedCourse
 from ..polish.crowd.correction import Correction
@@ -49,10 +49,10 @@ class PlayerEdit:
 def kept(plan: Plan) -> Plan:
     """The plan as files keep it, so that what is made of it does not depend on whether it has been in one.
 
-    Its key moments and its ball are in force; the track's times are in whole microseconds, its places in whole
+    Its touches are solved; the track's times are in whole microseconds, its places in whole
     millimetres, and so is the ball's course, which has a point every COURSE_STEP and at each touch.
     """
-    plan = in_force(plan)
+    plan = solve_touches(plan)
     track = plan.track
     track = Track(
         np.round(track.times * 1e6) / 1e6, _to_millimetres(track.positions), _to_millimetres(track.ball),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from ..errors import InputError, told_time
 from ..files.match_data import Match, MatchPlayer
 from ..motion.track import Track, clean
@@ -159,6 +160,6 @@ def _shifted(role: Role, times: np.ndarray, shift: np.ndarray) -> Role:
         return role
     asked = []
     for track in role.measured:
-        own = np.stack([np.interp(track.times, times, shift[:, axis]) for axis in (0, 1)], axis=1)
+        own = interpolate(track.times, times, shift)
         asked.append(replace(track, positions=track.positions + own))
     return replace(role, asked=tuple(asked))

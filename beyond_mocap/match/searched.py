@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from ..library.chosen import with_chosen_gaits
 from ..library.library import Library
-from ..own_size import in_library_size, size_of
 from ..plan import Plan
+from ..resolve_plan import resolve_plan
 from ..synthesis.balance import balanced
 from ..synthesis.distance import exact_keys
 from ..synthesis.path_search import PathSearch
-from ..synthesis.wanted import wanted
+from ..synthesis.wanted import build_order
 from .library_clips import named
 from .named_edit import NamedEdit
 from .units import Unit
@@ -48,9 +48,9 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
     begun = time.process_time()
     with threadpool_limits(limits=1):
         library = searched_library(library, unit.plan)
-        plan = in_library_size(unit.plan, size_of(unit.plan, library.skeleton))
-        order = wanted(library, plan)
-        search = PathSearch(library, order, balanced(plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
+        plan = resolve_plan(unit.plan, library, touches_solved=True)
+        order = build_order(library, plan)
+        search = PathSearch(library, order, balanced(unit.plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
         edit = exact_keys(library, search.run(), order)
     return Piece(
         unit.player, unit.stretch, unit.number, unit.first, unit.own, named(library, edit, plan.timeline.keys),

@@ -13,7 +13,8 @@ from ..library.library import Library
 from ..polish.crowd.attention import looking
 from ..polish.crowd.correction import Correction, applied
 from ..synthesize import look_of
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
+from ..take import Take
 from .at_ball import at_ball
 from .expand import expanded
 from .joined_takes import own_part

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from ..library.library import FPS, Library
-from ..own_size import in_library_size, size_of
+from ..library.features import FPS
+from ..library.library import Library
 from ..plan import Plan
+from ..resolve_plan import resolve_plan
 from ..synthesis.balance import balanced
 from ..synthesis.path_costs import PathCosts
 from ..synthesis.slots import AROUND
-from ..synthesis.wanted import wanted
+from ..synthesis.wanted import build_order
 from .cut_plan import cut_plan
 from .library_clips import bound
 from .named_edit import CONTINUES, NamedEdit, NamedKey, chained, part, retabled, table
@@ -106,7 +107,7 @@ def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, 
     library = searched_library(library, plan)
     begin = float(plan.track.times[0])
     here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
-    order = wanted(library, in_library_size(here, size_of(here, library.skeleton)))
+    order = build_order(library, resolve_plan(here, library, touches_solved=True))
     leaves, enters = (bound(library, part(p.edit, low - p.first, high - p.first)) for p in (before, after))
     costs = PathCosts(library, order, balanced(plan.alpha))
     step = np.gradient(leaves.frame)

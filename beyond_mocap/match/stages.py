@@ -17,7 +17,7 @@ from ..files.tables import plain
 from ..files.whole import atomic_write
 from ..library.library import Library
 from ..polish.crowd.correction import joined
-from ..take import BallPath
+from ..motion.track.ball_path import BallPath
 from .content_digest import digest_of
 from .crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn
 from .folder import MatchFolder

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..library.library import FPS
+from ..library.features import FPS
 from ..plan import Plan
 from ..synthesis.offer import SLOT
 from .cut_plan import cut_plan

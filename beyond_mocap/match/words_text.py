@@ -7,13 +7,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..annotation import format_timeline, parse_timeline, read_text, validate
+from ..base.digest import hex_digest
 from ..files.whole import atomic_write
 from .words import USER, Moment, ordered, timeline_of
 
@@ -59,4 +59,4 @@ def _line(moment: Moment) -> str:
 def _digest(lines: Iterable[str]) -> str:
     """Of what lines say, however they end."""
     said = "\n".join(line.rstrip() for line in lines if line.strip())
-    return hashlib.sha256(said.encode()).hexdigest()[:8]
+    return hex_digest(said, digits=8)

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ..files import bvh
-from ..files.tables import Provenance, provenance_of, write_provenance
+from ..synthesis.provenance import Provenance, provenance_of, write_provenance
 from ..motion.track import Track
-from ..take import BallPath, Take
+from ..motion.track.ball_path import BallPath
+from ..take import Take
 from .crowd_window import CrowdPart, crowd_window
 from .figures import player_report
 from .player_edit import PlayerEdit

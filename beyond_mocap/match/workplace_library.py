@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
-from ..library.library import Library, build
+from ..library.library import Library
+from ..library.build import build
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,8 @@ _LEG = (
 _CENTRE_TIPS = (("Head", (10, 0, 125)),)
 _LIMB_TIPS = (("Hand", (0, 0, -100)), ("ToeBase", (38, 0, -3)))
 STATURE = 1.80
+LEG = 0.873
+"""m, thigh and shank of the adult of whom published figures of gait tell."""
 
 
 def adult_skeleton(stature: float = STATURE) -> Skeleton:

@@ -20,15 +20,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import cross, unit_vectors
 from . import quaternion
 from .humanoid import Humanoid, Limb
-from .limb import unit
 from .motion import Motion, pose_kinematics
 from .skeleton import Skeleton, frozen_array
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = np.array([0.0, 1.0, 0.0])
-_FRAMES = 400
+_FRAMES = 400  # of an example that are looked at
 _FEW = 3  # fewer frames are a pose that is shown, no recording: a foot that looks flat in it is taken to be flat
 # frames count by the cosine of the trunk's lean to this power: 10 degrees 0.74, 20 degrees 0.29, 45 degrees 0.001
 _UPRIGHT = 20
@@ -110,8 +110,8 @@ class _Study:
         self.local, self.standing = local, standing
         left, right = body.left, body.right
         self.pelvis = 0.5 * (self.places[:, left.upper_leg] + self.places[:, right.upper_leg])
-        self.trunk = unit(self._top() - self.pelvis, _UP)
-        self.across_hips = unit(self.places[:, left.upper_leg] - self.places[:, right.upper_leg], _LEFT)
+        self.trunk = unit_vectors(self._top() - self.pelvis, _UP)
+        self.across_hips = unit_vectors(self.places[:, left.upper_leg] - self.places[:, right.upper_leg], _LEFT)
         self.across_chest = self._across_chest()
         self.weight = (np.maximum(self.trunk[:, 2], 0.1) / max(self.trunk[:, 2].max(), 0.1)) ** _UPRIGHT
         self.axes = quaternion.identity(len(skeleton))
@@ -131,7 +131,7 @@ class _Study:
         arms = (self.body.left.upper_arm, self.body.right.upper_arm)
         if None in arms:
             return self.across_hips
-        return unit(self.places[:, arms[0]] - self.places[:, arms[1]], self.across_hips)
+        return unit_vectors(self.places[:, arms[0]] - self.places[:, arms[1]], self.across_hips)
 
     def mean(self, joint: int, vectors: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
         """The weighted sum of world vectors (T, 3) seen in a joint's axes, over the weights' sum: (3,)."""
@@ -150,11 +150,11 @@ class _Study:
     def settle(self, joint: int, up: np.ndarray, left: np.ndarray, first: str = "up") -> None:
         """F of a joint from its up and left direction (3,), of which the one named `first` is kept exactly."""
         if first == "up":
-            up = unit(up, _UP)
-            left = unit(left - (left @ up) * up, _any_normal(up))
+            up = unit_vectors(up, _UP)
+            left = unit_vectors(left - (left @ up) * up, _any_normal(up))
         else:
-            left = unit(left, _LEFT)
-            up = unit(up - (up @ left) * left, _any_normal(left))
+            left = unit_vectors(left, _LEFT)
+            up = unit_vectors(up - (up @ left) * left, _any_normal(left))
         forward = np.cross(left, up)
         self.axes[joint] = quaternion.from_matrix(np.stack([forward, left, up], axis=-1))
         self.known.add(joint)
@@ -186,7 +186,7 @@ class _Study:
             self.settle(joint, self.mean(joint, self.trunk), self.mean(joint, across))
         chain = head_chain(self.skeleton, body)
         tip = _tip(self.skeleton, chain[-1]) if chain else None
-        crown = self.trunk if tip is None else unit(quaternion.rotate(self.world[:, chain[-1]], tip), _UP)
+        crown = self.trunk if tip is None else unit_vectors(quaternion.rotate(self.world[:, chain[-1]], tip), _UP)
         for number, joint in enumerate(chain, 1):
             share = number / len(chain)  # a neck is bent half as far as the head, which its tip shows in every frame
             up = self.mean(joint, (1.0 - share) * self.trunk + share * crown)
@@ -199,15 +199,15 @@ class _Study:
         if limb.lower_arm is None:
             self.follow(limb.upper_arm, self.segment(chest))
             return
-        upper = unit(self.places[:, limb.lower_arm] - self.places[:, limb.upper_arm], -_UP)
+        upper = unit_vectors(self.places[:, limb.lower_arm] - self.places[:, limb.upper_arm], -_UP)
         end = limb.hand if limb.hand is not None else limb.lower_arm
-        lower = unit(self.places[:, end] - self.places[:, limb.lower_arm], upper)
-        hinge = -quaternion.cross(upper, lower) + _STRAIGHT * quaternion.cross(-upper, self.direction(chest, 0))
+        lower = unit_vectors(self.places[:, end] - self.places[:, limb.lower_arm], upper)
+        hinge = -cross(upper, lower) + _STRAIGHT * cross(-upper, self.direction(chest, 0))
         self.settle(limb.upper_arm, -self._bone(limb.upper_arm, limb.lower_arm), self.mean(limb.upper_arm, hinge))
         if limb.hand is None:
             self.follow(limb.lower_arm, self.segment(limb.upper_arm))
             return
-        hinge = -quaternion.cross(upper, lower) + _STRAIGHT * self.direction(limb.upper_arm, 1)
+        hinge = -cross(upper, lower) + _STRAIGHT * self.direction(limb.upper_arm, 1)
         self.settle(limb.lower_arm, -self._bone(limb.lower_arm, limb.hand), self.mean(limb.lower_arm, hinge))
         fingers = _fingers(self.skeleton, limb.hand)
         if fingers is None:
@@ -220,16 +220,16 @@ class _Study:
         poses)."""
         self.follow(limb.shoulder, self.segment(self.body.chest))
         neutral = quaternion.inverse(self.axes[limb.shoulder])
-        held = unit(quaternion.rotate(neutral, self._bone(limb.shoulder, limb.upper_arm)), _UP)
+        held = unit_vectors(quaternion.rotate(neutral, self._bone(limb.shoulder, limb.upper_arm)), _UP)
         sideways = np.array([0.0, 1.0 if limb is self.body.left else -1.0, 0.0])
         if held @ sideways < _COLLAR and np.linalg.norm(self._bone(limb.shoulder, limb.upper_arm)) > 1e-3:
             neutral = quaternion.multiply(quaternion.between(held, sideways), neutral)
             self.axes[limb.shoulder] = quaternion.inverse(neutral)
 
     def _leg(self, limb: Limb) -> None:
-        thigh = unit(self.places[:, limb.lower_leg] - self.places[:, limb.upper_leg], -_UP)
-        shank = unit(self.places[:, limb.foot] - self.places[:, limb.lower_leg], -_UP)
-        hinge = quaternion.cross(thigh, shank)
+        thigh = unit_vectors(self.places[:, limb.lower_leg] - self.places[:, limb.upper_leg], -_UP)
+        shank = unit_vectors(self.places[:, limb.foot] - self.places[:, limb.lower_leg], -_UP)
+        hinge = cross(thigh, shank)
         beside = _STRAIGHT * self.direction(self.body.hips, 1)
         self.settle(
             limb.upper_leg, -self._bone(limb.upper_leg, limb.lower_leg), self.mean(limb.upper_leg, hinge + beside)
@@ -251,10 +251,11 @@ class _Study:
         if ahead is None:
             ahead = self.mean(limb.foot, self.direction(limb.lower_leg, 0))
         level = self._level_frames(limb)
-        up = None if level is None else unit(self.mean(limb.foot, np.broadcast_to(_UP, self.trunk.shape), level), _UP)
-        along = unit(ahead, _UP)
+        ups = np.broadcast_to(_UP, self.trunk.shape)
+        up = None if level is None else unit_vectors(self.mean(limb.foot, ups, level), _UP)
+        along = unit_vectors(ahead, _UP)
         if up is None or not _SLOPE[0] < np.arcsin(np.clip(-(along @ up), -1.0, 1.0)) < _SLOPE[2]:
-            left = unit(left - (left @ along) * along, _any_normal(along))
+            left = unit_vectors(left - (left @ along) * along, _any_normal(along))
             up = quaternion.rotate(quaternion.about_axis(left, -_SLOPE[1]), np.cross(along, left))
         self.settle(limb.foot, up, np.cross(up, ahead))
         if limb.toe is not None:
@@ -332,4 +333,4 @@ def _positive(q: np.ndarray) -> np.ndarray:
 
 def _any_normal(direction: np.ndarray) -> np.ndarray:
     other = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    return unit(other - (other @ direction) * direction, other)
+    return unit_vectors(other - (other @ direction) * direction, other)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import quaternion
-from .gait_tables import LEG
+from .adult import LEG
 from .humanoid import Humanoid, Limb, identify
 from .motion import Motion
 from .neutral import Neutral, neutral_stance, rests_upright
@@ -65,7 +65,7 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
 def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
     """The stance with its head as it rests, unless that would have the example's people look up: who kicks or walks
     looks down at the ground ahead, but some suits rest with a bowed head."""
-    carrier = _head_carrier(identify(neutral.skeleton))
+    carrier = identify(neutral.skeleton).head_or_neck
     ahead = quaternion.multiply(neutral.rotations[carrier], quaternion.inverse(rest.rotations[carrier]))
     if quaternion.rotate(ahead, np.array([1.0, 0.0, 0.0]))[2] > 0.0:
         return neutral
@@ -74,17 +74,13 @@ def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
     return replace(neutral, rotations=rotations)
 
 
-def _head_carrier(body: Humanoid) -> int:
-    return next(j for j in (body.head, body.neck, body.chest) if j is not None)
-
-
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
     """Vertices (..., V, 3), metres, of the body in poses with joints at `places` (..., J, 3), turned by `world` (...,
     J, 4).
 
     Linear blend skinning, as Blender's armature modifier does without volume preservation.
     """
-    origin = _rest_places(skeleton)
+    origin = skeleton.rest_positions
     out = np.zeros((*places.shape[:-2], len(body.vertices), 3))
     for column in range(2):
         joint = body.joints[:, column]
@@ -93,18 +89,9 @@ def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.n
     return out
 
 
-def _rest_places(skeleton: Skeleton) -> np.ndarray:
-    places = np.array(skeleton.offsets)
-    places[0] = 0.0
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            places[joint] = places[parent] + skeleton.offsets[joint]
-    return places
-
-
 def _to_rest(neutral: Neutral, vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """The rest position (V, 3) of vertices (V, 3) of the neutral stance: blend skinning turned round."""
-    origin = _rest_places(neutral.skeleton)
+    origin = neutral.skeleton.rest_positions
     turn = quaternion.to_matrix(neutral.rotations)
     shift = neutral.positions - np.einsum("jab,jb->ja", turn, origin)
     matrix = np.einsum("vc,vcab->vab", weights, turn[joints])
@@ -238,8 +225,8 @@ class _Build:
         body, k = self.body, self.scale
         hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
         shoulder, _ = self._shoulders(hip)
-        carrier = _head_carrier(body)
-        neck = body.neck if body.neck is not None else body.chest
+        carrier = body.head_or_neck
+        neck = body.neck_or_chest
         base = self.at(carrier) if body.head is not None else shoulder + k * np.array([0.03, 0.0, 0.15])
         low = shoulder + k * np.array([-0.012, 0.0, 0.03])
         rings = [(low, 0.066, 0.072)]

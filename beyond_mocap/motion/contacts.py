@@ -15,11 +15,12 @@ from scipy.ndimage import grey_opening, maximum_filter1d
 
 from .humanoid import Humanoid, identify, leg_length
 from .motion import Motion, forward_kinematics
+from .runs import run_numbers, runs
 from .skeleton import Skeleton
 
 _ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once within it
 _SWING_SECONDS = 1.2
-_DIFFERENCE_SECONDS = 1.0 / 60.0
+_DIFFERENCE_SECONDS = 1.0 / 60.0  # to either side, over which a foot's speed is measured
 _LOW = (0.045, 0.06)  # metres above the envelope: to enter, to leave
 _SLOW = (0.15, 0.25)  # metres per second above the envelope: to enter, to leave, where the foot hardly moves
 _SLOW_SHARE = (0.04, 0.08)  # of the swing's speed: to enter, to leave
@@ -27,7 +28,7 @@ _HELD_UP = 0.10  # metres above the other foot's envelope: this foot does not st
 _UPRIGHT = 0.45  # of the leg's length: hips above the foot
 _ANKLE = 0.087  # of the leg's length
 _SHORTEST = 0.04  # seconds of contact
-_SHORTEST_GAP = 0.05
+_SHORTEST_GAP = 0.05  # s; shorter gaps within a stance are closed
 _AT_ZERO = (-0.02, 0.065)  # metres: what toe joints may be over a floor at height 0
 
 
@@ -137,15 +138,14 @@ def _horizontal_speed(places: np.ndarray, fps: float) -> np.ndarray:
 
 def _hysteresis(enter: np.ndarray, leave: np.ndarray) -> np.ndarray:
     """Runs of `leave` (T,) that hold at least one frame of `enter` (T,)."""
-    labels = np.cumsum(np.diff(leave, prepend=False)) * leave
+    labels = run_numbers(leave)
     return leave & np.isin(labels, labels[enter & leave])
 
 
 def _without_short(flags: np.ndarray, frames: float) -> np.ndarray:
     """`flags` (T,) without runs shorter than `frames`; runs that touch an end of the clip stay, they may go on."""
-    edges = np.flatnonzero(np.diff(flags, prepend=~flags[0], append=~flags[-1]))
     out = flags.copy()
-    for start, stop in zip(edges[:-1], edges[1:]):
-        if flags[start] and stop - start < frames and start > 0 and stop < len(flags):
+    for start, stop in runs(flags):
+        if stop - start < frames and start > 0 and stop < len(flags):
             out[start:stop] = False
     return out

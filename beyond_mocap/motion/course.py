@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import quintic_step
+from ..base.time_series import hann_smooth
 from ..errors import InputError
 from . import gait_tables as tables
-from .gait_tables import at_speed, smooth_step
+from .gait_tables import at_speed
 from .neutral import Neutral
 
 # the plan reaches this many seconds beyond both ends, so that stances which cross them are known; less for one who runs
@@ -89,7 +91,7 @@ def plan(
     velocity = speed[:, None] * np.stack([np.cos(way), np.sin(way)], axis=-1)
     path = np.stack([_integral(velocity[:, axis], rate, pad) for axis in range(2)], axis=-1)
     acceleration = np.stack(
-        [smoothed(np.gradient(velocity[:, axis], 1.0 / rate), int(0.35 * rate)) for axis in (0, 1)], -1
+        [hann_smooth(np.gradient(velocity[:, axis], 1.0 / rate), int(0.35 * rate)) for axis in (0, 1)], -1
     )
     root_scale = np.sqrt(neutral.leg / tables.LEG)
     gear = speed / root_scale
@@ -104,14 +106,8 @@ def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndar
     spot.
     """
     usual = at_speed("frequency", gear) * (1.0 + 0.22 * np.sin(0.5 * direction) ** 2 + 0.5 * np.sin(direction) ** 2)
-    on_the_spot = 1.0 - smooth_step(gear / 1.8)
+    on_the_spot = 1.0 - quintic_step(gear / 1.8)
     return np.hypot(usual, on_the_spot * turn_rate / 1.3)
-
-
-def smoothed(values: np.ndarray, width: int) -> np.ndarray:
-    """The values (N,) through a Hann window of `width` moments to either side, ends repeated."""
-    window = np.hanning(2 * width + 3)[1:-1]
-    return np.convolve(np.pad(values, width, mode="edge"), window / window.sum(), mode="valid")
 
 
 def wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:

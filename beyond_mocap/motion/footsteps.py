@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import quintic_step
+from ..base.time_series import interpolate
 from . import gait_tables as tables
-from .gait_tables import smooth_step
 from .neutral import Neutral
 
 # beyond this pitch the ball of the foot leaves the ground and the toe tip stays
@@ -47,7 +48,7 @@ class Footsteps:
     def step_size(self, scale: float) -> np.ndarray:
         """Share (K-1,) of a full step that lies between each stance and the next; turning on the spot counts too."""
         moved = np.linalg.norm(np.diff(self.place, axis=0), axis=1) / scale
-        return smooth_step((moved + 0.3 * np.abs(np.diff(self.yaw))) / _FULL_STEP)
+        return quintic_step((moved + 0.3 * np.abs(np.diff(self.yaw))) / _FULL_STEP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutr
     sizes = steps.step_size(neutral.leg / tables.LEG)
     before = np.concatenate([sizes[:1], sizes])[which]
     after = np.concatenate([sizes, sizes[-1:]])[which]
-    amount = before + (after - before) * smooth_step((share - 0.2) / 0.3)
+    amount = before + (after - before) * quintic_step((share - 0.2) / 0.3)
     pitch = amount * _directed_pitch(share, steps.speed[which], steps.direction[which])
     tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFTS, 0.0)
     forward, up = _roll(pitch, tip_pitch, neutral, steps.side)
@@ -149,7 +150,7 @@ def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank
 
     def free(at, share_at):
         """Ankle (N, 3) and pitch (N,) of the published swing, hung on the hip at seconds `at`."""
-        hip_at = np.stack([np.interp(at, times, hip[:, axis]) for axis in range(3)], axis=-1)
+        hip_at = interpolate(at, times, hip)
         turned = np.interp(at, times, heading)
         forward, up, pitch = _leg_swing(share_at, speed, direction, thigh_shank)
         across = np.stack([forward * np.cos(turned), forward * np.sin(turned), up], axis=-1)
@@ -168,10 +169,10 @@ def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank
     size = steps.step_size(scale)[which]
     small = _small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
     mixed = full * size[:, None] + small * (1.0 - size[:, None])
-    yaw = leave.yaw + (land.yaw - leave.yaw) * smooth_step(share)
+    yaw = leave.yaw + (land.yaw - leave.yaw) * quintic_step(share)
     ankle = mixed[:, :3].copy()
     ankle[:, 2] += _clearance(ankle[:, 2], mixed[:, 3], share, size, neutral)
-    return FootPath(ankle, mixed[:, 3], yaw, leave.bend * (1.0 - smooth_step(share / 0.3)))
+    return FootPath(ankle, mixed[:, 3], yaw, leave.bend * (1.0 - quintic_step(share / 0.3)))
 
 
 def _edge_speeds(steps: Footsteps, which: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
@@ -211,7 +212,7 @@ def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
     Offsets are spread over the whole swing; speeds are mended within its first and last third.
     """
     reach = 1.0 / 3.0
-    blend = smooth_step(share)[:, None]
+    blend = quintic_step(share)[:, None]
     out = offset0 * (1.0 - blend) + offset1 * blend
     for s, speed, sign in ((share, speed0, 1.0), (1.0 - share, speed1, -1.0)):
         inside = np.clip(s / reach, 0.0, 1.0)
@@ -221,7 +222,7 @@ def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
 
 def _small_step(share, leave, land, lift) -> np.ndarray:
     """A foot that is only put elsewhere (N, 4): straight over, a little lifted."""
-    out = leave + (land - leave) * smooth_step(share)[:, None]
+    out = leave + (land - leave) * quintic_step(share)[:, None]
     out[:, 2] += lift * np.sin(np.pi * share) ** 2
     return out
 

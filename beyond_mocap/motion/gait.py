@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.time_series import hann_smooth, interpolate
 from . import gait_tables as tables
 from .adult import adult_skeleton
-from .course import Course, GaitStyle, plan, smoothed
+from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, travel
 from .gait_tables import at_speed
 from .gait_trunk import arms, trunk
@@ -92,7 +93,7 @@ def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> 
     left = (
         left + sign * 0.5 * np.abs(np.sin(direction)) * np.interp(middle, course.times, course.speed) * (off - on) * 0.8
     )
-    place = np.stack([np.interp(middle, course.times, course.path[:, axis]) for axis in (0, 1)], axis=-1)
+    place = interpolate(middle, course.times, course.path)
     place = place + np.stack(
         [ahead * np.cos(heading) - left * np.sin(heading), ahead * np.sin(heading) + left * np.cos(heading)], -1
     )
@@ -111,7 +112,7 @@ def _within_reach(
     ends = []
     for edge, sign in ((on, -1.0), (off, 1.0)):
         at = 0.5 * (on + off)[:, None] + sign * share * (off - on)[:, None]
-        hips = np.stack([np.interp(at, course.times, course.path[:, axis]) for axis in (0, 1)], axis=-1)
+        hips = interpolate(at, course.times, course.path)
         near = np.linalg.norm(hips - place[:, None], axis=-1) <= (_AHEAD if sign < 0 else _BEHIND) * leg
         last = np.where(near.all(axis=1), len(share) - 1, np.argmin(near, axis=1))
         ends.append(
@@ -127,7 +128,7 @@ def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
     height = 0.8 * (neutral.leg + neutral.ankle_height)
     shift = (
         height
-        * np.stack([np.interp(at, course.times, course.acceleration[:, axis]) for axis in (0, 1)], -1)
+        * interpolate(at, course.times, course.acceleration)
         / tables.GRAVITY
     )
     size = np.linalg.norm(shift, axis=-1, keepdims=True)
@@ -207,7 +208,7 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
         need = np.maximum(need, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))
     width = max(int(0.06 / (times[1] - times[0])), 1)
-    return smoothed(_running_max(need, width), width)
+    return hann_smooth(_running_max(need, width), width)
 
 
 def _running_max(values: np.ndarray, width: int) -> np.ndarray:

@@ -24,9 +24,10 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-LEG = 0.873
-GRAVITY = 9.81
-FASTEST = 9.5
+from ..base.easing import quintic_step
+
+GRAVITY = 9.81  # m/s^2
+FASTEST = 9.5  # m/s, the tables' last speed
 # walking turns into running here (N: spontaneous change at 1.9 to 2.3 m/s)
 _CHANGE = (1.95, 2.35)
 
@@ -147,13 +148,7 @@ def at_speed(name: str, speed: np.ndarray) -> np.ndarray:
 
 def run_share(speed: np.ndarray) -> np.ndarray:
     """How far running has replaced walking at `speed` (...,) m/s: 0 .. 1."""
-    return smooth_step((np.asarray(speed) - _CHANGE[0]) / (_CHANGE[1] - _CHANGE[0]))
-
-
-def smooth_step(x: np.ndarray) -> np.ndarray:
-    """0 below 0, 1 above 1, and a quintic with still ends between (Perlin 2002)."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (x * (6.0 * x - 15.0) + 10.0)
+    return quintic_step((np.asarray(speed) - _CHANGE[0]) / (_CHANGE[1] - _CHANGE[0]))
 
 
 # The swinging leg: thigh against the vertical (forward positive), knee flexion, ankle (dorsiflexion positive), in

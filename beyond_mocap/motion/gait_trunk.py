@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.easing import quintic_step
 from . import gait_tables as tables
 from .course import Course, GaitStyle, wander
-from .gait_tables import at_speed, run_share, smooth_step
+from .gait_tables import at_speed, run_share
 from .neutral import Neutral
 
 
@@ -19,7 +20,7 @@ def trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) -> dict
     scale = neutral.leg / tables.LEG
     turn = 2.0 * np.pi * phase
     ahead = 1.0 - 0.6 * np.sin(0.5 * course.direction) ** 2
-    idle = style.life * (1.0 - smooth_step(gear / 0.7))
+    idle = style.life * (1.0 - quintic_step(gear / 0.7))
     middle = 0.5 * at_speed("duty", gear)
     sway = scale * at_speed("sway", gear) * np.cos(turn - 2.0 * np.pi * middle) + idle * 0.014 * wander(
         course.times, seed + 1, 6.0
@@ -125,7 +126,7 @@ def arms(course: Course, style: GaitStyle, seed: int) -> np.ndarray:
         n: np.radians(at_speed(n, gear))
         for n in ("arm_swing", "arm_middle", "elbow", "elbow_swing", "abduct", "inward")
     }
-    idle = style.life * (1.0 - smooth_step(gear / 0.7))
+    idle = style.life * (1.0 - quintic_step(gear / 0.7))
     sides = []
     for side, shift in ((0, 0.5), (1, 0.0)):
         uneven = 1.0 + style.life * (0.08 * wander(course.times, seed + 5 + side, 2.6) + (0.04, -0.04)[side])

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..base.easing import quintic_step
 from . import gait_tables as tables
 from . import quaternion
 from .adult import adult_skeleton
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, lift_off_ground
 from .gait import footsteps, kept_bent, posture_over, thigh_shank, with_feet
-from .gait_tables import smooth_step
 from .keyed import envelope, keyed, mixed
 from .motion import Motion
 from .neutral import Neutral, neutral_stance
@@ -164,7 +164,7 @@ def strike(
 def _on_the_run(recipe: Strike, speed: float) -> Strike:
     """The same strike in a run at `speed` m/s: the steps keep their rhythm, arms and trunk swing out less, and the
     touch falls into the middle of the standing foot's short stance."""
-    share = float(smooth_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
+    share = float(quintic_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
     duty = float(tables.at_speed("duty", speed))
     at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
     return replace(
@@ -259,7 +259,7 @@ def dribble(
     which = steps[RIGHT].current(course.times)
     share = (course.times - steps[RIGHT].off[which]) / (steps[RIGHT].on[which + 1] - steps[RIGHT].off[which])
     touch = np.where(share > 0, np.exp(-(((np.clip(share, 0, 1) - 0.78) / 0.1) ** 2)), 0.0)
-    touch = touch * smooth_step(np.clip((1.0 - share) / 0.1, 0, 1))
+    touch = touch * quintic_step(np.clip((1.0 - share) / 0.1, 0, 1))
     scale = neutral.leg / tables.LEG
     ahead = np.stack([np.cos(posture.heading), np.sin(posture.heading), 0 * touch], axis=-1)
     ankles[:, RIGHT] += 0.05 * scale * touch[:, None] * ahead

@@ -77,6 +77,16 @@ class Humanoid:
         """The uppermost joint of the spine, or the hips where there is none."""
         return self.spine[-1] if self.spine else self.hips
 
+    @property
+    def neck_or_chest(self) -> int:
+        """The top of the trunk: the neck, or the chest where there is none."""
+        return self.chest if self.neck is None else self.neck
+
+    @property
+    def head_or_neck(self) -> int:
+        """The joint that turns the head: the head, or the neck or chest where there is none."""
+        return self.neck_or_chest if self.head is None else self.head
+
 
 def side_and_part(name: str) -> tuple[str, str]:
     """Side ("left", "right", "") and the rest of a joint's name, prefix, blanks and case removed."""

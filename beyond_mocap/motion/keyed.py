@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from .gait_tables import smooth_step
+from ..base.easing import quintic_step
+
 
 
 def keyed(rows, times: np.ndarray) -> np.ndarray:
@@ -15,6 +16,13 @@ def keyed(rows, times: np.ndarray) -> np.ndarray:
     last."""
     first, last, curve = _curve(tuple(map(tuple, rows)))
     return curve(np.clip(times, first, last))
+
+
+def keyed_rounded(rows, times: np.ndarray, frames: float) -> np.ndarray:
+    """`keyed` without corners in the speed: (T, values) behind a Gaussian of `frames` standard deviation."""
+    from scipy.ndimage import gaussian_filter1d
+
+    return gaussian_filter1d(keyed(rows, times), frames, axis=0, mode="nearest")
 
 
 @lru_cache(maxsize=256)
@@ -26,7 +34,7 @@ def _curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
 
 def envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
     """0 before `begin`, 1 from `full` to `fade`, 0 after `end` (T,)."""
-    return smooth_step((times - begin) / (full - begin)) * (1.0 - smooth_step((times - fade) / (end - fade)))
+    return quintic_step((times - begin) / (full - begin)) * (1.0 - quintic_step((times - fade) / (end - fade)))
 
 
 def mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:

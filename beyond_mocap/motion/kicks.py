@@ -14,13 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import quintic_step
 from . import gait_tables as tables
 from . import quaternion
 from .footsteps import lift_off_ground
-from .gait_tables import smooth_step
 from .gestures import LEFT, RIGHT
 from .humanoid import identify
-from .keyed import keyed
+from .keyed import keyed_rounded
 from .mirror import mirror
 from .motion import Motion, at_frames, place, pose_kinematics
 from .neutral import Neutral
@@ -187,7 +187,7 @@ def _upright(style: KickStyle, neutral: Neutral, times: np.ndarray) -> tuple[Pos
     scale = neutral.leg / tables.LEG
 
     def curve(rows) -> np.ndarray:
-        return _rounded(keyed(rows, times))
+        return keyed_rounded(rows, times, _ROUND * _PLAN)
 
     nothing = np.zeros_like(times)
     pelvis, spine = np.radians(curve(style.pelvis)), np.radians(curve(style.spine))
@@ -320,17 +320,10 @@ def _swung(
     near = np.exp(-0.5 * (times / _LIFT) ** 2)
     ankle[:, 2] += lift * near
     foot = np.stack([np.zeros_like(times), bent - loft * near - shank, turn - out], axis=-1)
-    free = smooth_step((times - _FREE[0]) / (_FREE[1] - _FREE[0]))
-    free = free * (1.0 - smooth_step((times - _DOWN[0]) / (_DOWN[1] - _DOWN[0])))
+    free = quintic_step((times - _FREE[0]) / (_FREE[1] - _FREE[0]))
+    free = free * (1.0 - quintic_step((times - _DOWN[0]) / (_DOWN[1] - _DOWN[0])))
     ankles, feet, toes = posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
     ankles[:, RIGHT] += free[:, None] * (ankle - ankles[:, RIGHT])
     feet[:, RIGHT] += free[:, None] * (foot - feet[:, RIGHT])
     toes[:, RIGHT] += free * (_TOES_UP * near - toes[:, RIGHT])
     return posture.changed(ankles=ankles, feet=feet, toes=toes)
-
-
-def _rounded(rows: np.ndarray) -> np.ndarray:
-    """The same curves (T, C) without corners in their speed."""
-    from scipy.ndimage import gaussian_filter1d
-
-    return gaussian_filter1d(rows, _ROUND * _PLAN, axis=0, mode="nearest")

@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.easing import quintic_step
+from ..base.vectors import cross, unit_vectors
 from . import quaternion
-from .gait_tables import GRAVITY, smooth_step
+from .gait_tables import GRAVITY
 from .humanoid import Humanoid, identify
 from .motion import Motion, at_frames, concatenate, pose_kinematics, resample
 from .neutral import neutral_stance
@@ -31,7 +33,7 @@ LEANING = np.radians(25.0)
 _MEASURED = 0.05  # seconds over which speeds at the recording's end are taken
 _FASTEST_TURN = 6.0  # radians per second; faster ones are the end of a filter
 _MIDDLE = 0.25  # of the way from hips to neck: the body's middle, which falls freely
-_LONGEST_FALL = 1.5
+_LONGEST_FALL = 1.5  # s
 _SETTLING, _LYING_STILL = 0.4, 0.15  # seconds from touching the ground to turning, and from there to getting up
 _STARTING = 0.4  # seconds in which the way up gathers speed
 _FRICTION = 0.13  # seconds in which a sliding body loses two thirds of its speed
@@ -39,7 +41,7 @@ _CUSHION = 0.05  # metres over which the ground takes the fall up
 _RATES = (11.0, 11.0, 7.0)  # per second: in the air, landing, turning over and getting up
 _HASTE = 1.25  # a player gets up faster than who shows it in a studio
 _LEAD = 0.4  # seconds before the hips rise at which a way of getting up is begun
-_RISEN = 0.04
+_RISEN = 0.04  # m of the hips above where they lay, from which a way up begins
 _SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # metres per second squared of a marker taken for another, near the end
 
 
@@ -194,21 +196,17 @@ def _axes(skeleton: Skeleton, rotations: np.ndarray) -> tuple[np.ndarray, np.nda
     """Unit vectors (T, 3) in the world: along the trunk to the neck, to the body's left, and ahead of the chest."""
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
-    top = body.neck if body.neck is not None else body.chest
-    along = _unit(places[:, top] - places[:, body.hips])
+    top = body.neck_or_chest
+    along = unit_vectors(places[:, top] - places[:, body.hips])
     left = places[:, body.left.upper_leg] - places[:, body.right.upper_leg]
-    left = _unit(left - np.sum(left * along, axis=1, keepdims=True) * along)
-    return along, left, quaternion.cross(left, along)
-
-
-def _unit(v: np.ndarray) -> np.ndarray:
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
+    left = unit_vectors(left - np.sum(left * along, axis=1, keepdims=True) * along)
+    return along, left, cross(left, along)
 
 
 def _to_middle(skeleton: Skeleton, body: Humanoid, rotations: np.ndarray) -> np.ndarray:
     """(T, 3) m from the root to the body's middle; rotations (T, J, 4) local."""
     places, _ = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
-    top = body.neck if body.neck is not None else body.chest
+    top = body.neck_or_chest
     return places[:, body.hips] + _MIDDLE * (places[:, top] - places[:, body.hips])
 
 
@@ -276,13 +274,13 @@ def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up
     root[:, :2] = fall.level(seconds, flight / fps) - middle[:, :2]
     ground = lowest_root(skeleton, rotations, arms=False)
     free = fall.height(np.minimum(seconds, (flight + settling) / fps)) - middle[:, 2]
-    root[:, 2] = _cushioned(free, ground, smooth_step(seconds / 0.15))
+    root[:, 2] = _cushioned(free, ground, quintic_step(seconds / 0.15))
     start = flight + settling
     goal, pose = at_frames(up, shown)
     root[start:, :2] = _carried(root[start - 3 : start, :2], goal[:, :2], fps)
     way = np.arange(len(shown)) / fps
     clear = np.maximum(goal[:, 2] - lowest_root(skeleton, pose, arms=False), 0.0)
-    root[start:, 2] += smooth_step((way - _LYING_STILL) / 0.6) * clear
+    root[start:, 2] += quintic_step((way - _LYING_STILL) / 0.6) * clear
     return root
 
 

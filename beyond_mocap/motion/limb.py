@@ -8,19 +8,32 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import cross, unit_vectors
 from . import quaternion
 
 
-def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray) -> np.ndarray:
+def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray, xp=np) -> np.ndarray:
     """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then it only nears
     it.
 
     distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap
-    straight.
+    straight. xp: array module, numpy or jax.numpy.
     """
     start = longest - soft
-    beyond = np.maximum(distance - start, 0.0)
-    return np.where(distance > start, longest - soft * np.exp(-beyond / soft), distance)
+    beyond = xp.maximum(distance - start, 0.0)
+    return xp.where(distance > start, longest - soft * xp.exp(-beyond / soft), distance)
+
+
+def inner_angle(upper: np.ndarray, lower: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """The angle between two bones at the joint between them, by the law of cosines.
+
+    Args:
+        upper, lower: (...,), lengths of the bones, m.
+        length: (...,), distance between their far ends, m.
+    Returns:
+        (...,), rad, from 0 folded to pi straight.
+    """
+    return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
 
 
 def bend(
@@ -34,7 +47,7 @@ def bend(
     difference of the bones."""
     line = target - top
     asked = np.linalg.norm(line, axis=-1)
-    direction = unit(line, np.array([0.0, 0.0, -1.0]))
+    direction = unit_vectors(line, np.array([0.0, 0.0, -1.0]))
     nearest = np.abs(upper - lower) + 0.02 * (upper + lower)
     reach = np.maximum(soft_distance(asked, upper + lower, soft), nearest)
     across = pole - np.sum(pole * direction, axis=-1, keepdims=True) * direction
@@ -42,19 +55,13 @@ def bend(
     along = (upper**2 - lower**2 + reach**2) / (2.0 * reach)
     height = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     middle = top + along[..., None] * direction + height[..., None] * across
-    return middle, top + reach[..., None] * direction, quaternion.cross(direction, across)
-
-
-def unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) at length one; `otherwise` (..., 3) where they have none."""
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.where(length > 1e-9, v / np.maximum(length, 1e-9), otherwise)
+    return middle, top + reach[..., None] * direction, cross(direction, across)
 
 
 def _unit_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) at length one; any square to `direction` (..., 3) where they have none."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return v / length if np.all(length > 1e-9) else unit(v, _any_normal(direction))
+    return v / length if np.all(length > 1e-9) else unit_vectors(v, _any_normal(direction))
 
 
 def _any_normal(direction: np.ndarray) -> np.ndarray:
@@ -70,5 +77,5 @@ def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """
     left = -(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
     left = _unit_across(left, direction)
-    forward = quaternion.cross(left, -direction)
+    forward = cross(left, -direction)
     return quaternion.from_matrix(np.stack([forward, left, -direction], axis=-1))

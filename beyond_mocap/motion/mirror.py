@@ -28,9 +28,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from . import quaternion
 from .humanoid import Humanoid, identify
-from .motion import Motion, pose_kinematics
+from .motion import Motion, local_rotations, pose_kinematics
 from .skeleton import Skeleton
 
 _FLIPS = np.stack([np.diag(signs) for signs in ((-1.0, 1, 1), (1.0, -1, 1), (1.0, 1, -1), (-1.0, -1, -1))])
@@ -39,7 +40,7 @@ _PULL = 1e-3  # of D_j against the bones: decides what bones leave open, and mov
 _SYMMETRIC = 0.1  # squared misfit of the rest pose with its mirror image, over its bones' squared lengths
 _GEOMETRY_WEIGHT = 4.0
 _CHANGE = 3.0  # by how much another D than the parent's has to be better
-_FRAMES = 256
+_FRAMES = 256  # of a motion that are looked at
 
 
 def mirror(motion: Motion) -> Motion:
@@ -54,9 +55,7 @@ def mirror(motion: Motion) -> Motion:
     # M R M keeps the angle; its axis, a pseudovector, keeps its y and turns the others
     turned = world[:, list(body.mirror)] * (1.0, -1.0, 1.0, -1.0)
     world = quaternion.multiply(turned, corrections)
-    local = world.copy()
-    parents = list(motion.skeleton.parents[1:])
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents]), world[:, 1:])
+    local = local_rotations(motion.skeleton, world)
     return Motion(motion.skeleton, motion.root_positions * np.diag(_WORLD), local, motion.fps)
 
 
@@ -76,7 +75,7 @@ def _rest_mirror(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
     """The mirror (3, 3) of the rest pose: across the line from hip to hip."""
     rest, _ = pose_kinematics(skeleton, np.zeros(3), quaternion.identity(len(skeleton)))
     across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
-    across = across / max(np.linalg.norm(across), 1e-9)
+    across = unit_vector(across)
     return np.eye(3) - 2.0 * np.outer(across, across)
 
 

@@ -102,6 +102,20 @@ def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     )
 
 
+def local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
+    """Each joint's rotation against its parent's.
+
+    Args:
+        skeleton: J joints, the root first.
+        world: (..., J, 4), world rotations.
+    Returns:
+        (..., J, 4), local rotations.
+    """
+    local, parents = world.copy(), list(skeleton.parents[1:])
+    local[..., 1:, :] = quaternion.multiply(quaternion.inverse(world[..., parents, :]), world[..., 1:, :])
+    return local
+
+
 def world_rotation(skeleton: Skeleton, local: np.ndarray, joint: int) -> np.ndarray:
     """World rotation (T, 4) of one joint, from local rotations (T, J, 4)."""
     world = local[:, joint]

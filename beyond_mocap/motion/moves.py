@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..base.easing import quintic_step
 from . import gait_tables as tables
 from .adult import adult_skeleton
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps
 from .gait import footsteps, posture_over, with_feet
-from .gait_tables import smooth_step
 from .gestures import LEFT, RIGHT, Gesture
 from .keyed import envelope, keyed, mixed
 from .motion import Motion
@@ -290,7 +290,7 @@ def getting_up(
     times = course.times - rest
     trunk = np.radians(keyed(_UP["tilt"], times))
     way = keyed(_UP["hips"], times) * scale
-    on_feet = smooth_step((times - 3.2) / 0.7)
+    on_feet = quintic_step((times - 3.2) / 0.7)
     nothing = np.zeros_like(times)
     hips = np.stack([way[:, 0], posture.hips[:, 1] * on_feet, way[:, 1]], -1)
     hips[:, 2] = mixed(hips[:, 2], posture.hips[:, 2], on_feet)

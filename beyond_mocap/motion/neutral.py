@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import cross, unit_vectors
 from . import quaternion
 from .arctangent import arctan2
 from .humanoid import Humanoid, Limb, heading_from_positions, identify
-from .limb import unit
-from .motion import Motion, forward_kinematics, pose_kinematics
+from .motion import Motion, forward_kinematics, local_rotations, pose_kinematics
 from .skeleton import Skeleton, frozen_array
+from .structure import below
 
 _UP = np.array([0.0, 0.0, 1.0])
 _DOWN = -_UP
@@ -61,7 +62,7 @@ def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral
     world = np.array(_start(skeleton, body, example))
     slopes = [_sole_slope(skeleton, limb, world, example) for limb in (body.left, body.right)]
     _straighten(skeleton, body, world, slopes)
-    local = _to_local(skeleton, world)
+    local = local_rotations(skeleton, world)
     positions, _ = pose_kinematics(skeleton, np.zeros((1, 3)), local[None])
     return _measure(skeleton, body, world, positions[0])
 
@@ -73,7 +74,9 @@ def rests_upright(skeleton: Skeleton) -> bool:
     top = next(j for j in (body.neck, body.head, body.chest, body.hips) if j is not None)
     bones = [(body.hips, top, _UP, _NEARLY)]
     bones += [(leg.upper_leg, leg.foot, _DOWN, _SPLAYED) for leg in (body.left, body.right)]
-    return all(unit(places[0, low] - places[0, high], -way) @ way > np.cos(most) for high, low, way, most in bones)
+    return all(
+        unit_vectors(places[0, low] - places[0, high], -way) @ way > np.cos(most) for high, low, way, most in bones
+    )
 
 
 def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.ndarray:
@@ -87,11 +90,12 @@ def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.nda
     up = places[top] - places[body.hips]
     if np.linalg.norm(up) < 1e-6:
         up = places[body.hips] - 0.5 * (places[body.left.foot] + places[body.right.foot])
-    left = unit(across, np.array([0.0, 1.0, 0.0]))
-    if unit(up, _UP)[2] > np.cos(_NEARLY):
-        left, up = unit(left * [1.0, 1.0, 0.0], left), _UP  # a skeleton that rests upright keeps its own posture
-    up = unit(up - np.dot(up, left) * left, _UP)
-    frame = quaternion.from_matrix(np.stack([quaternion.cross(left, up), left, up], axis=-1))
+    left = unit_vectors(across, np.array([0.0, 1.0, 0.0]))
+    if unit_vectors(up, _UP)[2] > np.cos(_NEARLY):
+        # a skeleton that rests upright keeps its own posture
+        left, up = unit_vectors(left * [1.0, 1.0, 0.0], left), _UP
+    up = unit_vectors(up - np.dot(up, left) * left, _UP)
+    frame = quaternion.from_matrix(np.stack([cross(left, up), left, up], axis=-1))
     return np.broadcast_to(quaternion.inverse(frame), (len(skeleton), 4))
 
 
@@ -116,7 +120,7 @@ def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
             (limb.upper_arm, limb.lower_arm),
         ):
             if high is not None and low is not None:
-                score += unit(places[:, low] - places[:, high], _DOWN) @ _DOWN
+                score += unit_vectors(places[:, low] - places[:, high], _DOWN) @ _DOWN
     return score
 
 
@@ -172,9 +176,9 @@ def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:
 def _direction(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None) -> np.ndarray:
     """World direction (3,) of the bone from `joint` to `child` (or to its tip, or its parent's bone going on)."""
     if child is not None:
-        return unit(_world_offset(skeleton, world, joint, child), _DOWN)
+        return unit_vectors(_world_offset(skeleton, world, joint, child), _DOWN)
     offset = _tip(skeleton, joint) if _has_tip(skeleton, joint) else skeleton.offsets[joint]
-    return unit(quaternion.rotate(world[joint], offset), _DOWN)
+    return unit_vectors(quaternion.rotate(world[joint], offset), _DOWN)
 
 
 def _world_offset(skeleton: Skeleton, world: np.ndarray, joint: int, below: int) -> np.ndarray:
@@ -196,24 +200,8 @@ def _point(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None,
     turn = quaternion.between(direction, wanted)
     if np.dot(direction, wanted) < -0.999:
         turn = quaternion.about_axis(np.array([1.0, 0.0, 0.0]), np.pi)
-    for other in _below(skeleton, joint):
+    for other in below(skeleton.parents, joint):
         world[other] = quaternion.multiply(turn, world[other])
-
-
-def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and everything that hangs on it."""
-    found = {joint}
-    for other, parent in enumerate(skeleton.parents):
-        if parent in found:
-            found.add(other)
-    return sorted(found)
-
-
-def _to_local(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
-    parents = np.array(skeleton.parents)
-    local = world.copy()
-    local[1:] = quaternion.multiply(quaternion.inverse(world[parents[1:]]), world[1:])
-    return local
 
 
 def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.ndarray) -> Neutral:

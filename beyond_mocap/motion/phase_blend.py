@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ..base.vectors import distance_along
 from . import quaternion
 from .humanoid import heading_from_positions
 from .motion import Motion, at_frames, forward_kinematics
@@ -53,7 +54,7 @@ class Strides:
     @property
     def metres(self) -> np.ndarray:
         """(K - 1,) how far the body goes with each step."""
-        return np.diff(_at(_travelled(self.path), self.landings))
+        return np.diff(_at(distance_along(self.path), self.landings))
 
     @property
     def speed(self) -> float:
@@ -164,11 +165,6 @@ def _inside(standing: np.ndarray, frames: np.ndarray) -> np.ndarray:
             away = np.abs(frames[:, None] - edges).min(axis=1) if len(edges) else np.full(len(frames), float(len(on)))
             out[:, side, point] = np.where(on[np.round(frames).astype(int)], away, -away)
     return out
-
-
-def _travelled(path: np.ndarray) -> np.ndarray:
-    """Metres (T,) along `path` (T, 2) since its first frame."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
 
 
 def _at(values: np.ndarray, frames: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from .body import MATERIALS, deformed, low_poly_body
 from .humanoid import heading_from_positions
 from .motion import Motion, forward_kinematics, place
@@ -57,7 +58,7 @@ def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
     """
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    normal = unit_vectors(normal, least=1e-12)
     light = normal @ (_SUN / np.linalg.norm(_SUN))
     colour = (
         np.array([COLOURS[part] for part in MATERIALS])[material] * (0.55 + 0.45 * np.maximum(light, -0.5))[:, None]

@@ -11,9 +11,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from . import limb, quaternion
 from .humanoid import Humanoid, Limb, identify
-from .motion import Motion, pose_kinematics
+from .motion import Motion, local_rotations, pose_kinematics
 from .neutral import Neutral
 
 # metres below full stretch from where a leg eases: less than what `gait` leaves, so that standing feet are met exactly
@@ -71,9 +72,7 @@ def to_motion(posture: Posture, neutral: Neutral) -> Motion:
     body = identify(skeleton)
     turns = _turns(posture, neutral, body)
     world = quaternion.multiply(turns, neutral.rotations)
-    local = world.copy()
-    parents = np.array(skeleton.parents)
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents[1:]]), world[:, 1:])
+    local = local_rotations(skeleton, world)
     places, _ = pose_kinematics(skeleton, np.zeros((len(posture), 3)), local)
     middle = 0.5 * (places[:, body.left.upper_leg] + places[:, body.right.upper_leg])
     return Motion(skeleton, posture.hips - middle, local, posture.fps)
@@ -159,8 +158,8 @@ def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[in
     ankle = posture.ankles[:, side]
     pole = knee_pole(posture, top, side)
     knee, end, hinge = limb.bend(top, ankle, np.array(upper), np.array(lower), pole, _SOFT)
-    thigh = limb.bone_frame(limb.unit(knee - top, -_Z), hinge)
-    shank = limb.bone_frame(limb.unit(end - knee, -_Z), hinge)
+    thigh = limb.bone_frame(unit_vectors(knee - top, -_Z), hinge)
+    shank = limb.bone_frame(unit_vectors(end - knee, -_Z), hinge)
     foot = foot_rotation(posture.feet[:, side])
     said = {joints.upper_leg: thigh, joints.lower_leg: shank, joints.foot: foot}
     if joints.toe is not None:

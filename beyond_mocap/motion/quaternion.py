@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import cross, unit_vectors
 from .arctangent import arctan2
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -45,9 +46,7 @@ def inverse(q: np.ndarray) -> np.ndarray:
 
 def normalized(q: np.ndarray) -> np.ndarray:
     """The same rotations with length one; a zero quaternion becomes the identity: (..., 4)."""
-    q = np.asarray(q, dtype=float)
-    length = np.linalg.norm(q, axis=-1, keepdims=True)
-    return np.where(length > 1e-12, q / np.maximum(length, 1e-12), IDENTITY)
+    return unit_vectors(np.asarray(q, dtype=float), IDENTITY, 1e-12)
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -56,13 +55,6 @@ def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     w, u = q[..., :1], q[..., 1:]
     t = 2.0 * cross(u, v)
     return v + w * t + cross(u, t)
-
-
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross product of (..., 3) vectors, several times faster than `numpy.cross` on long arrays."""
-    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
-    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def about_axis(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -83,6 +75,11 @@ def turned_level(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y = v[..., 0], v[..., 1]
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
+def turned_about_up(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) turned by `angle` (...,) radians about the world's up axis: (..., 3)."""
+    return np.concatenate([turned_level(v[..., :2], angle), v[..., 2:]], axis=-1)
 
 
 def from_rotation_vector(v: np.ndarray) -> np.ndarray:
@@ -175,8 +172,8 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The shortest rotation that turns vectors a onto b: (..., 3), (..., 3) -> (..., 4); opposites about any axis."""
     a = np.asarray(a, dtype=float)
     b = np.asarray(b, dtype=float)
-    a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
-    b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
+    a = unit_vectors(a, least=1e-12)
+    b = unit_vectors(b, least=1e-12)
     dot = np.sum(a * b, axis=-1, keepdims=True)
     axis = cross(a, b)
     other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from ..base.vectors import unit_vectors
 from . import gait_tables as tables
 from . import quaternion
 from .humanoid import Humanoid, identify
@@ -46,7 +47,7 @@ def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarra
         shoulder = places[:, chain[0]]
         points = [(p - shoulder, thick) for joint, p, thick in _surface(skeleton, places, world) if joint in chain[1:]]
         out_level = points[-1][0][:, :2]
-        level = out_level / np.maximum(np.linalg.norm(out_level, axis=1, keepdims=True), 1e-9)
+        level = unit_vectors(out_level)
         along = np.stack([np.sum(p[:, :2] * level, axis=1) for p, _ in points], axis=1)[..., None]
         above = np.stack([p[:, 2] for p, _ in points], axis=1)[..., None]
         thick = np.array([t for _, t in points])[:, None]

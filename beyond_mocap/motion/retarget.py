@@ -20,19 +20,20 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from . import limb, quaternion
 from .anatomy import Anatomy, head_chain, spine_shares, study
 from .bone_map import Pairs, pair
 from .humanoid import Limb
-from .motion import Motion, forward_kinematics
+from .motion import Motion, forward_kinematics, local_rotations
 from .skeleton import Skeleton
 
-_SOFT = 0.01
+_SOFT = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
 _CARRIED_BY = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower_arm", "toe": "foot"}
 # two rigs are the same, axes and all, when their bones point the same way in their rest pose within this angle
 _SAME_RIG = np.cos(np.radians(12.0))
-_TRUNK_ROUNDS = 3
+_TRUNK_ROUNDS = 3  # of turning the trunk and seeing what is left
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -122,7 +123,7 @@ class _Transfer:
         places = _laid(self.target.skeleton, world) + root[:, None]
         for mine, theirs in sides:
             self._reach(places, mine, theirs)
-        return Motion(self.target.skeleton, root, _to_local(self.target.skeleton, self._world()), self.fps)
+        return Motion(self.target.skeleton, root, local_rotations(self.target.skeleton, self._world()), self.fps)
 
     @staticmethod
     def _limbs(anatomy: Anatomy) -> tuple[Limb, Limb]:
@@ -188,7 +189,7 @@ class _Transfer:
         bending = spine[:-1] or spine
         if not bending or tops is None:
             return world
-        line = limb.unit(self.places[:, tops[0]] - _mid_hips(self.places, self.source), _UP)
+        line = unit_vectors(self.places[:, tops[0]] - _mid_hips(self.places, self.source), _UP)
         for _ in range(_TRUNK_ROUNDS):
             places = _laid(self.target.skeleton, world)
             start, middle = places[:, bending[0]], _mid_hips(places, self.target)
@@ -229,7 +230,7 @@ class _Transfer:
     def _pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray, height: np.ndarray) -> np.ndarray:
         """Where a knee points (T, 3): as the source's, which says little where it is straighter than the target's will
         be, `height` (T,) metres off the line hip-ankle; the rest of the way it bends about the thigh's own hinge."""
-        line = limb.unit(ankle - hip, -_UP)
+        line = unit_vectors(ankle - hip, -_UP)
         ahead = quaternion.rotate(self._turn(mine.upper_leg), np.array([1.0, 0.0, 0.0]))
         off, ahead = (v - np.sum(v * line, axis=1, keepdims=True) * line for v in (knee - hip, ahead))
         lacking = np.maximum(height - np.linalg.norm(off, axis=1), 0.0)
@@ -280,9 +281,3 @@ def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
     for joint, parent in enumerate(parents, 1):
         places[:, joint] = places[:, parent] + bones[:, joint - 1]
     return places
-
-
-def _to_local(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
-    local, parents = world.copy(), list(skeleton.parents[1:])
-    local[:, 1:] = quaternion.multiply(quaternion.inverse(world[:, parents]), world[:, 1:])
-    return local

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import cross_level
 from ..errors import InputError
 from .body import SHIRT, BodyMesh, deformed
 from .motion import Motion
@@ -77,10 +78,10 @@ def _behind(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """For points (N, 2) the triangle of (K, 3, 2) that holds each, or comes nearest to it, and barycentric shares
     (N, 3)."""
     origin, first, second = flat[:, 0], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    area = cross_level(first, second)
     away = points[:, None] - origin
-    b = (away[..., 0] * second[:, 1] - away[..., 1] * second[:, 0]) / area
-    c = (first[:, 0] * away[..., 1] - first[:, 1] * away[..., 0]) / area
+    b = cross_level(away, second) / area
+    c = cross_level(first, away) / area
     shares = np.stack([1.0 - b - c, b, c], axis=-1)
     chosen = np.argmax(shares.min(axis=-1), axis=1)
     share = np.clip(shares[np.arange(len(points)), chosen], 0.0, None)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..base.digest import hex_digest
 from ..errors import InputError
 
 
@@ -85,9 +85,16 @@ class Skeleton:
         )
 
     @property
+    def rest_positions(self) -> np.ndarray:
+        """Where the joints are while none is turned, (J, 3) m from the root."""
+        places = np.zeros((len(self), 3))
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                places[joint] = places[parent] + self.offsets[joint]
+        return places
+
+    @property
     def fingerprint(self) -> str:
         """A short hash of names, parents and offsets to a tenth of a millimetre."""
-        digest = hashlib.sha256("\n".join(self.names).encode())
-        digest.update(np.array(self.parents, np.int64).tobytes())
-        digest.update(np.round(self.offsets * 1e4).astype(np.int64).tobytes())
-        return digest.hexdigest()[:16]
+        parents, offsets = np.array(self.parents, np.int64), np.round(self.offsets * 1e4).astype(np.int64)
+        return hex_digest("\n".join(self.names), parents, offsets)

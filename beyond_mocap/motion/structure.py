@@ -11,6 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
+
 _ALIKE = 0.15  # relative difference of two bones that count as left and right
 _SHORTEST = 0.3  # of the longest pair: upper plus lower bones of a pair
 _NEARLY = 0.6
@@ -100,15 +102,15 @@ def _sided(legs, places, tips, parents, arms):
     a, b = legs
     hips = 0.5 * (places[:, a[0]] + places[:, b[0]])
     ends = [arm[0] for arm in arms] if arms is not None else [0]
-    up = _unit(places[:, ends].mean(axis=1) - hips) if arms is not None else np.array([0.0, 0.0, 1.0])
-    across = _unit(places[:, a[0]] - places[:, b[0]])
+    up = unit_vectors(places[:, ends].mean(axis=1) - hips) if arms is not None else np.array([0.0, 0.0, 1.0])
+    across = unit_vectors(places[:, a[0]] - places[:, b[0]])
     vote = 0.0
     for leg in (a, b):
-        thigh, shank = (_unit(places[:, leg[i + 1]] - places[:, leg[i]]) for i in (0, 1))
+        thigh, shank = (unit_vectors(places[:, leg[i + 1]] - places[:, leg[i]]) for i in (0, 1))
         vote += np.mean(np.sum(np.cross(thigh, shank) * across, axis=1))
         toes = children(parents, leg[2])
         ends = places[:, toes].mean(axis=1) if toes else tips[:, leg[2]]
-        vote += np.mean(np.sum(np.cross(up, _unit(ends - places[:, leg[2]])) * across, axis=1))
+        vote += np.mean(np.sum(np.cross(up, unit_vectors(ends - places[:, leg[2]])) * across, axis=1))
     return (a, b) if vote > -_TELLING else (b, a)
 
 
@@ -180,7 +182,3 @@ def common_ancestor(parents, joints: Sequence[int]) -> int:
     """The lowest joint from which all of `joints` hang (itself not counted as hanging on itself unless it is one)."""
     shared = set(path(parents, joints[0])).intersection(*(path(parents, j) for j in joints[1:]))
     return max(shared, key=lambda j: len(path(parents, j)))
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)

@@ -21,17 +21,17 @@ from .footsteps import lift_off_ground
 from .gestures import LEFT, RIGHT
 from .grip import grip_in
 from .humanoid import identify
-from .keyed import keyed
+from .keyed import keyed_rounded
 from .mirror import mirror
 from .motion import Motion, at_frames, forward_kinematics, place
 from .neutral import Neutral, neutral_stance
 from .posture import Posture, to_motion
 from .skeleton import Skeleton
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # m/s^2
 BEFORE, AFTER = 1.6, 1.2
 """Seconds of a hard throw before and after release; slower ones take longer."""
-SLOWEST, FASTEST = 3.0, 45.0
+SLOWEST, FASTEST = 3.0, 45.0  # m/s at release
 _PLAN = 480.0  # frames a second at which a throw is planned
 _ROUND = 0.007  # s over which corners of the tables are rounded
 _EARLIEST, _LATEST = -0.022, 0.022  # s around the table's release within which the ball may leave
@@ -227,7 +227,7 @@ def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
     scale = neutral.leg / tables.LEG
 
     def curve(rows) -> np.ndarray:
-        return _rounded(keyed(rows, times))
+        return keyed_rounded(rows, times, _ROUND * _PLAN)
 
     nothing = np.zeros_like(times)
     body = identify(neutral.skeleton)
@@ -264,10 +264,3 @@ def _foot(rows: np.ndarray, neutral: Neutral, scale: float) -> np.ndarray:
     up = neutral.ankle_height + raised * scale
     up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
     return np.stack([ahead * scale, left * scale, up, np.zeros_like(up), pitch, yaw], axis=-1)
-
-
-def _rounded(rows: np.ndarray) -> np.ndarray:
-    """The same curves (T, C) without corners in their speed."""
-    from scipy.ndimage import gaussian_filter1d
-
-    return gaussian_filter1d(rows, _ROUND * _PLAN, axis=0, mode="nearest")

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..motion import quaternion
 from ..motion.humanoid import Limb, identify
+from ..motion.limb import inner_angle
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.striking import Surface
@@ -31,8 +32,8 @@ more."""
 MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}
 """Radians that the whole limb turns about its hip or shoulder at most."""
 
-SOFT = 0.003
-_DAMPING = 1e-3
+SOFT = 0.003  # m below full length from where a limb eases
+_DAMPING = 1e-3  # keeps the bend of a spine small where it moves the part little
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +102,7 @@ def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray
     turn = quaternion.to_rotation_vector(quaternion.between(old[None], new[None]))[0]
     turn *= min(1.0, most / max(np.linalg.norm(turn), 1e-9))
     bones = np.linalg.norm(middle - top), np.linalg.norm(end - middle)
-    own, wanted = (_inside(*bones, np.linalg.norm(line)) for line in (old, new))
+    own, wanted = (inner_angle(*bones, np.linalg.norm(line)) for line in (old, new))
     limit = MOST_ANGLE if wanted > own else LEAST_ANGLE
     left = limit - own
     bend = 0.0 if left * (wanted - own) <= 0.0 else min((wanted - own) / left, 1.0) * np.sign(left)
@@ -115,18 +116,13 @@ def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarr
     line = end - top
     length = np.linalg.norm(line, axis=1)
     bones = np.linalg.norm(middle - top, axis=1), np.linalg.norm(end - middle, axis=1)
-    own = _inside(*bones, length)
+    own = inner_angle(*bones, length)
     left = np.maximum(MOST_ANGLE - own, 0.0) if swing.bend > 0.0 else np.minimum(LEAST_ANGLE - own, 0.0)
     angle = own + share * abs(swing.bend) * left
     reach = np.sqrt(bones[0] ** 2 + bones[1] ** 2 - 2.0 * bones[0] * bones[1] * np.cos(angle))
     turned = quaternion.rotate(quaternion.from_rotation_vector(share[:, None] * swing.turn), line)
     moves = turned * (reach / length)[:, None] - line - share[:, None] * [0.0, 0.0, swing.lowered]
     return np.where(share[:, None] > 0.0, moves, 0.0)
-
-
-def _inside(upper, lower, length):
-    """Angle (...,) rad between two bones whose ends are `length` (...,) m apart."""
-    return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
 
 
 def limb_carried(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.easing import quintic_step
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 
@@ -21,8 +22,7 @@ def share(through: np.ndarray, after: np.ndarray) -> np.ndarray:
     through (R,) from 0 to 1: how far the fade has come; after (R,) bool: whether the frame lies behind the seam, where
     the other piece is the one that ends.
     """
-    x = np.clip(through, 0.0, 1.0)
-    begun = x**3 * (10.0 + x * (6.0 * x - 15.0))
+    begun = quintic_step(through)
     return np.where(after, 1.0 - begun, begun)
 
 

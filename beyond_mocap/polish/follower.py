@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.time_series import interpolate
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path
 from .detour import headings, left_of, offsets, round_offsets
@@ -62,9 +63,9 @@ class Follower:
         """Places (N, 3) at these times (N,); before its first and after its last time it stands."""
         times = times - change.delay
         if self.path is None or not change.detours:
-            return _sampled(times, self.times, self.places)
+            return interpolate(times, self.times, self.places)
         arc = np.interp(times, self.times, self.arc)
-        beside = _sampled(times, self.times, self.beside)
+        beside = interpolate(times, self.times, self.beside)
         return beside + self.way.with_detours_at(arc, change.detours, self.by_arc)
 
     def with_more(self, times: np.ndarray, change: Change, train) -> np.ndarray:
@@ -78,8 +79,8 @@ class Follower:
             arc = arc - way.extra(arc[0], aside) + way.extra(arc[0], old)
             aside = way.aside(arc, (*change.detours, *train))
         arc, shape = np.broadcast_to(arc, aside.shape).ravel(), (*aside.shape, 3)
-        places = _sampled(arc, way.arc, way.places) + aside.reshape(-1, 1) * _sampled(arc, way.arc, way.left)
-        return places.reshape(shape) + _sampled(times, self.times, self.beside)
+        places = interpolate(arc, way.arc, way.places) + aside.reshape(-1, 1) * interpolate(arc, way.arc, way.left)
+        return places.reshape(shape) + interpolate(times, self.times, self.beside)
 
     def arc_at(self, time: float, change: Change = Change()) -> float:
         """Metres along the path as it was at a time."""
@@ -102,13 +103,13 @@ class Way:
 
     def places_at(self, arc: np.ndarray) -> np.ndarray:
         """Places (N, 3) on the path at arc lengths (N,)."""
-        return _sampled(self._within(arc, self.length), self.arc, self.places)
+        return interpolate(self._within(arc, self.length), self.arc, self.places)
 
     def with_detours_at(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
         """Places (N, 3) on the path with detours; arc as in `on_it`."""
         arc = self.on_it(arc, detours, by_arc)
-        aside = _sampled(arc, self.arc, self.left) * self.aside(arc, detours)[:, None]
-        return _sampled(arc, self.arc, self.places) + aside
+        aside = interpolate(arc, self.arc, self.left) * self.aside(arc, detours)[:, None]
+        return interpolate(arc, self.arc, self.places) + aside
 
     def on_it(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
         """Arc lengths (N,) on the path as it was, of whoever has gone `arc` (N,) metres with the detours."""
@@ -144,8 +145,3 @@ class Way:
 
     def _within(self, arc, length):
         return arc % length if self.closed and length else np.clip(arc, 0.0, length)
-
-
-def _sampled(at: np.ndarray, grid: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """values (T, 3) on a rising grid (T,), linearly between, at (N,)."""
-    return np.stack([np.interp(at, grid, values[:, axis]) for axis in range(3)], axis=1)

@@ -14,14 +14,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d
 
+from ..base.banded_least_squares import BandedLeastSquares
+from ..base.time_series import hann_smooth
+from ..base.vectors import cross
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.contacts import sole_height
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
+from ..motion.runs import run_numbers
 from ..motion.skeleton import Skeleton
 from .reach import two_bone
 
@@ -45,7 +48,7 @@ in the air: a leg that is nearly straight pops at the knee. A leg that was strai
 LEAST_EASE, LEAST_SPARE = 0.003, 0.002
 """The same of legs that were straight in the recording."""
 
-_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004
+_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004  # rounds of holding stances less firmly; m of sliding that need none
 _BEHIND = 3  # frames at 30 per second by which a rise or drop is spread
 
 
@@ -204,7 +207,7 @@ def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
-    even, odd = np.sum(u * level, axis=1), np.sum(u * quaternion.cross(n, level), axis=1)
+    even, odd = np.sum(u * level, axis=1), np.sum(u * cross(n, level), axis=1)
     length = foot.longest
     asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
     most = np.hypot(even, odd)
@@ -231,7 +234,7 @@ def held_shift(
 def held_less(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
     """Weights (T, 2) with those stances held less firmly in which `excess` (T,) m is above 0: a third at 10 cm."""
     stance = weight.max(axis=1) > 0
-    label = np.cumsum(np.diff(stance, prepend=False)) * stance
+    label = run_numbers(stance)
     worst = np.zeros(label.max(initial=0) + 1)
     np.maximum.at(worst, label, np.where(stance, np.maximum(excess, 0.0), 0.0))
     return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2
@@ -251,25 +254,16 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
     firm = np.minimum(weight[1:], weight[:-1])
     total = firm.sum(axis=1)
     pushed = np.einsum("tp,tpk->tk", firm, velocity)
-    right = np.zeros((count, velocity.shape[2]))
-    right[1:] -= pushed
-    right[:-1] += pushed
-    band = np.zeros((4, count))
-    _add_differences(band, np.array([-1.0, 1.0]), total)
-    _add_differences(band, np.array([-1.0, 3.0, -3.0, 1.0]), np.full(max(count - 3, 0), SMOOTH / scale**4))
-    band[0] += PULL * scale**2
+    squares = BandedLeastSquares(count, columns=velocity.shape[2])
+    squares.right[1:] -= pushed
+    squares.right[:-1] += pushed
+    squares.add_difference(1, total)
+    squares.add_difference(3, SMOOTH / scale**4)
+    squares.add_value(PULL * scale**2)
     if kept is not None:
         given = ~np.isnan(kept[:, 0])
-        band[0] += HOLD * given
-        right += HOLD * np.where(given[:, None], kept, 0.0)
-    return solveh_banded(band, right, lower=True)
-
-
-def _add_differences(band: np.ndarray, stencil: np.ndarray, weight: np.ndarray) -> None:
-    """Adds sum weight_t (sum_i stencil_i x_{t+i})^2 to a symmetric system in lower banded form."""
-    for i, a in enumerate(stencil):
-        for j, b in enumerate(stencil[: i + 1]):
-            band[i - j, j : j + len(weight)] += weight * a * b
+        squares.add_value(HOLD * given, goal=np.where(given[:, None], kept, 0.0))
+    return squares.solve()
 
 
 def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
@@ -291,10 +285,11 @@ def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
 
 def settled(right: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH) -> np.ndarray:
     """The smooth curve (T,) that is `right` / `weight` where weight is large, and small elsewhere."""
-    band = np.zeros((4, len(weight)))
-    _add_differences(band, np.array([-1.0, 3.0, -3.0, 1.0]), np.full(max(len(weight) - 3, 0), smooth / scale**6))
-    band[0] += weight + 2e-2
-    return solveh_banded(band, right, lower=True)
+    squares = BandedLeastSquares(len(weight))
+    squares.add_difference(3, smooth / scale**6)
+    squares.add_value(weight + 2e-2)
+    squares.right += right
+    return squares.solve()[:, 0]
 
 
 def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:
@@ -311,10 +306,7 @@ def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: fl
 
 def spread_over(need: np.ndarray, reach: int) -> np.ndarray:
     """A smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
-    window = np.hanning(2 * reach + 3)[1:-1]
-    widened = maximum_filter1d(need, 2 * reach + 1, mode="nearest")
-    padded = np.pad(widened, reach, mode="edge")
-    return np.convolve(padded, window / window.sum(), mode="valid")
+    return hann_smooth(maximum_filter1d(need, 2 * reach + 1, mode="nearest"), reach)
 
 
 def lacking(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:

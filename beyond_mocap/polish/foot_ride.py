@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
@@ -34,7 +35,7 @@ from .foot_plant import (
     turned_flat,
 )
 from .reach import CLEAR_BEND, bent_limb
-from .underfoot import Footing, Surface, footing
+from .underfoot import Surface, footing
 
 MOST_SHIFT = 0.45
 """Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the
@@ -65,7 +66,7 @@ LEAST_BEND = 0.05
 _FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
 _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stairs, in the mean
 _UP = np.array([0.0, 0.0, 1.0])
-_ROUNDS, _SLIDES_FROM = 2, 0.004
+_ROUNDS, _SLIDES_FROM = 2, 0.004  # rounds of holding stances less firmly; m of sliding that need none
 _FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recording's floor: waves of half a second pass half; metres
 _NEAR, _FIRMER = 0.004, 8  # metres off its goal beyond which a standing foot is held more firmly, times in a row
 _MORE_BENT = 0.5  # share of its new bend from which on a leg's own direction counts fully
@@ -161,7 +162,7 @@ def _steady(foot: Foot) -> Foot:
     on its toes points nowhere."""
     level = np.linalg.norm((foot.toe - foot.heel)[:, :2], axis=1, keepdims=True)
     own = np.sum(quaternion.rotate(quaternion.inverse(foot.rotation), foot.left) * level**2, axis=0)
-    left = quaternion.rotate(foot.rotation, own / max(np.linalg.norm(own), 1e-9)) * [1.0, 1.0, 0.0]
+    left = quaternion.rotate(foot.rotation, unit_vector(own)) * [1.0, 1.0, 0.0]
     size = np.linalg.norm(left, axis=1, keepdims=True)
     return replace(foot, left=np.where(size > 0.1, left / np.maximum(size, 1e-9), foot.left))
 

@@ -12,6 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.easing import smoothstep
+from ..base.vectors import unit_vectors
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import heading_from_positions, identify
@@ -49,7 +51,7 @@ def following(
         return motion
     body = identify(motion.skeleton)
     joints, world = forward_kinematics(motion)
-    head = next(joint for joint in (body.head, body.neck, body.chest) if joint is not None)
+    head = body.head_or_neck
     facing = heading_from_positions(motion.skeleton, joints)
     away = _held(places, known) - joints[:, head]
     seen = quaternion.rotate(quaternion.about_up(-facing), away)
@@ -65,11 +67,11 @@ def following(
 def head_angles(seen: np.ndarray) -> np.ndarray:
     """(N, 2) radians of yaw (to the left) and pitch (up) by which a head turns to look where `seen` (N, 3) lies from
     it, x ahead of the body and y to its left; continuous but straight up and down."""
-    unit = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)
+    unit = unit_vectors(seen)
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
     side = arctan2(unit[:, 1], np.maximum(unit[:, 0], back))
-    yaw = _limited(side, MOST_YAW) * _smooth(level / _OVERHEAD)
+    yaw = _limited(side, MOST_YAW) * smoothstep(level / _OVERHEAD)
     pitch = arctan2(unit[:, 2], level)
     return np.column_stack([yaw, np.where(pitch > 0.0, _limited(pitch, MOST_UP), _limited(pitch, MOST_DOWN))])
 
@@ -86,11 +88,6 @@ def _smoothed(seen: np.ndarray, fps: float) -> np.ndarray:
     return zero_phase_hann(head_angles(seen), fps, SECONDS)
 
 
-def _smooth(x: np.ndarray) -> np.ndarray:
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
-
-
 def _held(places: np.ndarray, known: np.ndarray) -> np.ndarray:
     """(T, 3) with the nearest known place before (or behind the first) where none is known."""
     at = np.flatnonzero(known)
@@ -104,7 +101,7 @@ def _eased_in(known: np.ndarray, fps: float) -> np.ndarray:
     frames, without = np.arange(len(known)), np.flatnonzero(~known)
     after = np.searchsorted(without, frames)
     beside = (without[np.clip(after - back, 0, len(without) - 1)] for back in (0, 1))
-    return _smooth(np.minimum(*(np.abs(frames - other) for other in beside)) / (SECONDS * fps))
+    return smoothstep(np.minimum(*(np.abs(frames - other) for other in beside)) / (SECONDS * fps))
 
 
 def _turned(motion: Motion, world: np.ndarray, head: int, turn: np.ndarray, chest: np.ndarray) -> Motion:

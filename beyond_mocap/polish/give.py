@@ -8,14 +8,14 @@ track is taken back by `on_track.pulled_to_track`.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
+from ..base.banded_least_squares import BandedLeastSquares
 from ..motion.humanoid import identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
 from .foot_plant import firmness
 
-GIVE = 0.1
+GIVE = 0.1  # weight of a standing foot's movement
 STIFF = (2.0, 0.2)
 STAY = (0.02, 5e-4)
 """Weights of the third difference and of the whole, for metres of the root and for radians of facing."""
@@ -35,7 +35,7 @@ def give(
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, root, rotations)
     count, scale = len(root), 30.0 / fps
-    band, right = np.zeros((4 * _UNKNOWNS, _UNKNOWNS * count)), np.zeros(_UNKNOWNS * count)
+    squares = BandedLeastSquares(count, _UNKNOWNS)
     for side, limb in enumerate((body.left, body.right)):
         firm = firmness(standing[:, side])
         for point, joint in enumerate((limb.foot, limb.toe_or_foot)):
@@ -45,25 +45,9 @@ def give(
             one = np.ones(len(weight))
             for axis, swing in ((_ROOT_X, -arm[:, 1]), (_ROOT_Y, arm[:, 0])):
                 stencil = {axis: -one, _TURN: -swing, axis + _UNKNOWNS: one, _TURN + _UNKNOWNS: swing}
-                _add(band, right, stencil, weight, -moves[:, axis])
+                squares.add(stencil, weight, -moves[:, axis])
     for axis, kind in ((_ROOT_X, 0), (_ROOT_Y, 0), (_TURN, 1)):
-        if count > 3:
-            third = {axis + _UNKNOWNS * k: np.full(count - 3, c) for k, c in enumerate((-1.0, 3.0, -3.0, 1.0))}
-            _add(band, right, third, np.full(count - 3, STIFF[kind] / scale**4), np.zeros(count - 3))
-        band[0, axis::_UNKNOWNS] += STAY[kind] * scale**2
-    found = solveh_banded(band[: 1 + _UNKNOWNS * min(3, count - 1) + 2], right, lower=True).reshape(count, _UNKNOWNS)
+        squares.add_difference(3, STIFF[kind] / scale**4, axis)
+        squares.add_value(STAY[kind] * scale**2, axis)
+    found = squares.solve()
     return found[:, :2], found[:, _TURN]
-
-
-def _add(
-    band: np.ndarray, right: np.ndarray, stencil: dict[int, np.ndarray], weight: np.ndarray, goal: np.ndarray
-) -> None:
-    """Adds sum_t weight_t (sum_i c_i,t x_{i + UNKNOWNS t} - goal_t)^2 to a symmetric system in lower banded form."""
-    def at(row: int) -> slice:
-        return slice(row, row + _UNKNOWNS * len(weight), _UNKNOWNS)
-
-    for i, a in stencil.items():
-        right[at(i)] += weight * a * goal
-        for j, b in stencil.items():
-            if i >= j:
-                band[i - j, at(j)] += weight * a * b

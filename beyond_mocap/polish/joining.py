@@ -6,7 +6,7 @@ import numpy as np
 
 from ..motion import quaternion
 
-UPRIGHT = np.cos(np.radians(50.0))
+UPRIGHT = np.cos(np.radians(50.0))  # height of the trunk's unit vector below which a body lies
 
 
 def chained_facing(start: float, turn: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -
         after = up[seam]
         if before[2] < UPRIGHT and after[2] < UPRIGHT:
             turn = np.arctan2(before[1], before[0]) - np.arctan2(after[1], after[0])
-            out[number] = (turn + np.pi) % (2 * np.pi) - np.pi
+            out[number] = quaternion.wrapped(turn)
     return out
 
 

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import quintic_step_by_powers
+from ..base.vectors import unit_vectors
+from ..motion.quaternion import turned_about_up
 from ..motion.striking import ball_gap, nearest_on
 from ..motion.track import BALL_RADIUS
 
@@ -15,13 +18,13 @@ BALL_SECONDS = 0.3
 """Seconds before and after a key moment over which the ball's shift grows and fades."""
 
 _SLACK = 0.06  # metres that the ball may be above or below where the part would strike it squarely
-_ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])
+_ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])  # about the vertical, tried
 _ALONG = (0.5, 0.2, 0.8)
 _ANGLE_COST = 0.08  # metres of moved foot that a radian off the part's own direction is worth,
 _ALONG_COST = 0.1  # that the other end of the foot is,
 _INSIDE_COST = 15.0  # a metre of ball within the other leg,
 _MISS_COST = 3.0  # and a metre that the part cannot be moved
-_GRAVITY = 9.81
+_GRAVITY = 9.81  # m/s^2
 _ON_GROUND = 0.02  # metres above its radius
 
 Line = tuple[np.ndarray, np.ndarray]
@@ -68,7 +71,8 @@ def best_aim(
     sine of the ball's elevation as seen from the part; ball (3,) m as measured; avoid: (line, radius) that it may not
     lie in; possible: of a move (3,) m of the part, what the body can make of it.
     """
-    aims = [Aim(_turned(direction, angle), along) for angle in _ANGLES for along in _ALONG[: 1 if rise else None]]
+    shares = _ALONG[: 1 if rise else None]
+    aims = [Aim(turned_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
     found = meetings(line, radius, aims, rise, ball, room, avoid)
     least = np.linalg.norm(found.need, axis=1)
     least += _ANGLE_COST * np.abs(np.repeat(_ANGLES, len(aims) // len(_ANGLES)))
@@ -111,7 +115,7 @@ def meetings(
     places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
     for other, own in avoid:
         out = (places - nearest_on(other, places))[:, :2]
-        out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+        out = unit_vectors(out)
         places[:, :2] += np.maximum(-ball_gap(other, own, places), 0.0)[:, None] * out
         places[:, :2] = ball[:2] + _within(places[:, :2] - ball[:2], level)
     return Meeting(places, places - touching + lift)
@@ -143,7 +147,7 @@ def held_meeting(hands: Sequence[Line], radius: float, ball: np.ndarray, room: R
     away = middle[:2] - ball[:2]
     place = np.array([*(ball[:2] + away * min(1.0, level / max(np.linalg.norm(away), 1e-12))), height])
     out = places - middle
-    out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+    out = unit_vectors(out)
     return place, place + (radius + BALL_RADIUS) * out - places
 
 
@@ -205,10 +209,4 @@ def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.nda
 def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
     """0 .. 1 .. 0, twice continuously differentiable: rising and falling (N,) are the straight ramps, 1 and more
     inside."""
-    x = np.clip(np.minimum(rising, falling), 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-
-
-def _turned(direction: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([c * direction[0] - s * direction[1], s * direction[0] + c * direction[1], direction[2]])
+    return quintic_step_by_powers(np.minimum(rising, falling))

@@ -7,14 +7,14 @@ direction of travel; what is kept is the angle between the two that the recordin
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
+from ..base.banded_least_squares import BandedLeastSquares
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.runs import runs
 from ..motion.track import zero_phase_hann
 
-TURN_WEIGHT = 12.0
+TURN_WEIGHT = 12.0  # of the recording's own turning per frame, against the direction of travel
 OFF_THE_FEET = 40.0
 """How many times firmer the recording's own turning is followed by who flies, lies or kneels and so cannot turn at
 will."""
@@ -31,7 +31,7 @@ FAINT, AIM = 1e-4, 0.004
 HOLD = 1e6
 """Weight of a facing that is given: so much more than all else that it stays."""
 
-ROOT_WINDOW = 1.5
+ROOT_WINDOW = 1.5  # s, the window within which the root keeps to the track
 
 
 def facing(
@@ -53,7 +53,6 @@ def facing(
     firmer than usual the recording's own turning is followed (`firmness`). aim: (T,) radians that a body which stands
     slowly turns to.
     """
-    count = len(direction)
     own_speed = np.linalg.norm(velocity, axis=1)
     offset = arctan2(velocity[:, 1], velocity[:, 0])
     goal = direction - offset
@@ -61,18 +60,28 @@ def facing(
     goal, trust = _with_aim(goal, trust, speed, aim, turn)
     if kept is not None:
         goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
-    goal = _unwrapped(goal, turn)
-    weight = TURN_WEIGHT * np.broadcast_to(firm, count)[1:]
-    diagonal = trust.copy()
-    diagonal[1:] += weight
-    diagonal[:-1] += weight
-    right = trust * goal
-    right[1:] += weight * turn[1:]
-    right[:-1] -= weight * turn[1:]
-    band = np.zeros((2, count))
-    band[0] = diagonal
-    band[1, :-1] = -weight
-    return solveh_banded(band, right, lower=True) if count > 1 else goal
+    return follow_turning(_unwrapped(goal, turn), trust, turn, firm)
+
+
+def follow_turning(
+    goal: np.ndarray, trust: np.ndarray, turn: np.ndarray, firm: np.ndarray | float = 1.0
+) -> np.ndarray:
+    """The angles for which sum trust (a - goal)^2 + TURN_WEIGHT firm (a' - turn)^2 is least.
+
+    Args:
+        goal: (T,) rad, without jumps of whole turns.
+        trust: (T,), weight of the goal.
+        turn: (T,) rad, wanted since the frame before.
+        firm: (T,) or one number, how many times firmer than usual the turning is followed.
+    Returns:
+        (T,) rad.
+    """
+    if len(goal) < 2:
+        return goal
+    squares = BandedLeastSquares(len(goal), reach=1)
+    squares.add_value(trust, goal=goal)
+    squares.add({1: 1.0, 0: -1.0}, TURN_WEIGHT * np.broadcast_to(firm, len(goal))[1:], turn[1:])
+    return squares.solve()[:, 0]
 
 
 def firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
+from ..base.banded_least_squares import BandedLeastSquares
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
@@ -25,7 +25,7 @@ CLEAR = 0.25
 
 _FULL, _POWER, _MOST = 0.5, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
 _STIFF, _TIGHT = 0.1, 0.03  # seconds: of the heading's smoothness, and beyond which a gap is crossed in a straight line
-_STILL = 0.01
+_STILL = 0.01  # m/s: a path passed slower has no heading
 _COMES, _SURELY = 1.0, 0.6  # seconds; m/s above which speed alone counts
 
 
@@ -151,13 +151,9 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
     goal = near + quaternion.wrapped(raw - near)
     weight = np.minimum((speed / _FULL) ** _POWER, _MOST) + 1e-9
     stiff = (_STIFF * fps) ** 4
-    tight = stiff / (_TIGHT * fps) ** 2
-    band = np.zeros((3, len(raw)))
-    for stencil, much in (((1.0, -2.0, 1.0), stiff), ((-1.0, 1.0), tight)):
-        rows = len(raw) - len(stencil) + 1
-        for i, a in enumerate(stencil):
-            for j, b in enumerate(stencil[: i + 1]):
-                band[i - j, j : j + rows] += much * a * b
-    band[0] += weight
+    squares = BandedLeastSquares(len(raw), reach=2)
+    squares.add_difference(2, stiff)
+    squares.add_difference(1, stiff / (_TIGHT * fps) ** 2)
     # about the first direction: what is solved for stays small, and so does its rounding
-    return goal[0] + solveh_banded(band, weight * (goal - goal[0]), lower=True)
+    squares.add_value(weight, goal=goal - goal[0])
+    return goal[0] + squares.solve()[:, 0]

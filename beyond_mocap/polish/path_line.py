@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.time_series import interpolate
+from ..base.vectors import distance_along, unit_vectors
 from ..errors import InputError
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path, SplinePath
@@ -35,7 +37,7 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     are not finite, lines shorter than SHORTEST.
     """
     line = _checked(line, name, closed)
-    length = _along(line)[-1]
+    length = distance_along(line)[-1]
     rounding = max(min(rounding, length / 12), length / _LONGEST)
     sampled, along = _resampled(_thinned(line, rounding * _SAMPLE), rounding * _SAMPLE)
     sampled = _with_hairpins(sampled, along, rounding, closed)
@@ -131,19 +133,14 @@ def _checked(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
         line = line[np.append(True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9)]
     if len(line) < 2:
         raise InputError(name, "all its points are one", "two different points at least", "draw it longer")
-    if (length := _along(line)[-1]) < SHORTEST:
+    if (length := distance_along(line)[-1]) < SHORTEST:
         raise InputError(name, f"it is {length:.3g} m long", f"{SHORTEST} m at least", "draw it longer")
     return line
 
 
-def _along(line: np.ndarray) -> np.ndarray:
-    """Metres (N,) along a polyline (N, 3)."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-
-
 def _thinned(line: np.ndarray, step: float) -> np.ndarray:
     """Points denser than `step` metres averaged over it, so that their noise does not make the line longer."""
-    along = _along(line)
+    along = distance_along(line)
     cell = np.floor(along / step).astype(int)
     first = np.flatnonzero(np.diff(cell, prepend=-1))
     count = np.diff(np.append(first, len(line)))
@@ -190,7 +187,7 @@ def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tu
     """
     before, after = (at - reach) % period, (at + reach) % period
     chords = line[at] - line[before], line[after] - line[at]
-    return tuple(chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-12)[:, None] for chord in chords)
+    return tuple(unit_vectors(chord, least=1e-12) for chord in chords)
 
 
 def _room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:
@@ -210,6 +207,6 @@ def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
 
 def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Even samples (M, 3) of a polyline about `step` metres apart, and metres (M,) along it."""
-    along = _along(line)
+    along = distance_along(line)
     even = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step)) + 1, 16))
-    return np.stack([np.interp(even, along, column) for column in line.T], axis=1), even
+    return interpolate(even, along, line), even

@@ -6,6 +6,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from ..base.time_series import hann_smooth
+from ..base.vectors import cross_level
 from ..errors import TimedLine
 from ..motion.arctangent import arctan2
 from ..motion.path import Path
@@ -42,16 +44,14 @@ def steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> 
 def curvature(path: Path, at: np.ndarray) -> np.ndarray:
     """(T,) 1/m: how much a path bends over the ground at parameters `at` (T,)."""
     first, second = path.at(at, 1)[:, :2], path.at(at, 2)[:, :2]
-    cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    return np.abs(cross) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
+    return np.abs(cross_level(first, second)) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
 
 
 def share(free: np.ndarray, fps: float) -> np.ndarray:
     """(T,) from 0 to 1: how far within the stretches `free` (T,) bool a frame is, smoothly from their borders on."""
     wide = int(round(_FADE * fps))
     inner = minimum_filter1d(free.astype(float), 2 * wide + 1, mode="nearest")
-    window = np.hanning(2 * wide + 3)[1:-1]
-    return np.convolve(np.pad(inner, wide, mode="edge"), window / window.sum(), mode="valid")
+    return hann_smooth(inner, wide)
 
 
 def told(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:

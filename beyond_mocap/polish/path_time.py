@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..base.vectors import cross_level
 from ..motion import quaternion
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path
@@ -127,7 +128,7 @@ def way_of(path: Path, arc: ArcLength) -> Way:
     u = arc.parameter(s)
     first, second = path.at(u, 1), path.at(u, 2)
     level = np.linalg.norm(first[:, :2], axis=1)
-    turn = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    turn = np.abs(cross_level(first, second))
     slope = np.clip(first[:, 2] / np.maximum(level, 1e-9), -3.0, 3.0)
     bend = np.minimum(turn / np.maximum(level, 1e-9) ** 3, 20.0)
     width = int(np.clip(_SMOOTH / max(s[1], 1e-9), 1, count))

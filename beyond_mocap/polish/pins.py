@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import smoothstep
+from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify
@@ -35,8 +37,8 @@ MOST_YAW, MOST_PITCH = np.radians(100.0), np.radians(55.0)
 STRETCH = 0.985
 """Share of a limb's length up to which it reaches by itself."""
 
-_SOFT, _SOFT_LACK = 0.004, 0.02
-_CHEST_SHARE, _NECK_SHARE = 0.15, 0.35
+_SOFT, _SOFT_LACK = 0.004, 0.02  # m over which limbs ease at full length, and over which the body begins to go along
+_CHEST_SHARE, _NECK_SHARE = 0.15, 0.35  # of a look's turn; the head has the rest
 _GLIDE = 2.0  # frames in which a limb that leaves a pin takes up the body's speed
 _MOVED = 0.02  # m that the pelvis is moved where its feet are wholly held by reaching
 _NEAR = 0.01  # m by which a foot may be moved and still counts as standing
@@ -121,16 +123,16 @@ def target(pins: Sequence, start: float, fps: float, count: int) -> Target:
             continue
         if before is not None and first - before.frames[1] < 2.0 * fade:
             between = (at > before.frames[1]) & (at < first)
-            way = _eased((at[between] - before.frames[1]) / (first - before.frames[1]))
+            way = smoothstep((at[between] - before.frames[1]) / (first - before.frames[1]))
             share[between] = 1.0
             place[between] = before.place + way[:, None] * (stay.place - before.place)
         else:
             coming = (at < first) & (at > first - fade)
-            share[coming], place[coming] = _eased(1.0 - (first - at[coming]) / fade), stay.place
+            share[coming], place[coming] = smoothstep(1.0 - (first - at[coming]) / fade), stay.place
         inside = (at >= first) & (at <= last)
         share[inside], place[inside] = 1.0, stay.place
         leaving = (at > last) & (at < last + fade)
-        share[leaving], place[leaving] = _eased(1.0 - (at[leaving] - last) / fade), stay.place
+        share[leaving], place[leaving] = smoothstep(1.0 - (at[leaving] - last) / fade), stay.place
         stays.append(stay)
     return Target(share, place, tuple(stays))
 
@@ -141,17 +143,8 @@ def look_axis(skeleton: Skeleton, rotations: np.ndarray) -> np.ndarray:
     places, world = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
     facing = heading_from_positions(skeleton, places)
     ahead = np.column_stack([np.cos(facing), np.sin(facing), np.zeros(len(facing))])
-    mean = quaternion.rotate(quaternion.inverse(world[:, _head(identify(skeleton))]), ahead).mean(axis=0)
-    return mean / max(np.linalg.norm(mean), 1e-9)
-
-
-def _head(body: Humanoid) -> int:
-    return next(joint for joint in (body.head, body.neck, body.chest) if joint is not None)
-
-
-def _eased(way: np.ndarray) -> np.ndarray:
-    way = np.clip(way, 0.0, 1.0)
-    return way * way * (3.0 - 2.0 * way)
+    mean = quaternion.rotate(quaternion.inverse(world[:, identify(skeleton).head_or_neck]), ahead).mean(axis=0)
+    return unit_vector(mean)
 
 
 class _Work:
@@ -211,7 +204,7 @@ class _Work:
         """The largest miss while a pin holds; that of a pin outside the motion, or of a part that the body has not,
         is infinite."""
         stays = target([pin], start, self.before.fps, len(self.root)).stays
-        chain = _chains(self.body).get(pin.part, (_head(self.body),))
+        chain = _chains(self.body).get(pin.part, (self.body.head_or_neck,))
         if not stays or None in chain:
             return np.inf
         stay = stays[0]
@@ -262,7 +255,7 @@ class _Part:
             after = self._off_from(off, own, high, gap, held) if high >= 0 else np.zeros((len(gap), 3))
             before = self._off_from(off, own, low, gap, holds) if low < len(own) else np.zeros((len(gap), 3))
             if high >= 0 and low < len(own):
-                way = _eased((gap - high) / (low - high))[:, None]
+                way = smoothstep((gap - high) / (low - high))[:, None]
                 off[gap] = (after + way * (before - after)) * found.share[gap, None]
             else:
                 off[gap] = (after + before) * found.share[gap, None]
@@ -345,7 +338,7 @@ class _Part:
             self.skeleton, self.root, self.rotations, chain, goal, end_rotation=turn,
             keep_end_rotation=False, soft=_SOFT,
         ).rotations
-        weight = _eased(4.0 * share)
+        weight = smoothstep(4.0 * share)
         for joint in {*_bones(self.skeleton, chain), chain[0]}:
             near = quaternion.signed_like(found[:, joint], self.rotations[:, joint])
             mixed = quaternion.slerp(self.rotations[:, joint], near, weight)
@@ -354,7 +347,7 @@ class _Part:
 
     def gaze(self, found: Target, look: np.ndarray, whole: bool) -> None:
         """Turns the head so that it looks at the place, with the neck and the chest where the whole body is meant."""
-        head, neck, chest = _head(self.body), self.body.neck, self.body.chest
+        head, neck, chest = self.body.head_or_neck, self.body.neck, self.body.chest
         turn = self._gaze_turn(head, found, look)
         if whole:
             self._turn(chest, _CHEST_SHARE * found.share[:, None] * turn)
@@ -362,7 +355,7 @@ class _Part:
                 self._turn(neck, _NECK_SHARE * found.share[:, None] * turn)
             self._turn(head, found.share[:, None] * (1.0 - _CHEST_SHARE - _NECK_SHARE * (neck != head)) * turn)
         else:
-            self._turn(head, _eased((found.share - 0.7) / 0.3)[:, None] * turn)
+            self._turn(head, smoothstep((found.share - 0.7) / 0.3)[:, None] * turn)
 
     def _gaze_turn(self, head: int, found: Target, look: np.ndarray) -> np.ndarray:
         """(W, 3) rotation vectors, in the world, from where the head looks to the place, as far as a neck can."""

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import cross, unit_vectors
 from ..errors import InputError
 from ..motion import limb, quaternion
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
+from ..motion.structure import path
 
 # below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
 CLEAR_BEND = 0.06
@@ -85,7 +87,7 @@ def bent_limb(
     swing = quaternion.between(ankle - top, target - top)
     new_pole = quaternion.rotate(swing, old_pole) if pole is None else np.asarray(pole, dtype=float)
     new_knee, new_ankle, new_hinge = limb.bend(top, target, *lengths, new_pole, soft)
-    old_hinge = quaternion.cross(limb.unit(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
+    old_hinge = cross(unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
     turns = [
         quaternion.multiply(_frame(b - a, new_hinge), quaternion.inverse(_frame(d - c, old_hinge)))
         for a, b, c, d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
@@ -104,22 +106,13 @@ def bent_limb(
 def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
     upper, middle, end = joints
     for high, low in ((upper, middle), (middle, end)):
-        if high == low or high not in _ancestors(skeleton, low):
+        if high == low or high not in path(skeleton.parents, low):
             raise InputError("limb", f"{skeleton.names[low]} does not hang below {skeleton.names[high]}", "a chain")
-
-
-def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and those above it, from below."""
-    chain = []
-    while joint >= 0:
-        chain.append(joint)
-        joint = skeleton.parents[joint]
-    return chain
 
 
 def _between(skeleton: Skeleton, high: int, low: int) -> list[int]:
     """Joints from `high` (included) down to `low` (not included)."""
-    chain = _ancestors(skeleton, low)
+    chain = path(skeleton.parents, low)
     return chain[1 : chain.index(high) + 1][::-1]
 
 
@@ -134,7 +127,7 @@ def _local(skeleton: Skeleton, world: np.ndarray, joint: int) -> np.ndarray:
 
 
 def _frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
-    return limb.bone_frame(limb.unit(direction, np.array([0.0, 0.0, -1.0])), hinge)
+    return limb.bone_frame(unit_vectors(direction, np.array([0.0, 0.0, -1.0])), hinge)
 
 
 def _own_pole(
@@ -144,18 +137,19 @@ def _own_pole(
 
     A nearly straight limb says little: there the direction is mixed with the mean one of all frames, carried by the
     upper bone (a knee is a hinge), weighted by how clearly each frame shows it."""
-    line = limb.unit(ankle - top, np.array([0.0, 0.0, -1.0]))
+    line = unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0]))
     off = knee - top - np.sum((knee - top) * line, axis=-1, keepdims=True) * line
     length = np.linalg.norm(knee - top, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
     bent = (np.linalg.norm(off, axis=-1) / np.maximum(length, 1e-9))[:, None]
     in_bone = quaternion.rotate(quaternion.inverse(upper_world), off)
     mean = np.sum(in_bone * bent, axis=0)
     if np.linalg.norm(mean) < 1e-9:
-        return limb.unit(off, limb.unit(np.array([1.0, 0.0, 0.0]) - line[..., :1] * line, np.array([0.0, 0.0, 1.0])))
+        across = unit_vectors(np.array([1.0, 0.0, 0.0]) - line[..., :1] * line, np.array([0.0, 0.0, 1.0]))
+        return unit_vectors(off, across)
     steady = quaternion.rotate(upper_world, mean / np.linalg.norm(mean))
-    steady = limb.unit(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
+    steady = unit_vectors(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
     # a frame that bends the other way, as blended poses may, is not believed: its knee would flip
-    right_way = np.sum(limb.unit(off, steady) * steady, axis=-1, keepdims=True)
+    right_way = np.sum(unit_vectors(off, steady) * steady, axis=-1, keepdims=True)
     weight = np.clip(bent / np.reshape(clear, (-1, 1)), 0.0, 1.0) ** 2 * np.clip(2.0 * right_way, 0.0, 1.0)
-    mixed = weight * limb.unit(off, steady) + (1.0 - weight) * steady
-    return limb.unit(mixed, steady)
+    mixed = weight * unit_vectors(off, steady) + (1.0 - weight) * steady
+    return unit_vectors(mixed, steady)

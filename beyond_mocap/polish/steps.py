@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import smoothstep
 from ..motion import quaternion
 from ..motion.arctangent import arctan2
 from ..motion.humanoid import Limb, identify
@@ -169,12 +170,12 @@ class _Foot:
         first, end = self._flat_before(first, reach), self._flat_behind(end, reach)
         at, before = slice(first, end), first - 1
         behind = end if end < len(self.yaw) else before
-        through = _eased(_through(first, end))
+        through = smoothstep(_through(first, end))
         new.held[at], new.before[at], new.behind[at], new.through[at] = True, before, behind, through
         new.points[at] = new._between(self.points, at)
         new.middle[at] = new.points[at].mean(axis=1)
         own = self.yaw[[before, behind]] - self.heading[[before, behind]]
-        change = (own[1] - own[0] + np.pi) % (2.0 * np.pi) - np.pi
+        change = quaternion.wrapped(own[1] - own[0])
         new.yaw[end:] += own[0] + change - own[1]
         new.yaw[at] = self.heading[at] + own[0] + through * change
         return new
@@ -434,18 +435,13 @@ def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list
             sway[low:high] += np.sin(np.pi * _through(low, high))[:, None] ** 2 * over
         for first, end in runs(swings[:, side]):
             rising = np.clip(np.minimum(_through(first, end), 1.0 - _through(first, end)) / 0.45, 0.0, 1.0)
-            moves[first:end, side, 2] = LIFT * _eased(rising)
+            moves[first:end, side, 2] = LIFT * smoothstep(rising)
     return moves, sway
 
 
 def _through(first: int, end: int) -> np.ndarray:
     """How far each of frames first .. end is through them, between 0 and 1."""
     return (np.arange(first, end) - first + 1.0) / (end - first + 1.0)
-
-
-def _eased(x: np.ndarray) -> np.ndarray:
-    """From 0 to 1 with level ends."""
-    return x * x * (3.0 - 2.0 * x)
 
 
 def _tilt(through: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import unit_vector
 from ..motion.humanoid import Limb, heading_from_positions, identify
 from ..motion.motion import pose_kinematics
 from ..motion.skeleton import Skeleton
@@ -35,10 +36,10 @@ is."""
 OUT_OF_REACH = 0.15
 """Metres of gap that would be left, above which the body does not try, and plays as recorded."""
 
-MOST_DROP = 0.04
-_LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12
+MOST_DROP = 0.04  # m
+_LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body goes over
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
-_IN_THE_AIR = 0.2
+_IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
 _STOPPING = {"receive", "trap", "catch", "catchb"}
 _HIGH = {"high", "volley", "bicycle"}
@@ -294,25 +295,20 @@ def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.nda
     coming = _flat(path[moment.frame] - path[max(moment.frame - reach, 0)]) / 0.1
     leaving = _flat(path[min(moment.frame + reach, len(path) - 1)] - path[moment.frame]) / 0.1
     if part.part == "hand" and met_within(moment.words):
-        return _unit(-coming, ahead)
+        return unit_vector(-coming, ahead)
     if part.part != "foot":
         return ahead
     if _STOPPING & moment.words:
         middle = np.mean(body.line(part, at), axis=0)
         wish = -coming if np.linalg.norm(coming) > 1.0 else _flat(path[moment.frame] - middle)
-        return _unit(_unit(wish, ahead) + 0.8 * ahead, ahead)
+        return unit_vector(unit_vector(wish, ahead) + 0.8 * ahead, ahead)
     swing = _flat(_velocity(body, part, at, fps))
-    along = _unit(swing, ahead) if np.linalg.norm(swing) > 1.0 else ahead
-    return _unit(along + 0.5 * _unit(leaving, along), along) if np.linalg.norm(leaving) > 3.0 else along
+    along = unit_vector(swing, ahead) if np.linalg.norm(swing) > 1.0 else ahead
+    return unit_vector(along + 0.5 * unit_vector(leaving, along), along) if np.linalg.norm(leaving) > 3.0 else along
 
 
 def _flat(v: np.ndarray) -> np.ndarray:
     return v * [1.0, 1.0, 0.0]
-
-
-def _unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(v)
-    return v / length if length > 1e-9 else otherwise
 
 
 def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:

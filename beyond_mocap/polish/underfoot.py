@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.easing import quintic_step_by_powers
+from ..base.time_series import interpolate
 from ..motion.arc_length import ArcLength
 from ..motion.path import Path
 from ..motion.runs import runs
@@ -72,7 +74,7 @@ def path_surface(path: Path, arc: ArcLength, passed: np.ndarray) -> Surface:
 
     def look(s: np.ndarray) -> np.ndarray:
         inside = s % whole if path.closed and whole > 0.0 else np.clip(s, 0.0, whole)
-        return np.stack([np.interp(inside, at, column) for column in table.T], axis=1)
+        return interpolate(inside, at, table)
 
     def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         s = passed[frames].copy()
@@ -139,7 +141,7 @@ def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, s
 def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray) -> np.ndarray:
     """How much of its way from stance to stance (T, 2) a foot has gone, from 0 to 1: over the ground, but by time,
     `way` (T,), where it leaves and arrives and where it stays about where it is."""
-    by_time = way**3 * (10.0 - 15.0 * way + 6.0 * way**2)
+    by_time = quintic_step_by_powers(way)
     step = there - here
     length = np.sum(step * step, axis=1)
     by_place = np.clip(np.sum((toe - here) * step, axis=1) / np.maximum(length, 1e-9), 0.0, 1.0)

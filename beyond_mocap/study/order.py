@@ -6,21 +6,21 @@ get used to the task come first and do not count.
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.digest import hex_digest
 from ..errors import InputError
 
 TRAINING = "training"
 """In place of a system: this clip comes first and does not count."""
 MOST_RATERS, MOST_CLIPS = 1000, 500
 _LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, no words; nothing that looks like something else
-_LONG = 4
-_TRIES = 200
+_LONG = 4  # letters of a clip's name
+_TRIES = 200  # random orders tried until one is new
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
     """
     _check(clips)
     named = _named(clips, seed)
-    mark = hashlib.sha256(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])).encode()).hexdigest()[:8]
+    mark = hex_digest(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])), digits=8)
     taken: set[tuple] = set()
     orders = {}
     for number in range(raters):

@@ -56,6 +56,11 @@ class Footage(Shown):
     ahead_sway: np.ndarray
 
 
+def output_index(frames: int, library: Library, fps: float, count: int) -> np.ndarray:
+    """(frames,) output frames at `fps` as fractional frames of the library's rate, of which there are `count`."""
+    return np.minimum(np.arange(frames) * (library.fps / fps), count - 1)
+
+
 def shown(library: Library, edit: EditList, index: np.ndarray) -> Shown:
     """What fractional output frames `index` (T,) of the library's rate show."""
     clip, frame, piece = at_times(edit, index)

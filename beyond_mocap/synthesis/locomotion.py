@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation import LOCOMOTION_WORDS
+from ..base.vectors import distance_along
 from ..library.library import Library
 from ..motion.track import SampledTrack
 from .blocks import FINEST, BlockSearch, Candidates
@@ -67,14 +68,13 @@ def match_distance(search: BlockSearch, blocks: Candidates, delta: float) -> lis
 
 def travelled_distance(track: SampledTrack) -> np.ndarray:
     """(T,) metres along the smoothed track since its first frame."""
-    step = np.linalg.norm(np.diff(track.positions, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(step)])
+    return distance_along(track.positions)
 
 
 def block_distances(library: Library, blocks: Candidates) -> np.ndarray:
     """(K,) metres that each 8-frame block travels along its clip's path."""
     frames = library.frames
-    running = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(frames.path, axis=0), axis=1))])
+    running = distance_along(frames.path)
     last = frames.first[blocks.clip] + frames.count[blocks.clip] - 1
     low = np.clip(blocks.start, frames.first[blocks.clip], last)
     return running[np.clip(blocks.start + FINEST, low, last)] - running[low]

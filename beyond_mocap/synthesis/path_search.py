@@ -79,7 +79,8 @@ class PathSearch:
     between: search this stretch only and keep the rest. used: footage to do without where that can be. alike: another
     measure of how far poses are apart. on_grid: slots lie as in other searches of the same frames (`slot_edges`).
     hurry: when it says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None;
-    before the first slot is filled it ends the search as `cancelled` does.
+    before the first slot is filled it ends the search as `cancelled` does. narrow: the beam is narrow from the second
+    slot on.
     """
 
     def __init__(
@@ -89,11 +90,13 @@ class PathSearch:
         weights: Weights = Weights(),
         progress: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
+        *,
         hurry: Callable[[], bool] | None = None,
         between: Between | None = None,
         used: tuple[Used, ...] = (),
         alike: Alike | None = None,
         on_grid: bool = False,
+        narrow: bool = False,
     ):
         self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
         self.frames = library.frames
@@ -106,7 +109,7 @@ class PathSearch:
         self.width, self.hurried = Width(), None
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
-        self._hurry = hurry or (lambda: False)
+        self._hurry, self._narrow = hurry or (lambda: False), narrow
 
     def run(self) -> EditList:
         """The cheapest way through all slots that the beam finds; InputError where no clip is as long as a slot."""
@@ -132,7 +135,7 @@ class PathSearch:
     def _stop_or_hurry(self, slot: int) -> None:
         if self._cancelled() or slot == 0 and self._hurry():
             raise Cancelled("synthesis: cancelled")
-        if self.hurried is None and self._hurry():
+        if self.hurried is None and (self._hurry() or self._narrow and slot > 0):
             self.width, self.hurried = NARROW, int(self.edges[slot])
 
     def _choice_costs(self) -> np.ndarray:

@@ -16,7 +16,7 @@ from ..library.automatic import automatic_words
 from ..library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ..library.library import Library
 from ..motion.track import SampledTrack
-from ..plan import Plan
+from .resolved_plan import ResolvedPlan
 from .style import off_style_cost
 from .variety import Taste, taste
 
@@ -69,32 +69,33 @@ class Wanted:
         return frozenset().union(*self.avoided[max(first, 0) : end])
 
 
-def wanted(library: Library, plan: Plan) -> Wanted:
-    """Puts a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries
-    (unless plan.nearest)."""
+def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
+    """Put a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless asked to go on
+    with the nearest)."""
+    asked_for = plan.asked
     track = plan.sampled(library.fps)
     gaits = library.gaits
     speeds = np.array([gait.speed for gait in gaits])
-    labelled = plan.method == "path" and not plan.omega
-    thresholds = library.gait_thresholds if labelled else gait_thresholds(speeds, plan.omega or PAPERS_OMEGA)
+    labelled = plan.method == "path" and not asked_for.omega
+    thresholds = library.gait_thresholds if labelled else gait_thresholds(speeds, asked_for.omega or PAPERS_OMEGA)
     gait = automatic_gaits(track.speed, library.fps, speeds, thresholds)
     avoided = avoided_per_frame(plan.timeline, track.times)
     gait = _other_gaits(library, gait, track.speed, avoided)
     automatic = automatic_words(library, gait, track)
     automatic = [tuple(word for word in words if word not in avoid) for words, avoid in zip(automatic, avoided)]
     timeline = fill(plan.timeline, track.times, automatic)
-    allowed = np.array([plan.mirror or not clip.mirrored for clip in library.clips])
+    allowed = np.array([asked_for.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
-    keys = tuple(_key(library, moment, track, gait, allowed, plan.nearest, warnings) for moment in timeline.keys)
+    keys = tuple(_key(library, moment, track, gait, allowed, asked_for.nearest, warnings) for moment in timeline.keys)
     known = plan.track.ball_height_known
     nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.asked.in_force))) for key in keys]
     keys = tuple(replace(key, ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
     asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
     warnings += _lacking(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
-    off_style = off_style_cost(library, plan.style, plan.style_weight, warnings)
-    weak_foot = {"left": "right", "right": "left"}.get(plan.strong_foot, "")
-    own = taste(library, plan.lag, plan.variety, float(track.times[0]))
+    off_style = off_style_cost(library, asked_for.style, asked_for.style_weight, warnings)
+    weak_foot = {"left": "right", "right": "left"}.get(asked_for.strong_foot, "")
+    own = taste(library, asked_for.lag, asked_for.variety, float(track.times[0]))
     preferred = {"off_style": off_style, "weak_foot": weak_foot, "taste": own}
     return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, **preferred)
 

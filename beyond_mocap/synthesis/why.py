@@ -1,7 +1,6 @@
 """Why this clip: what each piece of an edit list cost the search that chose it, by name, and what else was near.
 
-    order = wanted(library, plan)
-    for reason in reasons(library, order, PathSearch(library, order, weights).run(), weights): print(reason.costs)
+    for reason in explain_choices(library, resolve_plan(take.plan, library), take.edit): print(reason.costs)
 
 The costs are the search's own functions, asked again for what it chose: where every seam lies on one of its slots'
 edges (always, unless the edit list was edited) all parts of all pieces add up to what it paid. Of Faustino's block
@@ -17,14 +16,17 @@ import numpy as np
 
 from ..library.library import Library
 from .annotation_cost import AnnotationCost
+from .balance import balanced
 from .cheapest_way import Offered
 from .edit_list import EditList
 from .offer import RATES, SLOT
 from .path_costs import Term, Weights
 from .path_search import MEMORY_SLOTS, PathSearch, States
+from .resolved_plan import ResolvedPlan
+from .search_library import search_library
 from .slots import Pieces, slot_edges
 from .transition_cost import distances, typical_distance, windows
-from .wanted import Wanted
+from .wanted import Wanted, build_order
 
 PARTS = {
     "speed": "speed other than the track's",
@@ -83,6 +85,21 @@ class Reason:
     def cost(self) -> float:
         """All parts together."""
         return sum(self.costs.values()) + sum(self.seam.values())
+
+
+def explain_choices(library: Library, plan: ResolvedPlan, edit: EditList) -> list[Reason]:
+    """Explain each piece of an edit list by the costs of the search that chose it.
+
+    Args:
+        library: the recordings.
+        plan: what the search was asked for.
+        edit: what it chose, at the library's rate.
+    """
+    library = search_library(library, plan, edit=edit)
+    order = build_order(library, plan)
+    if plan.method == "path":
+        return reasons(library, order, edit, balanced(plan.asked.alpha))
+    return block_reasons(library, order, edit, plan.asked.alpha)
 
 
 def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, others: int = NEAREST) -> list[Reason]:

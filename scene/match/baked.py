@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...beyond_mocap.take import BallPath
+from ...beyond_mocap.motion.track.ball_path import BallPath
 from .. import action, ball, channels
 from ..measure import frames_per_second, units_per_metre
 from . import ours

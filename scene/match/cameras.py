@@ -10,6 +10,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.time_series import gaussian_smooth
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.humanoid import identify
@@ -46,7 +48,7 @@ def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndar
     camera.data.clip_start, camera.data.clip_end, camera.data.sensor_width = units, 400.0 * units, SENSOR
     look = camera.constraints.new("TRACK_TO")
     look.target, look.track_axis, look.up_axis = aim, "TRACK_NEGATIVE_Z", "UP_Y"
-    middle = smooth(seen, GLIDE * frames_per_second(scene))
+    middle = gaussian_smooth(seen, GLIDE * frames_per_second(scene))
     middle = np.clip(middle, *(np.outer([-1.0, 1.0], np.array(size) / 2.0 - [14.0, 14.0])))
     places = np.column_stack([middle, np.full(len(middle), 0.6)])
     away = np.linalg.norm(places - stand, axis=1)
@@ -87,43 +89,30 @@ def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.n
     from ...beyond_mocap.motion.neutral import neutral_stance  # brings scipy, which is slow to import
 
     skeleton = motion.skeleton
-    body, neutral = identify(skeleton), neutral_stance(skeleton, motion)
-    head = next((joint for joint in (body.head, body.neck, body.chest) if joint is not None), None)
-    if head is None:
-        raise InputError("skeleton", "no head, neck or chest", "a person")
+    head, neutral = identify(skeleton).head_or_neck, neutral_stance(skeleton, motion)
     places, world = forward_kinematics(motion)
     face = quaternion.multiply(world[:, head], quaternion.inverse(neutral.rotations[head]))
     scale = neutral.leg / 0.88  # an adult's leg of 1.80 m
     eye = places[:, head] + quaternion.rotate(face, np.array([EYE[0], 0.0, EYE[1]]) * scale)
-    ahead = _unit(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
-    gaze = smooth(_towards(ahead, eye, target), STEADY * motion.fps)
+    ahead = unit_vectors(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
+    gaze = gaussian_smooth(_towards(ahead, eye, target), STEADY * motion.fps)
     gaze[:, 2] = np.minimum(gaze[:, 2], UP * np.linalg.norm(gaze[:, :2], axis=1))
-    return eye, _looking(_unit(gaze))
-
-
-def smooth(values: np.ndarray, width: float) -> np.ndarray:
-    """Values (T, n) through a bell of standard deviation `width` frames, their ends held."""
-    reach = int(3.0 * width)
-    if reach < 1 or len(values) < 2:
-        return values
-    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    held = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    return np.stack([np.convolve(column, bell / bell.sum(), "valid") for column in held.T], axis=1)
+    return eye, _looking(unit_vectors(gaze))
 
 
 def _towards(ahead: np.ndarray, eye: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     """Directions (T, 3): `ahead`, turned towards the target as far as eyes turn; a little down where there is none."""
-    down = _unit(ahead - [0.0, 0.0, np.tan(RESTS)])
+    down = unit_vectors(ahead - [0.0, 0.0, np.tan(RESTS)])
     if target is None:
         return down
     known = np.isfinite(target).all(axis=1)
-    wanted = np.where(known[:, None], _unit(np.where(known[:, None], target, eye + ahead) - eye), down)
+    wanted = np.where(known[:, None], unit_vectors(np.where(known[:, None], target, eye + ahead) - eye), down)
     cosine = np.clip(np.sum(ahead * wanted, axis=1), -1.0, 1.0)
     angle = np.arccos(cosine)
     share = np.minimum(1.0, EYES_TURN / np.maximum(angle, 1e-6))
-    behind = smooth(np.clip((np.radians(150.0) - angle) / np.radians(40.0), 0.0, 1.0)[:, None], 5.0)
+    behind = gaussian_smooth(np.clip((np.radians(150.0) - angle) / np.radians(40.0), 0.0, 1.0)[:, None], 5.0)
     turned = _between(ahead, wanted, angle, share)
-    return _unit(behind * turned + (1.0 - behind) * down)
+    return unit_vectors(behind * turned + (1.0 - behind) * down)
 
 
 def _between(first: np.ndarray, second: np.ndarray, angle: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -136,13 +125,9 @@ def _between(first: np.ndarray, second: np.ndarray, angle: np.ndarray, share: np
 
 def _looking(gaze: np.ndarray) -> np.ndarray:
     """Rotations (T, 4) of cameras that look along `gaze` (T, 3), upright."""
-    right = _unit(np.cross(gaze, [0.0, 0.0, 1.0]))
+    right = unit_vectors(np.cross(gaze, [0.0, 0.0, 1.0]))
     up = np.cross(right, gaze)
     return quaternion.continuous(quaternion.from_matrix(np.stack([right, up, -gaze], axis=-1)))
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def _ball_places(scene: bpy.types.Scene, ball: bpy.types.Object | None, frames: np.ndarray) -> np.ndarray | None:

@@ -14,7 +14,7 @@ from .people import TEAMS, Person, Scenery
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.take import BallPath
+    from ...beyond_mocap.motion.track.ball_path import BallPath
 
 LIBRARYS_SHARE = 0.1  # of the bar
 
@@ -42,7 +42,7 @@ def scenery(
     InputError where the folder holds no match, nobody of it is there in that time, or the library is another one.
     """
     from ...beyond_mocap.files.tables import read_ball
-    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.library.build import build
 
     state = _state(wanted.folder)
     if library is None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from pathlib import Path
 
 import bpy
 
+from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.errors import InputError
 from .. import preferences
 from ..settings import absolute
@@ -71,7 +71,7 @@ def folder_to_make(scene: bpy.types.Scene) -> str:
     home = Path(bpy.data.filepath).parent if bpy.data.is_saved else tracking.parent
     if not os.access(home, os.W_OK):
         home = Path(bpy.app.tempdir)
-    asked = hashlib.sha256("\0".join(_asked(scene)).encode()).hexdigest()[:6]
+    asked = hex_digest("\0".join(_asked(scene)), digits=6)
     return str(home / f"{tracking.stem} {typed(match.start)}-{typed(match.end)} s {asked}")
 
 

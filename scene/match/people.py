@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...beyond_mocap.motion.motion import Motion
-from ...beyond_mocap.take import BallPath
+from ...beyond_mocap.motion.track.ball_path import BallPath
 
 TEAMS = ("home", "away", "referee")
 

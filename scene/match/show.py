@@ -8,6 +8,7 @@ from time import perf_counter
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.time_series import interpolate
 from .. import bake, pitch, stage
 from ..measure import frames_per_second, units_per_metre
 from . import baked, cameras, ours
@@ -77,7 +78,7 @@ def _followed(scene: bpy.types.Scene, scenery: Scenery, frames: np.ndarray, firs
     seconds = scenery.start + (frames - first) / frames_per_second(scene)
     if scenery.ball is not None:
         path = scenery.ball
-        return np.stack([np.interp(seconds, path.times, path.positions[:, axis]) for axis in range(2)], axis=1)
+        return interpolate(seconds, path.times, path.positions[:, :2])
     total, count = np.zeros((len(frames), 2)), np.zeros(len(frames))
     for person in scenery.people:
         for begins, motion in person.motions:

@@ -233,16 +233,10 @@ def _told(plan: "Plan", take: "Take", library: "Library | None"):
 
 
 def _reasons(plan: "Plan", take: "Take", library: "Library") -> list["Reason"]:
-    from ...beyond_mocap.synthesis.balance import balanced
-    from ...beyond_mocap.synthesis.wanted import wanted
-    from ...beyond_mocap.synthesis.why import block_reasons, reasons
-    from ...beyond_mocap.synthesize import with_made_gaits
+    from ...beyond_mocap.resolve_plan import resolve_plan
+    from ...beyond_mocap.synthesis.why import explain_choices
 
-    library = with_made_gaits(library, plan, lambda fraction, text: None)
-    order = wanted(library, plan)
-    if plan.method == "path":
-        return reasons(library, order, take.edit, balanced(plan.alpha))
-    return block_reasons(library, order, take.edit, plan.alpha)
+    return explain_choices(library, resolve_plan(plan, library, course=take.solved), take.edit)
 
 
 def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:

@@ -6,12 +6,11 @@ fastest, as in the paper; at the foot red bars are the stretches in which a ball
 
 from __future__ import annotations
 
-import hashlib
-
 import bpy
 import bpy.utils.previews
 import numpy as np
 
+from ...beyond_mocap.base.digest import byte_digest
 from .settings import BeyondMocapHits, found_of
 
 SIZE = 480
@@ -106,4 +105,4 @@ def _draw_curve(image: np.ndarray, heights: np.ndarray, colour) -> None:
 
 
 def _name(found: str) -> str:
-    return hashlib.blake2b(found.encode(), digest_size=8).hexdigest()
+    return byte_digest(found, size=8).hex()

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import bmesh
 import bpy
-import numpy as np
 from mathutils import Matrix, Vector
 
+from ...beyond_mocap.base.vectors import unit_vector
 from ...beyond_mocap.motion.humanoid import identify
 from .. import armature
 from ..material import colour
@@ -25,7 +25,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, collec
     hand = getattr(identify(skeleton), side or "right").hand
     bone = body.data.bones[skeleton.names[hand]]
     metres = armature.placement(body, scene).scale
-    along = Vector(skeleton.offsets[hand] / max(np.linalg.norm(skeleton.offsets[hand]), 1e-9))
+    along = Vector(unit_vector(skeleton.offsets[hand]))
     name = f"{body.name} tool"
     mesh, shape = bpy.data.meshes.new(name), bmesh.new()
     near = tool.length - tool.reach

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from ...beyond_mocap.ball.contact import Tool
 from ...beyond_mocap.ball.pass_scene import Net, PassScene
+from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.errors import InputError
 from .. import action, armature, bake, ball, body, channels, linked, preferences, session
 from ..measure import frames_per_second, units_per_metre
@@ -74,8 +74,8 @@ def order_of(scene: bpy.types.Scene) -> Order:
         channels.check_free(settings.rally)
         possession.check_unaimed(settings.rally)
     unit = (common.library_unit or None) if not settings.library_folder else None
-    parts = repr((wanted, chosen, unit, settings.start_frame)).encode()  # a file may be moved with its library
-    digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
+    # without the library's folder: a file may be moved with it
+    digest = byte_digest(repr((wanted, chosen, unit, settings.start_frame))).hex()
     return Order(
         wanted, float(settings.start_frame), folder, unit, session.library(folder, unit), digest,
         preferences.for_build(folder),
@@ -84,7 +84,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
     """Build the library where it is not there yet, and play the scene. Never touches bpy."""
-    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.library.build import build
     from ...beyond_mocap.passes import passes
 
     library = order.library

@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
+from ...beyond_mocap.base.easing import smoothstep
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
 from .. import armature, channels, linked
@@ -254,7 +255,7 @@ def _touching(scene, hold, begins: Matrix, ball) -> Matrix:
 
 def _between(one: Matrix, other: Matrix, share: float) -> Matrix:
     """From one place to another, smoothly."""
-    smooth = share * share * (3.0 - 2.0 * share)
+    smooth = float(smoothstep(share))
     place = one.to_translation().lerp(other.to_translation(), smooth)
     return Matrix.LocRotScale(place, one.to_quaternion().slerp(other.to_quaternion(), smooth), None)
 

@@ -89,7 +89,7 @@ def together(named: tuple):
 
 def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     """The ball on its solved way, on every frame of the scene; its touches in the list. Returns the ball."""
-    from ...beyond_mocap.take import BallPath
+    from ...beyond_mocap.motion.track.ball_path import BallPath
 
     settings, room = scene.beyond_mocap_passes, bake.collection(scene)
     own = next((thing for thing in room.objects if thing.get(KEPT) == BALL), None)

@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
@@ -105,11 +105,10 @@ class Carrier(ABC):
         found, slot = self.source()
         if found is None or slot is None:
             return b""
-        digest = hashlib.blake2b(digest_size=16)
+        parts = []
         for (path, index), curve in channels.curves(found, slot).items():
-            digest.update(f"{path} {index} {len(curve.modifiers)}".encode())
-            digest.update(keys.places(curve).tobytes())
-        return digest.digest()
+            parts += [f"{path} {index} {len(curve.modifiers)}", keys.places(curve)]
+        return byte_digest(*parts)
 
     def ours(self) -> tuple[bpy.types.Action, object]:
         """Our action and its slot; a copy where another object plays it too: a duplicate of a rider is a rider of its
@@ -148,9 +147,8 @@ class PlainCarrier(Carrier):
         rest = np.empty(16 * len(bones), np.float32)
         bones.foreach_get("matrix_local", rest)
         modes = " ".join(bone.rotation_mode for bone in body.pose.bones)
-        where = np.array(body.matrix_world).tobytes() + rest.tobytes()
         form = f"{frames_per_second(scene)!r} {units_per_metre(scene)!r} {modes}"
-        return hashlib.blake2b(where + form.encode(), digest_size=16).digest()
+        return byte_digest(np.array(body.matrix_world), rest, form)
 
     def read(self, scene: bpy.types.Scene) -> Read:
         found, slot = self._original()

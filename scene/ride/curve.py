@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...beyond_mocap.base.digest import byte_digest
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion.path import Path
 from ..drawn_track import points_of
@@ -51,8 +52,7 @@ class Drawn:
     @property
     def digest(self) -> bytes:
         """Another where the path is another."""
-        form = f"{self.kind} {self.order} {self.clamped} {self.closed}".encode()
-        return hashlib.blake2b(form + self.still, digest_size=16).digest()
+        return byte_digest(f"{self.kind} {self.order} {self.clamped} {self.closed}", self.still)
 
     def line(self) -> np.ndarray:
         """Places (N, 3) m along it, close together where it bends."""
@@ -242,7 +242,7 @@ def _nodes(path: Path, arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places (N, 3) and unit tangents (N, 3) at arc lengths s (N,) m."""
     u = arc.parameter(s)
     pull = path.at(u, 1)
-    return path.at(u), pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1e-9)
+    return path.at(u), unit_vectors(pull)
 
 
 def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:

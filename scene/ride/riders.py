@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +9,7 @@ from functools import cached_property
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.errors import BeyondMocapError, InputError
 from .. import channels, linked
 from ..set_aside import drop, play_as_before
@@ -94,8 +94,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     settings, drawn = RideSettings(**wishes(ridden_by)), curve.read(scene, ridden_by.curve)
     known = source.of(carrier, scene, settings)
     ground = source.ground_digest(scene, ridden_by.ground)
-    parts = known.digest + drawn.digest + ground + repr(settings).encode()
-    digest = hashlib.blake2b(parts, digest_size=16).hexdigest()
+    digest = byte_digest(known.digest, drawn.digest, ground, repr(settings)).hex()
     made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:

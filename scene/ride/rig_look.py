@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
 
 TURNS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
@@ -54,7 +55,7 @@ def turns(mode: str, values: np.ndarray) -> np.ndarray:
         return quaternion.normalized(np.where(np.any(values, axis=1, keepdims=True), values, [1.0, 0.0, 0.0, 0.0]))
     if mode == "AXIS_ANGLE":
         axis = values[:, 1:]
-        return quaternion.about_axis(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9), values[:, 0])
+        return quaternion.about_axis(unit_vectors(axis), values[:, 0])
     order = mode[::-1]  # Blender names the axes in the order in which they are applied to a point
     return quaternion.from_euler(values[:, ["XYZ".index(letter) for letter in order]], order)
 

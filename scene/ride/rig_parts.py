@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, pose_kinematics
@@ -175,15 +176,10 @@ def upright(rig: bpy.types.Object, shown: dict[str, str]) -> np.ndarray:
     """The turn (4,), by quarter turns, that lets the armature's space stand along Z and face +X."""
     heads = {part: np.array(rig.data.bones[bone].head_local) for part, bone in shown.items()}
     legs = [heads["left upper_leg"], heads["right upper_leg"]]
-    up = _axis(np.mean(legs, axis=0) - 0.5 * (heads["left foot"] + heads["right foot"]))
+    up = nearest_axis(np.mean(legs, axis=0) - 0.5 * (heads["left foot"] + heads["right foot"]))
     across = legs[0] - legs[1]
-    left = _axis(across - (across @ up) * up)
+    left = nearest_axis(across - (across @ up) * up)
     return quaternion.from_matrix(np.stack([np.cross(left, up), left, up]))
-
-
-def _axis(vector: np.ndarray) -> np.ndarray:
-    number = int(np.argmax(np.abs(vector)))
-    return np.eye(3)[number] * np.sign(vector[number])
 
 
 def motion_of(rig: bpy.types.Object, parts: Parts, seen: Look, units: float, fps: float) -> Motion:

@@ -6,7 +6,6 @@ A rig is looked at once, frame by frame (`rig_source`); while a path is dragged 
 
 from __future__ import annotations
 
-import hashlib
 import json
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.errors import InputError
 from .. import armature, channels, rig_bake
 from ..action import PLACED
@@ -60,16 +60,16 @@ class RigCarrier(Carrier):
             if thing is body or thing.animation_data is None:
                 form.append([thing.name, [list(row) for row in thing.matrix_basis]])
             thing = thing.parent
-        return hashlib.blake2b(rest.tobytes() + repr(form).encode(), digest_size=16).digest()
+        return byte_digest(rest, repr(form))
 
     def keys_digest(self) -> bytes:
-        digest = hashlib.blake2b(super().keys_digest(), digest_size=16)
+        parts = [super().keys_digest()]
         for strip in self._strips():
-            digest.update(repr((strip.action.name, strip.frame_start, strip.frame_end, strip.scale, strip.repeat,
-                                strip.blend_type, strip.influence, strip.mute)).encode())
+            parts.append(repr((strip.action.name, strip.frame_start, strip.frame_end, strip.scale, strip.repeat,
+                               strip.blend_type, strip.influence, strip.mute)))
             for place, curve in channels.curves(strip.action, strip.action_slot).items():
-                digest.update(repr(place).encode() + keys.places(curve).tobytes())
-        return digest.digest()
+                parts += [repr(place), keys.places(curve)]
+        return byte_digest(*parts)
 
     def read(self, scene: bpy.types.Scene) -> Read:
         armature.placement(self.body, scene)  # an uneven scale turns bones askew

@@ -3,12 +3,12 @@ the ground that its feet follow."""
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.errors import BeyondMocapError, InputError
 from ..measure import units_per_metre
 from . import curve, keys
@@ -55,8 +55,7 @@ def of(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
     number = original.session_uid if original is not None else 0
     if uid not in _keys or _keys[uid][0] != number:
         _keys[uid] = number, carrier.keys_digest()
-    parts = _keys[uid][1] + carrier.stamp(scene)
-    digest = hashlib.blake2b(parts + repr(wishes).encode(), digest_size=16).digest()
+    digest = byte_digest(_keys[uid][1], carrier.stamp(scene), repr(wishes))
     known = _sources.get(uid)
     if known is not None and known.digest == digest:
         return known
@@ -82,15 +81,15 @@ def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> by
         raise InputError("ground", f"{ground.name} is gone from the scene", "a mesh object", "choose another, or none")
     shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = shown.to_mesh()  # also while it is being edited
-    digest = hashlib.blake2b(_vertices(mesh).tobytes(), digest_size=16)
+    parts = [_vertices(mesh)]
     if corners := mesh.attributes.get(".corner_vert"):  # at once; triangles take Blender ten times as long
         found = np.empty(len(corners.data), np.int32)
         corners.data.foreach_get("value", found)
-        digest.update(found.tobytes() + len(mesh.polygons).to_bytes(8, "little"))
+        parts += [found, len(mesh.polygons).to_bytes(8, "little")]
     shown.to_mesh_clear()
     if not curve.is_animated(ground):
-        digest.update(np.array(shown.matrix_world).tobytes())
-    return digest.digest()
+        parts.append(np.array(shown.matrix_world))
+    return byte_digest(*parts)
 
 
 def ground_notes(ground: bpy.types.Object | None) -> tuple[str, ...]:

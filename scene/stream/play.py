@@ -40,7 +40,7 @@ class Begun:
 def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> Begun:
     """Build the library where it is not there yet, and let everybody stand. Never touches bpy."""
     from ...beyond_mocap import live_passes
-    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.library.build import build
 
     library = order.library
     if library is None:

@@ -11,10 +11,10 @@ from .order import Order
 
 if TYPE_CHECKING:
     from ...beyond_mocap.ball.flight import Flight
-    from ...beyond_mocap.joined_throw import Joined
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.throw import Thrown
+    from ...beyond_mocap.throws.join_throw import JoinedThrow
 
 FOLLOWED, LONGEST = 3.0, 10.0
 """Seconds that the ball is followed behind the target, bouncing and rolling, and that it takes to get there at most."""
@@ -28,7 +28,7 @@ class Result:
 
     order: Order
     thrown: "Thrown"
-    joined: "Joined"
+    joined: "JoinedThrow"
     flight: "Flight"
     seconds: float
     library: "Library | None"
@@ -39,17 +39,18 @@ class Result:
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
     """The throw, and the motion it is part of. Never touches bpy."""
-    from ...beyond_mocap import joined_throw
     from ...beyond_mocap.ball.flight import fly
-    from ...beyond_mocap.library.library import build
+    from ...beyond_mocap.library.build import build
     from ...beyond_mocap.motion.retarget import Retargeter
+    from ...beyond_mocap.throws.join_throw import EASED, FADE, join_throw, library_jerk, stand_still, transition_jerk
+    from ...beyond_mocap.throws.leave_path import leave_path
 
     library = order.library
     if order.folder and library is None:
         library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
     own = order.own
     if own is None:
-        own = joined_throw.standing(order.skeleton, 0.0, order.fps, order.place, order.facing)
+        own = stand_still(order.skeleton, 0.0, order.fps, order.place, order.facing)
     elif order.table:
         own = Retargeter(own, order.skeleton, keeps_travel=True).carry(own)
     start = order.first / order.fps
@@ -58,20 +59,21 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     motion, release = _shown(order, thrown, library is not None)
     told: tuple = ()
     if library is not None:
-        way = joined_throw.around(
-            library, own, start, motion, release, order.at, order.act, _share(progress, 0.3, 1.0), cancelled
+        way = leave_path(
+            library, own, start, motion, release, at=order.at, action=order.act, progress=_share(progress, 0.3, 1.0),
+            cancelled=cancelled,
         )
         own, start, told = way.motion, way.start, way.warnings
-    fade = joined_throw.FADE if library is not None else joined_throw.EASED[order.act]
-    joined = joined_throw.laid_into(own, start, motion, release, order.at, goes_on=library is None, fade=fade)
-    usual = joined_throw.usual_jerk(library, order.fps) if library is not None else float("nan")
+    fade = FADE if library is not None else EASED[order.act]
+    joined = join_throw(own, start, motion, release, at=order.at, goes_on=library is None, fade=fade)
+    usual = library_jerk(library, order.fps) if library is not None else float("nan")
     joined = replace(joined, warnings=(*_when(asked, order, joined), *told, *joined.warnings))
     up = np.array([0.0, 0.0, order.lift])
     raised = replace(joined.motion, root_positions=joined.motion.root_positions + up)
     joined = replace(joined, motion=raised)
     launch = replace(thrown.launch, time=0.0, position=thrown.launch.position + up)
     flight = fly(launch, thrown.ball, seconds + FOLLOWED)
-    return Result(order, thrown, joined, flight, seconds, library, float(joined_throw.seam_jerk(joined).max()), usual)
+    return Result(order, thrown, joined, flight, seconds, library, float(transition_jerk(joined).max()), usual)
 
 
 def _met(order: Order, own: "Motion", start: float, joined: bool, progress, cancelled):
@@ -91,7 +93,7 @@ def _met(order: Order, own: "Motion", start: float, joined: bool, progress, canc
     return order, thrown, seconds
 
 
-def _when(asked: Order, order: Order, joined: "Joined") -> list[str]:
+def _when(asked: Order, order: Order, joined: "JoinedThrow") -> list[str]:
     """Lines about a throw that does not fit into the scene before its release."""
     first = round(order.begins * order.fps)
     begins = round(joined.start * order.fps) + joined.first
@@ -107,16 +109,17 @@ def _when(asked: Order, order: Order, joined: "Joined") -> list[str]:
 
 def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", float]:
     """What is shown of a throw, and its release in that: a body on its way does not stop to wait."""
-    from ...beyond_mocap.joined_throw import EASED, EDGE, without_waiting
+    from ...beyond_mocap.throws.join_throw import EASED, trim_waiting
+    from ...beyond_mocap.throws.run_up import EDGE
 
-    return without_waiting(thrown.motion, thrown.release, EDGE if joined else EASED[order.act])
+    return trim_waiting(thrown.motion, thrown.release, EDGE if joined else EASED[order.act])
 
 
 def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
     """The throw where it has to be: begun where an armature that only stands is; over where its own motion has it at
     the release, if a library joins them; else begun where its own motion leads, since it is eased out of that."""
 
-    from ...beyond_mocap.joined_throw import comes_in_time, stops_at
+    from ...beyond_mocap.throws.leave_path import is_in_reach, stopping_place
 
     def spot(seconds: float) -> tuple[float, ...]:
         return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
@@ -131,9 +134,9 @@ def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, pro
     begin = order.at - release
     if not joined:
         return _thrown_from(order, target, model, {"start": spot(begin)}, progress, cancelled)
-    if comes_in_time(own, start, motion, release, order.at):
+    if is_in_reach(own, start, motion, release, order.at):
         return thrown
-    return _thrown_from(order, target, model, {"start": tuple(stops_at(own, start, begin))}, progress, cancelled)
+    return _thrown_from(order, target, model, {"start": tuple(stopping_place(own, start, begin))}, progress, cancelled)
 
 
 def _model(order: Order):

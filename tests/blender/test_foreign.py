@@ -154,7 +154,7 @@ def test_a_library_of_foreign_clips_is_built_and_a_broken_one_left_out(core, mix
     assert (mixed / ".beyond_mocap/converted/below/jog.fbx.bvh").is_file()
     after = state()
     assert {key for key in before if before[key] != after[key]} <= {"settings", "scenes"}
-    core("library.library").build(mixed)  # as the command line does, afterwards
+    core("library.build").build(mixed)  # as the command line does, afterwards
     bpy.ops.beyond_mocap.import_clip(path="below/jog.fbx", dressed=False)
     assert bpy.context.object.name == "jog"
 

@@ -91,7 +91,7 @@ def test_an_edited_action_is_another_example(actor, room):
 
 def test_what_is_like_it_is_played(actor, room, core, clips):
     """As with the same recording named as a clip, whatever the kind."""
-    library = room("session").library(str(clips), None) or core("library.library").build(str(clips))
+    library = room("session").library(str(clips), None) or core("library.build").build(str(clips))
     planned = core("passes").planned
     first().kind = "attack"
     shown = planned(library, asked(room)).strikes[0]

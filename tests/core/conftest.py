@@ -8,7 +8,8 @@ import pytest
 
 from beyond_mocap.annotation import Timeline, parse_timeline
 from beyond_mocap.files import bvh
-from beyond_mocap.library.library import Library, build
+from beyond_mocap.library.library import Library
+from beyond_mocap.library.build import build
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.gait import gait

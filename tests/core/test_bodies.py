@@ -12,7 +12,7 @@ from beyond_mocap.errors import InputError
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.striking import ball_gap
-from beyond_mocap.take import BallPath
+from beyond_mocap.motion.track.ball_path import BallPath
 
 FPS, RADIUS = 30.0, 0.105
 

@@ -16,7 +16,8 @@ from beyond_mocap.annotation import read_timeline
 from beyond_mocap.commands.told import Told
 from beyond_mocap.files import bvh
 from beyond_mocap.motion.humanoid import stature
-from beyond_mocap.files.tables import read_ball, read_provenance
+from beyond_mocap.files.tables import read_ball
+from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.library.made import KICKED, MADE_FOLDER
 
 TOP = Path(__file__).resolve().parents[2]

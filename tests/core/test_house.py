@@ -39,6 +39,7 @@ ROOMS = {
     "library": ["motion", "annotation", "files", "polish.foot_plant"],
     "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
     "synthesis.phase_network": ["motion", "polish.reach"],
+    "synthesis.construct": ["motion", "annotation", "library", "plan", "own_size", "take", "polish", "synthesis"],
     "polish": ["motion"],
     "ball": ["motion", "annotation", "library", "polish", "markers.trial", "markers.frames"],
     "stream": ["motion", "files", "ball"],

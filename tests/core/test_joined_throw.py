@@ -6,17 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap import joined_throw
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation.jerk import jerk, windowed
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.gait import gait
-from beyond_mocap.motion.humanoid import heading
+from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics, place
 from beyond_mocap.motion.throws import throw
-from beyond_mocap.motion.track import Track
-from beyond_mocap.plan import Plan
+from beyond_mocap.motion.track import BALL_RADIUS, Track
+from beyond_mocap.plan import Plan, SolvedCourse, Touched
+from beyond_mocap.throws.join_throw import (
+    EASED, join_throw, library_jerk, stand_still, transition_jerk, trim_waiting,
+)
+from beyond_mocap.throws.leave_path import is_in_reach, leave_path, stopping_place
+from beyond_mocap.throws.run_up import OWN_WORD, add_throw_clip, construct_run_up
 
 LIBRARY = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
 FPS, AT = 30.0, 6.0
@@ -62,8 +66,8 @@ def same_where_kept(joined, motion) -> bool:
 @pytest.mark.parametrize("speed", [0.0, 2.5])
 def test_the_synthesizer_joins_it_on_the_track(library, speed):
     motion, release, plan = on_library(library, speed)
-    way = joined_throw.run_up_and_recovery(library, plan, motion, release, AT)
-    joined = joined_throw.laid_into(way.motion, way.start, motion, release, AT)
+    way = construct_run_up(library, plan, motion, release, AT)
+    joined = join_throw(way.motion, way.start, motion, release, at=AT)
     assert len(joined.motion) == len(plan.sampled(FPS).times)
     assert abs(joined.release - AT) <= 0.5 / FPS + 1e-9
     assert same_where_kept(joined, motion)
@@ -73,8 +77,8 @@ def test_the_synthesizer_joins_it_on_the_track(library, speed):
     assert np.linalg.norm(both[0] - both[1], axis=-1).mean() < 0.03
     off = heading(way.motion)[inside] - heading(joined.motion)[inside]
     assert np.abs(np.angle(np.exp(1j * off))).max() < 0.12
-    usual = joined_throw.usual_jerk(library, FPS)
-    assert np.all(joined_throw.seam_jerk(joined) <= usual)
+    usual = library_jerk(library, FPS)
+    assert np.all(transition_jerk(joined) <= usual)
     # two seconds before and behind the player is on his track
     for second in (AT - 5.5, AT + 5.5):
         frame = int((second - way.start) * FPS)
@@ -84,29 +88,39 @@ def test_the_synthesizer_joins_it_on_the_track(library, speed):
 def test_the_library_itself_stays_as_it_was(library):
     motion, release, _ = on_library(library, 0.0)
     clips, keys = library.clips, library.keys
-    more = joined_throw.with_clip(library, motion, release)
+    more = add_throw_clip(library, motion, release)
     assert library.clips is clips and library.keys is keys
-    assert [key for key in more.keys if joined_throw.OWN_WORD in key.words][0].frame == pytest.approx(release * FPS)
+    assert [key for key in more.keys if OWN_WORD in key.words][0].frame == pytest.approx(release * FPS)
 
 
 def test_what_lies_within_the_throw_gives_way(library):
     motion, release, plan = on_library(library, 0.0)
     words = (KeyMoment(AT + 0.2, ("kick", "low")), KeyMoment(AT + 4.0, ("kick", "low")))
     plan = replace(plan, timeline=Timeline((Span(AT - 4.0, AT + 4.0, ("standing",)),), words))
-    way = joined_throw.run_up_and_recovery(library, plan, motion, release, AT)
+    way = construct_run_up(library, plan, motion, release, AT)
     assert [line for line in way.warnings if "not played" in line] == [
         "6.2 s: 'kick low' lies within the throw, it is not played"
     ]
 
 
+def test_a_key_moment_within_the_throw_by_its_solved_touch_gives_way_too(library):
+    motion, release, plan = on_library(library, 0.0)
+    asked = AT + motion.duration - release + 0.1  # behind the throw, its touch within
+    ball = np.tile([0.4, 0.0, BALL_RADIUS], (len(TIMES), 1))
+    course = SolvedCourse(TIMES, ball, np.zeros(len(TIMES), bool), (Touched(asked - 0.3, True, "foot", "kick"),))
+    plan = replace(plan, timeline=Timeline((), (KeyMoment(asked, ("kick", "low")),)), solved=course, solve_touches=True)
+    way = construct_run_up(library, plan, motion, release, AT)
+    assert any("'kick low' lies within the throw" in line for line in way.warnings)
+
+
 def test_other_bones_and_sizes_keep_the_exact_throw(library, made):
     # the adult of `motion.adult` is not the library's skeleton: the way there is found on the library's bones
     motion = released_over(made, np.zeros(2))
-    way = joined_throw.run_up_and_recovery(library, going(0.0), motion, made.release, AT)
+    way = construct_run_up(library, going(0.0), motion, made.release, AT)
     assert way.motion.skeleton.names == motion.skeleton.names
-    assert same_where_kept(joined_throw.laid_into(way.motion, way.start, motion, made.release, AT), motion)
+    assert same_where_kept(join_throw(way.motion, way.start, motion, made.release, at=AT), motion)
     tall = replace(going(0.0), height=2.0)
-    way = joined_throw.run_up_and_recovery(library, tall, motion, made.release, AT)
+    way = construct_run_up(library, tall, motion, made.release, AT)
     assert way.motion.root_positions[-1, 2] == pytest.approx(motion.root_positions[-1, 2], abs=0.15)
 
 
@@ -115,77 +129,77 @@ def test_eased_out_of_a_walk_and_on(made):
     first = round((3.0 - made.release) * FPS)
     offset = walk.root_positions[first] - made.motion.root_positions[0]
     motion = place(made.motion, 0.0, (*offset[:2], 0.0))
-    joined = joined_throw.laid_into(walk, 0.0, motion, made.release, 3.0, goes_on=True)
+    joined = join_throw(walk, 0.0, motion, made.release, at=3.0, goes_on=True)
     assert same_where_kept(joined, motion)
     assert np.array_equal(joined.motion.root_positions[: joined.first], walk.root_positions[: joined.first])
     behind = slice(joined.end, None)
     step = np.diff(joined.motion.root_positions[behind, :2], axis=0)
     own = np.diff(walk.root_positions[behind, :2], axis=0)
     assert np.allclose(np.linalg.norm(step, axis=1), np.linalg.norm(own, axis=1), atol=1e-9)  # it walks on, elsewhere
-    assert np.all(joined_throw.seam_jerk(joined) < 3000.0)
+    assert np.all(transition_jerk(joined) < 3000.0)
     assert not any("faces" in line for line in joined.warnings)  # throws begin side on
-    away = joined_throw.laid_into(place(walk, 0.5 * np.pi), 0.0, motion, made.release, 3.0, goes_on=True)
+    away = join_throw(place(walk, 0.5 * np.pi), 0.0, motion, made.release, at=3.0, goes_on=True)
     assert any("faces" in line for line in away.warnings)
 
 
 def test_a_motion_that_stays_where_it_is(made):
-    stands = joined_throw.standing(made.motion.skeleton, 6.0, FPS)
-    joined = joined_throw.laid_into(stands, 10.0, made.motion, made.release, 13.0)
+    stands = stand_still(made.motion.skeleton, 6.0, FPS)
+    joined = join_throw(stands, 10.0, made.motion, made.release, at=13.0)
     assert joined.start == 10.0 and abs(joined.release_frame - 90.0) <= 0.5
     assert np.array_equal(joined.motion.root_positions[joined.end :], stands.root_positions[joined.end :])
     assert not joined.moved.any()
 
 
 def test_a_short_motion_is_held(made):
-    stands = joined_throw.standing(made.motion.skeleton, 0.1, FPS)
-    joined = joined_throw.laid_into(stands, 3.0, made.motion, made.release, 3.0)
+    stands = stand_still(made.motion.skeleton, 0.1, FPS)
+    joined = join_throw(stands, 3.0, made.motion, made.release, at=3.0)
     assert joined.first == 0 and joined.end == len(joined.motion)
     assert joined.start == pytest.approx(3.0 - made.release, abs=0.5 / FPS)
 
 
 @pytest.mark.parametrize("fps", [24000.0 / 1001.0, 60.0])
 def test_at_any_rate(made, fps):
-    stands = joined_throw.standing(made.motion.skeleton, 6.0, fps)
+    stands = stand_still(made.motion.skeleton, 6.0, fps)
     exact = throw((18.0, 0.0, 1.0), 25.0, fps=fps)
-    joined = joined_throw.laid_into(stands, 0.0, exact.motion, exact.release, 3.0)
+    joined = join_throw(stands, 0.0, exact.motion, exact.release, at=3.0)
     assert same_where_kept(joined, exact.motion) and abs(joined.release - 3.0) <= 0.5 / fps + 1e-9
 
 
 def test_what_cannot_be_joined(library, made):
     other = Motion(library.skeleton, np.zeros((90, 3)), np.tile([1.0, 0, 0, 0], (90, len(library.skeleton), 1)), FPS)
     with pytest.raises(InputError, match="another skeleton"):
-        joined_throw.laid_into(other, 0.0, made.motion, made.release, 2.0)
-    stands = joined_throw.standing(made.motion.skeleton, 6.0, FPS)
+        join_throw(other, 0.0, made.motion, made.release, at=2.0)
+    stands = stand_still(made.motion.skeleton, 6.0, FPS)
     with pytest.raises(InputError, match="before and"):
-        joined_throw.laid_into(stands, 0.0, made.motion, 0.1, 2.0)
+        join_throw(stands, 0.0, made.motion, 0.1, at=2.0)
     motion, release, plan = on_library(library, 0.0)
     with pytest.raises(InputError, match="within the track"):
-        joined_throw.run_up_and_recovery(library, plan, motion, release, 1.0)
+        construct_run_up(library, plan, motion, release, 1.0)
 
 
 def test_out_of_a_walk_and_back_by_the_library(library, made):
     walk = gait(1.4, 14.0, FPS)
     motion = released_over(made, walk.root_positions[210, :2])
-    way = joined_throw.around(library, walk, 0.0, motion, made.release, 7.0)
-    joined = joined_throw.laid_into(way.motion, way.start, motion, made.release, 7.0)
+    way = leave_path(library, walk, 0.0, motion, made.release, at=7.0)
+    joined = join_throw(way.motion, way.start, motion, made.release, at=7.0)
     assert same_where_kept(joined, motion) and len(joined.motion) == len(walk)
     for part in (slice(0, 10), slice(-10, None)):
         assert np.array_equal(joined.motion.rotations[part], walk.rotations[part])
         assert np.array_equal(joined.motion.root_positions[part], walk.root_positions[part])
-    usual = joined_throw.usual_jerk(library, FPS)
+    usual = library_jerk(library, FPS)
     hits = windowed(jerk(forward_kinematics(joined.motion)[0], FPS))
     assert max(hits[int(seam) - 2] for seam in way.seams) <= usual
-    assert np.all(joined_throw.seam_jerk(joined) <= usual)
+    assert np.all(transition_jerk(joined) <= usual)
 
 
 def test_who_has_no_time_to_get_back_goes_on_from_there(library, made):
     run = gait(4.2, 6.0, FPS)
     over = released_over(made, run.root_positions[90, :2])
-    assert not joined_throw.comes_in_time(run, 0.0, over, made.release, 3.0)
-    begin = joined_throw.stops_at(run, 0.0, 3.0 - made.release) - made.motion.root_positions[0, :2]
+    assert not is_in_reach(run, 0.0, over, made.release, 3.0)
+    begin = stopping_place(run, 0.0, 3.0 - made.release) - made.motion.root_positions[0, :2]
     motion = place(made.motion, 0.0, (*begin, 0.0))
-    way = joined_throw.around(library, run, 0.0, motion, made.release, 3.0)
-    joined = joined_throw.laid_into(way.motion, way.start, motion, made.release, 3.0)
+    way = leave_path(library, run, 0.0, motion, made.release, at=3.0)
+    joined = join_throw(way.motion, way.start, motion, made.release, at=3.0)
     assert same_where_kept(joined, motion) and any("no time to get back" in line for line in way.warnings)
     speed = np.linalg.norm(np.diff(joined.motion.root_positions[:, :2], axis=0), axis=1) * FPS
     assert speed.max() < 1.25 * 4.2
@@ -198,23 +212,23 @@ def test_who_only_stands_does_not_wait_but_the_throw_is_the_same(made):
         motion.skeleton, np.concatenate([root[:1].repeat(60, axis=0), root, root[-1:].repeat(45, axis=0)]),
         np.concatenate([rotations[:1].repeat(60, axis=0), rotations, rotations[-1:].repeat(45, axis=0)]), motion.fps,
     )
-    shown, at = joined_throw.without_waiting(still, release + 60 / FPS, keeps=0.1)
+    shown, at = trim_waiting(still, release + 60 / FPS, keeps=0.1)
     first = round((release + 60 / FPS - at) * FPS)
     assert 57 <= first and len(shown) <= len(motion) + 6
     assert np.array_equal(shown.rotations, still.rotations[first : first + len(shown)])
-    before, _ = joined_throw.without_waiting(still, release + 60 / FPS, keeps=1.0)
+    before, _ = trim_waiting(still, release + 60 / FPS, keeps=1.0)
     assert len(before) >= len(shown) + 45
 
 
 def test_who_stands_steps_into_a_throw_without_a_library():
     one = throw((18.0, 0.0, 1.0), 25.0, fps=FPS)
-    own = joined_throw.standing(one.motion.skeleton, 12.0, FPS, one.motion.root_positions[0, :2] - [0.0, 0.15], 0.0)
+    own = stand_still(one.motion.skeleton, 12.0, FPS, one.motion.root_positions[0, :2] - [0.0, 0.15], 0.0)
     slides = []
     for goes_on in (False, True):  # faded; stepped
-        fade = joined_throw.EASED["throw"]
-        joined = joined_throw.laid_into(own, 0.0, one.motion, one.release, AT, goes_on=goes_on, fade=fade)
+        fade = EASED["throw"]
+        joined = join_throw(own, 0.0, one.motion, one.release, at=AT, goes_on=goes_on, fade=fade)
         assert same_where_kept(joined, one.motion)
-        body = joined_throw.identify(own.skeleton)
+        body = identify(own.skeleton)
         toes = forward_kinematics(joined.motion)[0][
             joined.first - 3 : joined.kept[0] + 3, [body.left.toe_or_foot, body.right.toe_or_foot]
         ]
@@ -223,4 +237,4 @@ def test_who_stands_steps_into_a_throw_without_a_library():
         slides.append(float((speed * low).sum() / FPS))
     assert slides[1] < 0.5 * slides[0]
     usual = windowed(jerk(forward_kinematics(one.motion)[0], FPS)).max()
-    assert joined_throw.seam_jerk(joined).max() < usual
+    assert transition_jerk(joined).max() < usual

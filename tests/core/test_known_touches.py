@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.known_touches import FURTHEST, in_force
+from beyond_mocap.known_touches import FURTHEST, solve_touches
 from beyond_mocap.motion.track import BALL_RADIUS, Track, sample
 from beyond_mocap.plan import Plan, SolvedCourse, Touched
 from beyond_mocap.resynthesize import resynthesize
@@ -97,7 +97,7 @@ def test_touches_go_to_the_key_moments_that_they_suit(planted, asked, touches, t
     keys = tuple(KeyMoment(time, tuple(words.split())) for time, words in asked)
     plan = planted(Timeline((), keys))
     course = replace(plan.solved, touches=tuple(Touched(*touch) for touch in touches))
-    assert [key.solved for key in in_force(replace(plan, solved=course)).timeline.keys] == times
+    assert [key.solved for key in solve_touches(replace(plan, solved=course)).timeline.keys] == times
 
 
 def test_a_key_moment_without_a_touch_stays_and_is_told(library, planted, timeline_of):
@@ -118,7 +118,7 @@ def test_a_track_without_a_ball_is_told(library, track_of, timeline_of, seen):
 
 def test_a_course_is_left_alone_where_touches_are_not_to_be_solved(planted, timeline_of):
     plan = replace(planted(timeline_of((5.3, KICK))), solve_touches=False)
-    assert in_force(plan).solved is None and in_force(plan).timeline == plan.timeline
+    assert solve_touches(plan).solved is None and solve_touches(plan).timeline == plan.timeline
 
 
 def test_solved_from_the_samples_of_a_track(library, planted, timeline_of):

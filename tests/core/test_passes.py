@@ -16,7 +16,8 @@ from beyond_mocap.commands.told import Told
 from beyond_mocap.errors import Cancelled, NotInLibrary
 from beyond_mocap.files import bvh
 from beyond_mocap.files.scene_json import parse_scene
-from beyond_mocap.files.tables import read_ball, read_provenance
+from beyond_mocap.files.tables import read_ball
+from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.motion.humanoid import stature
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.striking import ball_gap

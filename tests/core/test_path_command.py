@@ -9,7 +9,7 @@ from beyond_mocap.__main__ import main
 from beyond_mocap.commands import ride_path
 from beyond_mocap.commands.told import Told
 from beyond_mocap.files import bvh
-from beyond_mocap.files.tables import read_provenance
+from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.polish.path_frame import FRAMES
 

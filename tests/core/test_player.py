@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.humanoid import identify, stature
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.plan import METHODS, Pin, Plan

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.__main__ import main
-from beyond_mocap.ball.released.hand import hand_of
+from beyond_mocap.motion.hand import hand_of
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.files.trc_write import write_trc

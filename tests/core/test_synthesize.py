@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import Cancelled, InputError, NotInLibrary
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import pose_kinematics

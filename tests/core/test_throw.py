@@ -14,10 +14,10 @@ from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.files.network_npz import write_model
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.joined_throw import laid_into, standing
 from beyond_mocap.motion.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.throw import Order, throw_at, within
+from beyond_mocap.throws.join_throw import join_throw, stand_still
 from tests.core.linear_throws import linear_model, planted_examples, planted_kicks
 
 
@@ -107,8 +107,8 @@ def test_another_body_throws(model):
 
 def test_within_a_longer_motion_the_ball_flies_as_it_did(model):
     thrown = throw_at(model, ORDERS[0])
-    own = standing(thrown.motion.skeleton, 8.0, 30.0)
-    laid = laid_into(own, 0.0, thrown.motion, thrown.release, 4.0)
+    own = stand_still(thrown.motion.skeleton, 8.0, 30.0)
+    laid = join_throw(own, 0.0, thrown.motion, thrown.release, at=4.0)
     whole = within(thrown, laid.motion, laid.start, laid.release, laid.first)
     assert len(whole.shift) == len(whole.motion) and abs(whole.release_time - 4.0) < 0.02
     left = grip_point(whole.motion, InHand("right", thrown.grip), np.array([whole.release * 30.0]))[0, 0]

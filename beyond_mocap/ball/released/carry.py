@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.easing import smoothstep
 from ..flight import Launch, fly
 from ..physics import Ball
-from .hand import Hand
+from ...motion.hand import Hand
 
 _SETTLES = 0.10  # s before the release from which on the ball moves from its usual place to where it leaves
 _FOLLOWED = 10.0  # s of flight, bounces and rolling at most
@@ -24,8 +25,7 @@ def carried_and_thrown(hand: Hand, centre: np.ndarray, launch: Launch, ball: Bal
     gap = np.asarray(launch.position, float) - leaves
     k = int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1))
     gap_in_hand = hand.rotation[k].T @ gap
-    share = np.clip(1.0 - (launch.time - times) / _SETTLES, 0.0, 1.0)
-    share = share * share * (3.0 - 2.0 * share)
+    share = smoothstep(1.0 - (launch.time - times) / _SETTLES)
     places = held + share[:, None] * np.einsum("tij,j->ti", hand.rotation, gap_in_hand)
     gone = times > launch.time
     if gone.any():

@@ -7,20 +7,16 @@ motion's.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ...errors import InputError
 from ...markers.frames import rigid_fit
 from ...markers.trial import MarkerTrial
-from ...motion import quaternion
-from ...motion.humanoid import identify
-from ...motion.motion import Motion, forward_kinematics
+from ...motion.hand import Hand
 
 NEAR = 0.14
 """m from the wrist within which a marker belongs to the hand."""
-_HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
 _PASSES = 4
 _LIFTS = sorted(np.arange(-40, 41) / 100.0, key=abs)  # m
 _BEHIND = 0.02  # m nearer to the elbow than the wrist is, where the forearm's markers begin
@@ -28,56 +24,6 @@ _KNUCKLES = (0.055, 0.115)  # m from the wrist: a marker there sits on the metac
 _REACH_OF_KNUCKLES = 2.22  # fingers are 1.22 times the third metacarpal, Buchholz et al. 1992 (see `without_ball`)
 _TORN = 4.0  # times the usual misfit of the hand's markers, above which one of them is not where it should be
 _STEADY = 0.012  # m, spread in the hand's frame below which a marker is the hand's
-
-
-@dataclass(frozen=True, eq=False)
-class Hand:
-    """One hand over T frames.
-
-    side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
-    finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's
-    frame. elbow: (T, 3) m. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are,
-    which the origin has in it.
-    """
-
-    side: str
-    fps: float
-    origin: np.ndarray
-    rotation: np.ndarray
-    finger: np.ndarray
-    reach: float
-    elbow: np.ndarray
-    markers: tuple[str, ...] = ()
-    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
-
-    def __len__(self) -> int:
-        return len(self.origin)
-
-    @property
-    def times(self) -> np.ndarray:
-        """(T,) seconds from frame 0."""
-        return np.arange(len(self)) / self.fps
-
-    def carried(self, place: np.ndarray) -> np.ndarray:
-        """(T, 3) m: where a point `place` (3,) m of the hand's frame is."""
-        return self.origin + np.einsum("tij,j->ti", self.rotation, np.asarray(place, float))
-
-    def taken_back(self, points: np.ndarray) -> np.ndarray:
-        """(T, 3) m in the hand's frame of points (T, 3) m of the world, one a frame."""
-        return np.einsum("tji,tj->ti", self.rotation, points - self.origin)
-
-
-def hand_of(motion: Motion, side: str) -> Hand:
-    """The hand of a solved motion. InputError where the skeleton has none."""
-    limb = getattr(identify(motion.skeleton), side)
-    if limb.hand is None or limb.lower_arm is None:
-        raise InputError("release", f"a skeleton without a {side} hand", "joints for the hand and the forearm")
-    places, rotations = forward_kinematics(motion)
-    finger, reach = _finger(motion, limb)
-    return Hand(
-        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach,
-        places[:, limb.lower_arm],
-    )  # fmt: skip
 
 
 def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Hand:
@@ -161,31 +107,3 @@ def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple
             kept.append(number)
     return tuple(trial.labels[number] for number in kept), trial.positions[:, kept]
 
-
-def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
-    """Unit direction (3,) of the fingers in the hand's frame, and how far their tips are from the wrist, m.
-
-    The skeleton's own tip where it has a likely one, else straight on from the forearm.
-    """
-    skeleton, hand = motion.skeleton, limb.hand
-    forearm = float(np.linalg.norm(skeleton.offsets[hand]))
-    usual = _HAND_OF_ARM * forearm
-    tips = _tips(skeleton, hand)
-    lengths = np.linalg.norm(tips, axis=-1) if len(tips) else np.zeros(0)
-    if len(lengths) and 0.6 * usual < lengths.max() < 1.5 * usual:
-        tip = tips[int(np.argmax(lengths))]
-        return tip / lengths.max(), float(lengths.max())
-    if len(lengths) and lengths.max() > 0.1 * usual:
-        tip = tips[int(np.argmax(lengths))]
-        return tip / lengths.max(), usual
-    return skeleton.offsets[hand] / max(forearm, 1e-9), usual
-
-
-def _tips(skeleton, hand: int) -> np.ndarray:
-    """(N, 3) m at rest, in the hand's frame: the joints and end sites below the hand."""
-    at = {hand: np.zeros(3)}
-    for joint in range(hand + 1, len(skeleton)):
-        if skeleton.parents[joint] in at:
-            at[joint] = at[skeleton.parents[joint]] + skeleton.offsets[joint]
-    ends = [at[parent] + offset for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets) if parent in at]
-    return np.array([place for joint, place in at.items() if joint != hand] + ends).reshape(-1, 3)

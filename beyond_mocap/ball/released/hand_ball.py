@@ -10,9 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-USUAL_ALONG, USUAL_OFF = 0.62, 0.035
-"""The centre of a ball that is held ready to be thrown: as a share of the way from wrist to fingertip, and metres out
-of the palm; it lies on the fingers' middle parts."""
 _USUAL_SIGMA = 0.03  # m, how sure that is
 _SIGMA = 0.003  # m, a marker's distance from the centre against the radius
 _LEAST_SPREAD = 0.5  # of the radius, the smallest spread of the markers that tells it
@@ -29,11 +26,6 @@ class HandBall:
     radius: float
     sigma: float
     fitted: bool = False
-
-
-def usual_centre(finger: np.ndarray, reach: float, palm: np.ndarray | None = None) -> np.ndarray:
-    """(3,) m: where balls usually lie in a hand. finger (3,), reach: as of `Hand`. palm: (3,) unit, out of the palm."""
-    return USUAL_ALONG * reach * finger + (0.0 if palm is None else USUAL_OFF * np.asarray(palm, float))
 
 
 def ball_in_hand(points: np.ndarray, radius: float, usual: np.ndarray, fit_radius: bool = False) -> HandBall:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.time_series import interpolate
 from ..physics import Ball, in_air
 
 FASTEST_SPIN = 2.0 * np.pi * 50.0
@@ -258,4 +259,4 @@ def _air(times: np.ndarray, t0: float, velocity: np.ndarray, spin: np.ndarray, b
         off[k] = off[k - 1] + drift * step + 0.5 * extra * step**2
         drift, v = drift + extra * step, v + push * step
     at = np.clip(times - t0, 0.0, (count - 1) * step)
-    return np.stack([np.interp(at, np.arange(count) * step, off[:, c]) for c in range(3)], axis=-1)
+    return interpolate(at, np.arange(count) * step, off)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...base.vectors import unit_vector
 from ...errors import InputError
 from ...motion import quaternion
 from ...motion.between_frames import cubic_at
@@ -110,7 +111,7 @@ class AtFoot:
         points, velocities = carried(self, motion, np.array([frame]))
         middle = points[0].mean(axis=0)
         ahead = (target - middle) * [1.0, 1.0, 0.0]
-        ahead /= max(np.linalg.norm(ahead), 1e-9)
+        ahead = unit_vector(ahead)
         apart, up = FOOT_RADIUS + ball.radius, ball.radius - middle[2]
         level = middle + np.sqrt(max(apart**2 - up**2, 0.25 * apart**2)) * ahead
         return np.array([level[0], level[1], ball.radius])

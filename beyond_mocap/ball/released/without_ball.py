@@ -24,8 +24,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.time_series import interpolate
 from .first_guess import fastest
-from .hand import Hand
+from ...motion.hand import Hand
 
 SPEED_SIGMA = 0.06
 """Of the speed, one standard deviation."""
@@ -35,7 +36,7 @@ PAD = 0.91
 """Of the way from wrist to fingertip: where the fingers' pads push, each joint bent by some 25 degrees."""
 HOLD = 0.70
 """Of the way from wrist to fingertip: where the ball's centre is while it is gripped."""
-ROLLS_WITH = 2.0 / 7.0
+ROLLS_WITH = 2.0 / 7.0  # share of a surface's speed that a solid ball rolling on it takes on
 _SMOOTH = 0.014  # s, the window of the parabolas that velocities are taken from
 _NEAR = 0.1  # s about the frame in which the wrist is fastest when single frames are left aside
 _FINE = 8  # steps a frame
@@ -196,4 +197,4 @@ def _filled(points: np.ndarray) -> np.ndarray:
     if known.all():
         return points
     at = np.arange(len(points))
-    return np.stack([np.interp(at, at[known], points[known, c]) for c in range(3)], axis=-1)
+    return interpolate(at, at[known], points[known])

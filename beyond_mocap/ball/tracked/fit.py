@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.easing import hermite
+from ...base.vectors import unit_vectors
 from ...errors import Cancelled
 from ..batch import courses
 from ..physics import FOOTBALL, Ball
@@ -152,7 +154,7 @@ def _launch(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.n
     place[:, :2] += unknown[:, :2]
     place[:, 2] = np.maximum(place[:, 2], ball.radius)
     velocity = unknown[:, 2:5]
-    flat = velocity[:, :2] / np.maximum(np.linalg.norm(velocity[:, :2], axis=1), 1e-6)[:, None]
+    flat = unit_vectors(velocity[:, :2], least=1e-6)
     top, side = unknown[:, 5], unknown[:, 6]
     spin = np.stack([-flat[:, 1] * top, flat[:, 0] * top, side], axis=1)
     return place, velocity, spin
@@ -172,8 +174,7 @@ def _between(places, speeds, since) -> np.ndarray:
     row = np.arange(len(places))[:, None]
     p, q = places[row, cell], places[row, cell + 1]
     m, n = speeds[row, cell] * GRID, speeds[row, cell + 1] * GRID
-    s2, s3 = share**2, share**3
-    return (2 * s3 - 3 * s2 + 1) * p + (s3 - 2 * s2 + share) * m + (3 * s2 - 2 * s3) * q + (s3 - s2) * n
+    return hermite(share, p, m, q, n)
 
 
 def _misses(stretches: Stretches, unknown: np.ndarray, seen: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.time_series import interpolate
 from ..batch import courses
 from ..physics import FOOTBALL
 from .fit import LONGEST, Stretches, fit_launches, gathered
@@ -158,7 +159,7 @@ def _bounces(times, places, speeds) -> np.ndarray:
 
 def _off(piece: BallPiece, stretches: Stretches, number: int, span) -> tuple[float, float, float, float]:
     since, weight = stretches.since[number], stretches.weight[number]
-    at = np.stack([np.interp(since, piece.times - span[0], piece.positions[:, axis]) for axis in range(2)], axis=1)
+    at = interpolate(since, piece.times - span[0], piece.positions[:, :2])
     off = np.linalg.norm(at - stretches.points[number, :, :2], axis=1)
     seen = _sound(off, weight > _TRUSTED)
     made = (weight > 0) & ~(weight > _TRUSTED)
@@ -195,7 +196,7 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     measured = stretches.weight[number] > _TRUSTED
     since = stretches.since[number][measured]
     after = piece.times - piece.start
-    there = np.stack([np.interp(since, after, piece.positions[:, axis]) for axis in range(2)], axis=1)
+    there = interpolate(since, after, piece.positions[:, :2])
     sound = _sound(np.linalg.norm(there - stretches.points[number][measured, :2], axis=1), np.ones(len(since), bool))
     measured = np.flatnonzero(measured)[sound]
     since, there = since[sound], there[sound]
@@ -210,7 +211,7 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     speeds[:, :2] += slopes @ both
     higher = ends[1][2] - places[-1, 2] if np.isfinite(stretches.end[number, 2]) else 0.0
     places[:, 2] = np.maximum(places[:, 2] + every[:, 1] * higher, FOOTBALL.radius)
-    path = np.stack([np.interp(since, piece.times - piece.start, places[:, axis]) for axis in range(2)], axis=1)
+    path = interpolate(since, piece.times - piece.start, places[:, :2])
     residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if len(measured) else np.nan
     return BallPiece(piece.times, places, speeds, piece.kind, piece.spin, residual, piece.bounces)
 

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...base.easing import hermite
 from ...motion.skeleton import frozen_array
 
 
@@ -78,8 +79,7 @@ class SolvedPath:
         nowhere = np.isin(after, self._begins)[:, None]
         m, n = (np.where(nowhere, q - p, speeds[knot] * step) for knot in (before, after))
         if not slope:
-            s2, s3 = share**2, share**3
-            return (2 * s3 - 3 * s2 + 1) * p + (s3 - 2 * s2 + share) * m + (3 * s2 - 2 * s3) * q + (s3 - s2) * n
+            return hermite(share, p, m, q, n)
         rising = 6 * share - 6 * share**2
         out = rising * (q - p) + (3 * share**2 - 4 * share + 1) * m + (3 * share**2 - 2 * share) * n
         inside = (at >= times[0]) & (at <= times[-1])

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...base.time_series import interpolate
 from ...errors import Cancelled, InputError
-from ...motion.runs import runs
 from ...motion.skeleton import frozen_array
 from ...motion.track import BALL_RADIUS
 from . import cuts as cutting
@@ -23,7 +23,7 @@ from .flights import flown
 from .path import BallPiece, SolvedPath
 from .samples import Samples, read_samples
 
-PITCH = (105.0, 68.0)
+PITCH = (105.0, 68.0)  # m, the standard pitch
 _GAP = 1.5  # s without a sample, over which nothing is solved
 _SHORTEST, _FEWEST = 0.3, 5  # s that are solved where there are longer stretches; samples that can be
 _TOGETHER = 0.06  # s in which samples err together: they count as one
@@ -159,7 +159,7 @@ def _bridged(samples: Samples, window: slice) -> np.ndarray:
     axes = 3 if np.count_nonzero(heights & used) > _HEIGHTS * np.count_nonzero(used) else 2
     there = np.flatnonzero(used & heights) if axes == 3 else np.flatnonzero(used)
     every = np.arange(len(points))
-    return np.stack([np.interp(every, there, points[there, axis]) for axis in range(axes)], axis=1)
+    return interpolate(every, there, points[there, :axes])
 
 
 def _solve_window(samples: Samples, window: slice, positions: np.ndarray, stranger: float) -> touches.Cuts:

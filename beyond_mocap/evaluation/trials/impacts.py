@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...base.vectors import unit_vector, unit_vectors
 from .results import TrialResult
 
 CULLED = 3.0
@@ -35,8 +36,8 @@ def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
         if not rows:
             continue
         ways = np.array([results[i].throw.velocity[:2] for i in rows])
-        mean = np.sum(ways / np.maximum(np.linalg.norm(ways, axis=-1), 1e-9)[:, None], axis=0)
-        along = mean / max(float(np.linalg.norm(mean)), 1e-9)
+        mean = np.sum(unit_vectors(ways), axis=0)
+        along = unit_vector(mean)
         across = np.array([along[1], -along[0]])
         for i in rows:
             way = results[i].throw.impact - results[i].throw.hips

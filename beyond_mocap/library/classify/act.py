@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import find_peaks
 
-from ..proposals import Proposal
+from ..proposal import Proposal
 from .details import Details
 from .kernel import Kernel
 from .signals import RATE, STRIKES, Signals

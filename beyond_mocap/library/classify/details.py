@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..proposals import Proposal
+from ..proposal import Proposal
 
 EXCLUSIVE = (
     ("left", "right"), ("low", "middle", "high"), ("inside", "outside", "top", "volley"), ("standing", "running"),

@@ -12,7 +12,8 @@ from ...annotation import LOCOMOTION, VOCABULARY, ClipAnnotation, spoken
 from ...errors import Cancelled, InputError
 from ...motion.humanoid import identify
 from ...motion.motion import Motion
-from ..proposals import GAITS, Proposal, propose
+from ..proposals import GAITS, propose
+from ..proposal import Proposal
 from ..word_sources import is_open
 from .signals import Signals, signals
 

@@ -11,9 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ...motion import contacts, quaternion
+from ...base.vectors import unit_vectors
+from ...motion import contacts
 from ...motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ...motion.motion import Motion, forward_kinematics
+from ...motion.quaternion import turned_about_up
 
 RATE = 30.0
 """Signals per second."""
@@ -71,10 +73,10 @@ def signals(motion: Motion) -> Signals:
         away = places[rows][:, joints] - places[rows][:, [hips]]
         pace = (moving[rows][:, joints] - moving[rows][:, [hips]]) * _REACH
         turn = -facing[rows][:, None]
-        return np.concatenate([_turned(away, turn), _turned(pace, turn)], axis=-1) / leg
+        return np.concatenate([turned_about_up(away, turn), turned_about_up(pace, turn)], axis=-1) / leg
 
     sides = [_points_of(body, limb) for limb in (body.left, body.right)]
-    head = body.head if body.head is not None else body.neck if body.neck is not None else body.chest
+    head = body.head_or_neck
     strikes = _strikes(places, moving, body, head, facing)
     return Signals(motion.fps, len(motion), at, points([body.chest, head]),
                    np.stack([points(one) for one in sides], axis=1),
@@ -90,13 +92,14 @@ def _points_of(body: Humanoid, limb) -> list[int]:
 
 def _trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.ndarray:
     """(T, 8) of `Signals.trunk`."""
-    hips, top = body.hips, body.neck if body.neck is not None else body.chest
+    hips, top = body.hips, body.neck_or_chest
     height = (places[:, hips, 2] - contacts.ground_height(motion)) / leg
-    pace = gaussian_filter1d(_turned(moving[:, hips], -facing), max(0.05 * motion.fps, 0.5), axis=0, mode="nearest")
+    pace = turned_about_up(moving[:, hips], -facing)
+    pace = gaussian_filter1d(pace, max(0.05 * motion.fps, 0.5), axis=0, mode="nearest")
     smooth = gaussian_filter1d(facing, max(0.1 * motion.fps, 0.5), mode="nearest")
     turning = np.gradient(smooth) * motion.fps if len(motion) > 1 else np.zeros(1)
-    up = _turned(places[:, top] - places[:, hips], -facing)
-    up = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9)
+    up = turned_about_up(places[:, top] - places[:, hips], -facing)
+    up = unit_vectors(up)
     return np.concatenate([height[:, None], pace, turning[:, None], up], axis=1)
 
 
@@ -105,7 +108,7 @@ def _strikes(places, moving, body: Humanoid, head: int, facing) -> np.ndarray:
     feet = [body.left.toe_or_foot, body.right.toe_or_foot]
     hands = [_points_of(body, limb)[0] for limb in (body.left, body.right)]
     speed = np.linalg.norm(moving[:, [*feet, *hands]], axis=-1).reshape(len(places), 2, 2).max(axis=2)
-    nod = _turned(moving[:, head] - moving[:, body.chest], -facing)[:, 0]
+    nod = turned_about_up(moving[:, head] - moving[:, body.chest], -facing)[:, 0]
     height = places[:, body.hips, 2]
     return np.concatenate([speed, nod[:, None], height[:, None], -height[:, None]], axis=1)
 
@@ -115,8 +118,3 @@ def _velocity(places: np.ndarray, fps: float) -> np.ndarray:
     if len(places) < 2:
         return np.zeros_like(places)
     return np.gradient(gaussian_filter1d(places, max(_SMOOTH * fps, 0.5), axis=0, mode="nearest"), axis=0) * fps
-
-
-def _turned(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) turned by angles (...) about the world's Z."""
-    return np.concatenate([quaternion.turned_level(v[..., :2], angle), v[..., 2:]], axis=-1)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...annotation import swap_sides
 from ...errors import InputError
-from ..proposals import Proposal
+from ..proposal import Proposal
 from . import confidence, details, kernel
 from .act import Act, candidates, in_space, rule_at, rule_sure, steady, strike_of
 from .classifier import Classifier, in_seconds

@@ -11,17 +11,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...base.time_series import interpolate
 from ...errors import InputError
 from .data import Track
 
-HZ = 25.0
+HZ = 25.0  # samples a second of a track from a drawn line
 FASTEST = 12.0
 """Metres per second beyond which nobody runs."""
 
 SHORTEST = 0.2
 """Metres that a drawn line has at least."""
 
-LONGEST_SECONDS = 3600.0
+LONGEST_SECONDS = 3600.0  # a slower track is a mistake, and would take the memory
 
 
 def along(
@@ -53,7 +54,7 @@ def along(
     passed = np.clip(times - leave[at], 0.0, seconds[at])
     pull = (speeds[at + 1] - speeds[at]) / seconds[at]
     gone = np.clip(arc[at] + speeds[at] * passed + 0.5 * pull * passed**2, 0.0, way[-1])
-    places = np.stack([np.interp(gone, way, line[:, axis]) for axis in (0, 1)], axis=1)
+    places = interpolate(gone, way, line[:, :2])
     return Track(times + start, places, name=name)
 
 
@@ -65,7 +66,7 @@ def moved(times: np.ndarray, places: np.ndarray, name: str = "track") -> Track:
         raise InputError(name, "it moves for less than 0.2 s", "an animated object", "give it keys, or a longer range")
     count = max(int(round((times[-1] - times[0]) * HZ)), 5)
     even = np.linspace(times[0], times[-1], count + 1)
-    places = np.stack([np.interp(even, times, places[:, axis]) for axis in (0, 1)], axis=1)
+    places = interpolate(even, times, places)
     fastest = np.linalg.norm(np.diff(places, axis=0), axis=1).max() / (even[1] - even[0])
     if not fastest <= FASTEST:
         raise InputError(name, f"it moves at {fastest:.1f} m/s", f"{FASTEST:g} m/s at most", "slow it down")

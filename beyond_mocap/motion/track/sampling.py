@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.time_series import interpolate
 from ...errors import InputError
 from ..arctangent import arctan2
 from .data import BALL_RADIUS, SampledTrack, Track
@@ -20,8 +21,8 @@ LONG_GAP = 1.0
 MOVING_SPEED = 0.5
 """m/s; below it a direction of travel is mostly noise."""
 
-_TURN_SECONDS = 0.5
-_LONGEST = 6 * 3600.0
+_TURN_SECONDS = 0.5  # in which one who stood turns before setting off
+_LONGEST = 6 * 3600.0  # s
 
 
 def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> SampledTrack:
@@ -33,7 +34,7 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
     samples.
     """
     times, fine, step = _grids(track, fps)
-    positions = smoothed(_linear(fine, track.times, track.positions), fps * step, window)[::step]
+    positions = smoothed(interpolate(fine, track.times, track.positions), fps * step, window)[::step]
     measured = track.measured
     velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2) if len(times) > 2 else _chord(positions, fps)
     speed = np.linalg.norm(velocity, axis=1)
@@ -41,7 +42,7 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
     return SampledTrack(
         times=times,
         positions=positions,
-        raw=_linear(times, track.times[measured], track.positions[measured]),
+        raw=interpolate(times, track.times[measured], track.positions[measured]),
         velocity=velocity,
         speed=speed,
         direction=travel_direction(velocity, fps),
@@ -122,11 +123,6 @@ def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
     return fine[::step], fine, step
 
 
-def _linear(at: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """(len(at), k): `values` (N, k) at `times` (N,), linearly interpolated, held at the ends."""
-    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)
-
-
 def _chord(positions: np.ndarray, fps: float) -> np.ndarray:
     """Velocity (T, 2) m/s of one or two frames."""
     return np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)
@@ -147,5 +143,5 @@ def _ball(track: Track, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.full((len(at), 3), np.nan), np.zeros(len(at), dtype=bool)
     times = track.times[seen]
     height = np.where(track.ball_height_known[seen], track.ball[seen, 2], BALL_RADIUS)
-    ball = _linear(at, times, np.column_stack([track.ball[seen, :2], np.maximum(height, BALL_RADIUS)]))
+    ball = interpolate(at, times, np.column_stack([track.ball[seen, :2], np.maximum(height, BALL_RADIUS)]))
     return ball, _bridged(at, times, GAP_INTERVALS * track.interval)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.easing import smoothstep
 from ...motion.motion import Motion
 from ...motion.track import zero_phase_hann
 from ..gaze import following
@@ -49,9 +50,9 @@ def looking(
     waves = np.sin(2.0 * np.pi * times[:, None] / np.array(_PERIODS) + phases) @ weights / weights.sum()
     wander = LEAST + (MOST - LEAST) * (0.5 + 0.5 * np.clip(1.6 * waves + 0.4, -1.0, 1.0))
     away = np.linalg.norm(np.nan_to_num(late - motion.root_positions, nan=1e3)[:, :2], axis=1)
-    far = _between(away, NEAR)
+    far = smoothstep(away, *NEAR)
     share = MOST + far * (wander - MOST)
-    share = share * (1.0 - AHEAD * far * _between(_speed(motion), SPRINT))
+    share = share * (1.0 - AHEAD * far * smoothstep(_speed(motion), *SPRINT))
     return following(motion, late, look, zero_phase_hann(share[:, None], motion.fps, 0.6)[:, 0])
 
 
@@ -64,9 +65,3 @@ def _speed(motion: Motion) -> np.ndarray:
     """(T,) m/s over the ground, without the sway of steps."""
     ground = zero_phase_hann(motion.root_positions[:, :2], motion.fps, 0.6)
     return np.linalg.norm(np.gradient(ground, axis=0), axis=1) * motion.fps if len(motion) > 1 else np.zeros(1)
-
-
-def _between(values: np.ndarray, edges: tuple[float, float]) -> np.ndarray:
-    """0 below the first edge, 1 above the second, smooth between."""
-    x = np.clip((values - edges[0]) / (edges[1] - edges[0]), 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)

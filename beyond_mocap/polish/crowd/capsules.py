@@ -32,7 +32,7 @@ RADII = {
 FAR = 2.5
 """Metres between the middles of two bodies' hips from which on they cannot touch."""
 
-_TALL = 1.80
+_TALL = 1.80  # m, the body for which radii are given
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class _Same:
 def _capsules(same: _Same) -> tuple[Capsule, ...]:
     body, size = identify(same.skeleton), stature(same.skeleton) / _TALL
     radius = {part: size * value for part, value in RADII.items()}
-    top = body.neck if body.neck is not None else body.chest
+    top = body.neck_or_chest
     found = [Capsule(body.left.upper_leg, body.right.upper_leg, radius["hips"])]
     if top != body.hips:
         found.append(Capsule(body.hips, top, radius["spine"]))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ...base.easing import quintic_step_by_powers
 from ...errors import InputError
 from ...motion import quaternion
 from ...motion.humanoid import identify
@@ -27,7 +28,7 @@ CURVES = 12
 UNIT = 1e-4
 """Metres and radians that a kept 1 stands for."""
 
-KNOT_SECONDS = 0.1
+KNOT_SECONDS = 0.1  # between the knots of a correction
 _NOTHING = 5e-4  # m and rad below which a curve changes nothing that anybody sees
 
 
@@ -133,17 +134,11 @@ def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correcti
     for number, (correction, first, end) in enumerate(parts):
         share = np.ones(len(correction.knots))
         if number and parts[number - 1][2] == first:
-            share = share * _smooth((correction.knots - first + reach) / (2.0 * reach))
+            share = share * quintic_step_by_powers((correction.knots - first + reach) / (2.0 * reach))
         if number + 1 < len(parts) and parts[number + 1][1] == end:
-            share = share * _smooth((end + reach - correction.knots) / (2.0 * reach))
+            share = share * quintic_step_by_powers((end + reach - correction.knots) / (2.0 * reach))
         for knot, weight, values in zip(correction.knots.tolist(), share, correction.values):
             total[knot] = total.get(knot, 0.0) + weight * values
     knots = np.array(sorted(total), int)
     values = np.array([np.round(total[knot]) for knot in knots.tolist()]).reshape(-1, CURVES)
     return Correction(knots, values, fps, step)
-
-
-def _smooth(x: np.ndarray) -> np.ndarray:
-    """0 .. 1, twice continuously differentiable; _smooth(x) + _smooth(1 - x) = 1."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)

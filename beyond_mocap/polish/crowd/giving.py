@@ -2,8 +2,8 @@
 
 With n the direction away from the other, a point that is down its leg by a share f moves by (1 - f) root + f foot, and
 a point on an arm by turn x arm. What is least is, for root and feet together and for each arm by itself, one banded
-system (`banded_squares`): the squares of what lacks at each contact, of the curves and of their third differences, of a
-foot's distance from its root's shift, and of its speed while it stands.
+system (`BandedLeastSquares`): the squares of what lacks at each contact, of the curves and of their third differences,
+of a foot's distance from its root's shift, and of its speed while it stands.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...motion import quaternion
-from .banded_squares import BandedSquares
+from ...base.banded_least_squares import BandedLeastSquares
+from ...base.vectors import cross
 from .correction import ARMS, FEET
 from .crowd_body import Contact, CrowdBody
 
@@ -32,7 +32,7 @@ BASE = 30.0
 
 _SHORT_ARM = 0.08  # m from the shoulder's axis below which turning an arm brings nothing away
 _UPRIGHT = 0.35  # least share of a push that goes over the ground
-_HELD = 1e6
+_HELD = 1e6  # weight that holds a value: far above all others
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class Calm:
     body: CrowdBody
     low: int
     count: int
-    root_and_feet: BandedSquares
-    arms: tuple[BandedSquares, ...]
+    root_and_feet: BandedLeastSquares
+    arms: tuple[BandedLeastSquares, ...]
 
     @classmethod
     def of(cls, body: CrowdBody, curves: np.ndarray, held: tuple[bool, bool], fps: float) -> Calm:
@@ -53,7 +53,7 @@ class Calm:
         whole = _calm_root_and_feet(body.frames(low, high), curves[low:high], held, fps)
         arms = []
         for side in (0, 1):
-            arms.append(BandedSquares(high - low, 3))
+            arms.append(BandedLeastSquares(high - low, 3))
             for axis in range(3):
                 values = curves[low:high, ARMS.start + 3 * side + axis]
                 _calm(arms[side], axis, ARM_STAY, ARM_SECONDS, body.firm[low:high], fps)
@@ -61,8 +61,8 @@ class Calm:
         return cls(body, low, high - low, whole, tuple(arms))
 
 
-def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedSquares:
-    squares, scale = BandedSquares(len(curves), ARMS.start), BASE / fps
+def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedLeastSquares:
+    squares, scale = BandedLeastSquares(len(curves), ARMS.start), BASE / fps
     for curve in range(ARMS.start):
         _calm(squares, curve, STAY, SECONDS if curve < FEET.start else FOOT_SECONDS, body.firm, fps)
         _hold(squares, curve, curves[:, curve], held)
@@ -72,24 +72,24 @@ def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -
         for axis in (0, 1):
             foot = FEET.start + 2 * side + axis
             near = frames[:, None] + np.array([foot, axis])
-            squares.add(near, np.array([1.0, -1.0]), FOOT_NEAR * scale * body.firm)
+            squares.add_rows(near, np.array([1.0, -1.0]), FOOT_NEAR * scale * body.firm)
             step = frames[:-1, None] + np.array([foot + ARMS.start, foot])
-            squares.add(step, np.array([1.0, -1.0]), FOOT_STANDS / scale * both)
+            squares.add_rows(step, np.array([1.0, -1.0]), FOOT_STANDS / scale * both)
     return squares
 
 
-def _calm(squares: BandedSquares, curve: int, stay: float, seconds: float, firm: np.ndarray, fps: float) -> None:
+def _calm(squares: BandedLeastSquares, curve: int, stay: float, seconds: float, firm: np.ndarray, fps: float) -> None:
     """Keeps a curve small, and smooth over so many seconds."""
-    squares.stay(curve, stay * BASE / fps * firm)
-    squares.smooth(curve, stay * BASE / fps * (seconds * fps) ** 6 * firm)
+    squares.add_value(stay * BASE / fps * firm, curve)
+    squares.add_smoothness(stay * BASE / fps * (seconds * fps) ** 6 * firm, curve)
 
 
-def _hold(squares: BandedSquares, curve: int, values: np.ndarray, held) -> None:
+def _hold(squares: BandedLeastSquares, curve: int, values: np.ndarray, held) -> None:
     """Keeps a curve's first and last two frames what they are, where they are held."""
     for ends, which in ((slice(0, 2), held[0]), (slice(-2, None), held[1])):
         if which:
             index = (np.arange(squares.count) * squares.unknowns + curve)[ends, None]
-            squares.add(index, np.ones(1), np.full(len(index), _HELD), values[ends])
+            squares.add_rows(index, np.ones(1), np.full(len(index), _HELD), values[ends])
 
 
 def given(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: float) -> np.ndarray:
@@ -112,13 +112,13 @@ def given(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: flo
 
 def _arm(calm: Calm, side: int, mine: Contact, rows, shoulder, turns, weight: float) -> np.ndarray:
     """The turns (W, 3) of one arm with its contacts `rows`; shoulder (T, 3) m, turns (T, 3) so far."""
-    row = quaternion.cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
+    row = cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
     long = np.linalg.norm(row, axis=1) > _SHORT_ARM
     rows, row, squares = rows[long], row[long], calm.arms[side].copy()
     frame = mine.frame[rows]
     goal = np.einsum("rk,rk->r", row, turns[frame]) + mine.arm[rows]
-    squares.add((frame - calm.low)[:, None] * 3 + np.arange(3), row, np.full(len(rows), weight), goal)
-    return _limited(squares.least())
+    squares.add_rows((frame - calm.low)[:, None] * 3 + np.arange(3), row, np.full(len(rows), weight), goal)
+    return _limited(squares.solve())
 
 
 def _limited(turns: np.ndarray) -> np.ndarray:
@@ -140,5 +140,5 @@ def _root_and_feet(calm: Calm, mine: Contact, rows, curves, weight: float) -> np
     values = np.concatenate([(1.0 - share) * push, share * push], axis=1)
     goal = np.einsum("rk,rk->r", values, curves[frame[:, None], columns]) + mine.give[rows]
     squares = calm.root_and_feet.copy()
-    squares.add((frame - calm.low)[:, None] * ARMS.start + columns, values, np.full(len(rows), weight), goal)
-    return squares.least()
+    squares.add_rows((frame - calm.low)[:, None] * ARMS.start + columns, values, np.full(len(rows), weight), goal)
+    return squares.solve()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.vectors import unit_vectors
 from ...motion import limb as two_bones
 from ...motion import quaternion
 from ...motion.humanoid import Limb
@@ -35,7 +36,7 @@ def leg_moved(
     own, wanted = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
     eased = [two_bones.soft_distance(length, lengths[0] + lengths[1], SOFT) for length in (own, wanted)]
     reach = np.clip(own + eased[1] - eased[0], _LEAST, lengths[0] + lengths[1])
-    opened = _inside(*lengths, reach) - _inside(*lengths, own)
+    opened = two_bones.inner_angle(*lengths, reach) - two_bones.inner_angle(*lengths, own)
     toes = places[:, limb.toe_or_foot] - ankle if limb.toe is not None else np.zeros(line.shape)
     bend = quaternion.about_axis(_hinge(thigh, shin, line, toes), -opened)
     swing = quaternion.between(thigh + quaternion.rotate(bend, shin), goal)
@@ -54,17 +55,12 @@ def in_parent(skeleton: Skeleton, world: np.ndarray, joint: int, turned: np.ndar
     return quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), turned)
 
 
-def _inside(upper: np.ndarray, lower: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """(W,) rad between two bones whose ends are `length` (W,) m apart."""
-    return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
-
-
 def _hinge(thigh: np.ndarray, shin: np.ndarray, line: np.ndarray, toes: np.ndarray) -> np.ndarray:
     """(W, 3) unit: the axis about which the knee is bent, by which a positive turn bends it further."""
     bones = np.linalg.norm(thigh, axis=1) * np.linalg.norm(shin, axis=1)
     shows = np.cross(thigh, shin) / bones[:, None]
-    across = two_bones.unit(np.cross(toes, line), np.array([0.0, 1.0, 0.0]))
+    across = unit_vectors(np.cross(toes, line), np.array([0.0, 1.0, 0.0]))
     share = np.clip(np.linalg.norm(shows, axis=1, keepdims=True) / _CLEAR, 0.0, 1.0)
-    mixed = share * two_bones.unit(shows, across) + (1.0 - share) * across
-    down = two_bones.unit(line, across)
-    return two_bones.unit(mixed - np.sum(mixed * down, axis=1, keepdims=True) * down, across)
+    mixed = share * unit_vectors(shows, across) + (1.0 - share) * across
+    down = unit_vectors(line, across)
+    return unit_vectors(mixed - np.sum(mixed * down, axis=1, keepdims=True) * down, across)

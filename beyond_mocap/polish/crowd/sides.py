@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.vectors import unit_vectors
 from .capsules import Touching
 
 SECONDS = 0.2
@@ -34,7 +35,7 @@ def sides(found: Touching, before: np.ndarray, fps: float) -> np.ndarray:
         total[step:] += weight * off[:-step]
         total[:-step] += weight * off[step:]
     out = np.empty_like(total)
-    out[order] = _unit(total)
+    out[order] = unit_vectors(total)
     return out
 
 
@@ -43,7 +44,7 @@ def way_out(found: Touching, side: np.ndarray, trunks: np.ndarray, allowed: floa
     negative where there is room. side (K, 3): on which they pass, turned towards the way over the ground from the
     other's trunk to the one's, trunks (T, 3) m, so that limbs that have caught each other come free."""
     out = trunks[found.frame] * np.array([1.0, 1.0, 0.0])
-    way = _unit(side + OUTWARD * _unit(out))
+    way = unit_vectors(side + OUTWARD * unit_vectors(out))
     off = _off(found)
     along = np.einsum("kc,kc->k", way, off)
     square = along**2 + (found.radii - allowed) ** 2 - np.einsum("kc,kc->k", off, off)
@@ -53,7 +54,3 @@ def way_out(found: Touching, side: np.ndarray, trunks: np.ndarray, allowed: floa
 def _off(found: Touching) -> np.ndarray:
     """(K, 3) m from the other's line to the one's."""
     return found.away * (found.radii - found.depth)[:, None]
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)

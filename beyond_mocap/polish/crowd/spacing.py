@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.banded_least_squares import BandedLeastSquares
 from ...motion.arctangent import arctan2
 from ...motion.runs import runs
 from ...motion.track import zero_phase_hann
-from .banded_squares import BandedSquares
 from .episodes import Episode, episodes
 
 DISTANCE = 0.55
@@ -29,8 +29,8 @@ STEADY = 30.0
 """How much firmer who touches the ball keeps his way."""
 
 _TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s over which directions are smoothed at first
-_ROUNDS, _STEP = 24, 0.5
-_HELD = 1e6
+_ROUNDS, _STEP = 24, 0.5  # directions turn as bodies part, so shifts go half of the way each round
+_HELD = 1e6  # weight that holds a value: far above all others
 
 
 def spaced(
@@ -76,29 +76,29 @@ def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: fl
         if not len(index):
             break
         squares = calm.copy()
-        squares.add(index, values, np.ones(len(index)), goal)
-        least = squares.least().reshape(count, bodies, 2).transpose(1, 0, 2)
+        squares.add_rows(index, values, np.ones(len(index)), goal)
+        least = squares.solve().reshape(count, bodies, 2).transpose(1, 0, 2)
         shifts = shifts + _STEP * (least - shifts)
     return shifts
 
 
-def _calm(firm: np.ndarray, fps: float) -> BandedSquares:
+def _calm(firm: np.ndarray, fps: float) -> BandedLeastSquares:
     """The sum of squares that keeps shifts small and smooth, and holds both ends; firm (K, T)."""
-    squares = BandedSquares(firm.shape[1], 2 * len(firm))
+    squares = BandedLeastSquares(firm.shape[1], 2 * len(firm))
     held = np.zeros(firm.shape[1])
     held[:2], held[-2:] = _HELD, _HELD
     for body, weight in enumerate(firm):
         for axis in (0, 1):
-            squares.stay(2 * body + axis, STAY * weight + held)
-            squares.smooth(2 * body + axis, STAY * (SECONDS * fps) ** 6 * weight)
+            squares.add_value(STAY * weight + held, 2 * body + axis)
+            squares.add_smoothness(STAY * (SECONDS * fps) ** 6 * weight, 2 * body + axis)
     return squares
 
 
 def _lacking(
     places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], distance: float, seconds: float, fps: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The rows of one pair for `BandedSquares.add`: where it is too near, which way and how far it has to part; the
-    directions smoothed over `seconds`."""
+    """The rows of one pair for `BandedLeastSquares.add_rows`: where it is too near, which way and how far it has to
+    part; the directions smoothed over `seconds`."""
     one, other = pair
     bodies = len(places)
     off = places[one] + shifts[one] - places[other] - shifts[other]

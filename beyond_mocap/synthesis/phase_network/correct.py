@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...motion.limb import soft_distance
+
 _ONES = np.ones((3, 1))
 _CROSS = np.zeros((9, 3))  # the nine products of two vectors' components -> their cross product
 _CROSS[[5, 6, 1], [0, 1, 2]], _CROSS[[7, 2, 3], [0, 1, 2]] = 1.0, -1.0
@@ -15,7 +17,7 @@ _SKEW = np.zeros((3, 9))  # a vector -> the matrix of the cross product with it
 _SKEW[[0, 1, 2], [7, 2, 3]], _SKEW[[0, 1, 2], [5, 6, 1]] = 1.0, -1.0
 _EYE = np.eye(3)
 _STRAIGHT = 0.03  # weight of the given hinge against the sine of the bend that the limb shows itself
-_TINY = 1e-12
+_TINY = 1e-12  # m^2: roots keep a finite derivative at zero
 
 
 def toward(predicted, wanted, share):
@@ -55,10 +57,7 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
 def _eased(asked, upper, lower, soft, xp):
     """The reach that is played for an asked one, metres."""
     longest = upper + lower
-    start = longest - soft
-    beyond = xp.maximum(asked - start, 0.0)
-    far = xp.where(asked > start, longest - soft * xp.exp(-beyond / soft), asked)
-    return xp.maximum(far, xp.abs(upper - lower) + 0.02 * longest)
+    return xp.maximum(soft_distance(asked, longest, soft, xp), xp.abs(upper - lower) + 0.02 * longest)
 
 
 def _shortest(one, other):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.vectors import cross_level
 from .chains import Chains
 from .description import Windows
 from .kinematics import Pose, picked, six
@@ -26,7 +27,7 @@ def carried(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
     middle, wanted = (now * share).sum(-2), (window.next * share).sum(-2)
     a, b = share * (now - middle[..., None, :]), window.next - wanted[..., None, :]
     along = (a[..., :2] * b[..., :2]).sum((-1, -2))
-    across = (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(-1)
+    across = cross_level(a, b).sum(-1)
     turn = _about_up(along, across, xp)
     place = xp.matmul(turn, (pose.positions[..., chains.hips, :] - middle)[..., None])[..., 0] + wanted
     return xp.concatenate([place - origin, six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)], axis=-1)

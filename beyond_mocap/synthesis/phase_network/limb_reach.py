@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.vectors import unit_vector
 from .chains import LIMB_OF, Chains
 from .correct import bend_to, toward
 from .kinematics import Pose, one_pose, spread, transposed
@@ -13,7 +14,7 @@ from .limits import JointLimits
 
 _STRETCH = 0.995  # share of a limb's length beyond which the body goes along
 _MOST = 0.05  # metres that it goes in one frame
-_ROUNDS = 4
+_ROUNDS = 4  # of moving the body towards what limbs do not reach
 
 
 def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
@@ -23,7 +24,7 @@ def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
     known = {hinge.joint: hinge.across for hinge in (limits.hinges if limits is not None else ())}
     offsets = chains.skeleton.offsets
     across = offsets[chains.sockets[2]] - offsets[chains.sockets[3]]
-    across = across / max(float(np.linalg.norm(across)), 1e-9)
+    across = unit_vector(across)
     sides = (-across, -across, across, across)
     return np.stack([known.get(joint, side) for joint, side in zip(chains.middles, sides)])
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...base.vectors import unit_vector
 from ...errors import InputError
 from ...motion import quaternion
 from ...motion.arctangent import arctan2
@@ -25,14 +26,15 @@ from ...motion.skeleton import Skeleton, frozen_array
 
 FREE = 4.0
 """Radians: offsets never get so long, so a joint with this range is free."""
-_MARGIN = np.radians(10.0)
+_MARGIN = np.radians(10.0)  # beyond what the data show, on either side
 _SHARE = 0.08  # of the range, on either side
-_ROUNDS = 8
+_ROUNDS = 8  # steps to a mean rotation and to the middle of a range
 _CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
 _BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
 _OFF = 1e-9  # radians
 _TURNS = 6  # of box and hinges, until both are kept
 _LONG = 2.0  # radians: longer offsets may as well be meant the other way round
+_TINY = 1e-12  # metres: what is shorter has no direction
 _ONES = np.ones(3)
 _PARTS = np.zeros((9, 4))  # a matrix's nine numbers -> its skew part as a vector, and its trace
 _PARTS[[7, 2, 3], [0, 1, 2]], _PARTS[[5, 6, 1], [0, 1, 2]], _PARTS[[0, 4, 8], 3] = 1.0, -1.0, 1.0
@@ -200,13 +202,8 @@ def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hing
     """None where other joints stand between the two bones or where the mean pose is straight."""
     if skeleton.parents[end] != lower:
         return None
-    along = _unit(skeleton.offsets[lower])
-    across = np.cross(along, _unit(middle[lower] @ skeleton.offsets[end]))
+    along = unit_vector(skeleton.offsets[lower], least=_TINY)
+    across = np.cross(along, unit_vector(middle[lower] @ skeleton.offsets[end], least=_TINY))
     if np.linalg.norm(across) < np.sin(_CLEAR):
         return None
-    return Hinge(lower, end, _unit(across), along, skeleton.offsets[end])
-
-
-def _unit(v: np.ndarray) -> np.ndarray:
-    return v / max(float(np.linalg.norm(v)), 1e-12)
-
+    return Hinge(lower, end, unit_vector(across, least=_TINY), along, skeleton.offsets[end])

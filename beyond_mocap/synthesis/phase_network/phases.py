@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ...base.vectors import distance_along
 from ...errors import InputError
 
 AT_RELEASE = 0.66
@@ -27,7 +28,7 @@ def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray
     """
     _check(effector, fps)
     at = np.arange(len(effector), dtype=float)
-    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(effector, axis=0), axis=1))])
+    gone = distance_along(effector)
     return _pinned(at, gone, float(np.clip(release, 0.0, at[-1])))
 
 

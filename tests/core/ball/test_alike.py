@@ -6,13 +6,14 @@ import pytest
 from beyond_mocap.ball.alike import alike, bones
 from beyond_mocap.ball.links import BONES, BoneWeights, aligned, pose_distance
 from beyond_mocap.synthesis.path_costs import Alike, PathCosts, Weights
-from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.synthesis.wanted import build_order
 from beyond_mocap.plan import Plan
+from beyond_mocap.resolve_plan import resolve_plan
 
 
 @pytest.fixture(scope="module")
 def costs(library, track, asked):
-    order = wanted(library, Plan(track=track, timeline=asked))
+    order = build_order(library, resolve_plan(Plan(track=track, timeline=asked), library))
     return lambda **more: PathCosts(library, order, **more)
 
 

@@ -10,7 +10,7 @@ from beyond_mocap.ball.hits import analyse
 from beyond_mocap.ball.links import BoneWeights, Link, Transitions, aligned, links_of, pose_distance
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.gestures import strike
 from beyond_mocap.motion.motion import place

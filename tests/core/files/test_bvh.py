@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh, bvh_text, decimal_text
+from beyond_mocap.files.bvh_form import BvhForm
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading
 from beyond_mocap.motion.motion import end_positions, forward_kinematics
@@ -131,7 +132,7 @@ def test_channel_subsets_come_and_go(tmp_path, channels):
 
 def test_a_rotation_that_does_not_fit_its_channels_gets_all_and_is_told(tmp_path):
     clip = bvh.read(save(tmp_path, document(body(), rows_for(body()))))
-    form = bvh.BvhForm({**clip.form.channels, "LeftLeg": ("Xrotation",)})
+    form = BvhForm({**clip.form.channels, "LeftLeg": ("Xrotation",)})
     notes = bvh.write(tmp_path / "b.bvh", clip.motion, form)
     assert len(notes) == 1 and "LeftLeg" in notes[0]
     back = bvh.read(tmp_path / "b.bvh")

@@ -4,7 +4,7 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.library.add_clip import add_clip
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.gait import gait
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, block_starts, cluster_blocks
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 
 
 @pytest.mark.parametrize("length", BLOCK_LENGTHS)

@@ -13,7 +13,7 @@ from beyond_mocap.library.features import (
     raw_features,
     sampled_positions,
 )
-from beyond_mocap.library.library import Clip
+from beyond_mocap.library.clip import Clip
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import place

@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.annotation import ClipAnnotation, spoken
 from beyond_mocap.library.keys import Key, keys_of, nearest_serving, nearest_words, serving
-from beyond_mocap.library.library import Clip
+from beyond_mocap.library.clip import Clip
 from beyond_mocap.motion.gait import gait
 
 

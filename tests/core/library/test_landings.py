@@ -10,7 +10,7 @@ import pytest
 from beyond_mocap.evaluation.reference import library_reference
 from beyond_mocap.files import bvh
 from beyond_mocap.library.landings import LANDING_FOLDER
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.moves import getting_up
 from beyond_mocap.plan import Plan
 from beyond_mocap.resynthesize import resynthesize

@@ -5,7 +5,8 @@ import pytest
 
 from beyond_mocap.errors import Cancelled, InputError
 from beyond_mocap.files import bvh
-from beyond_mocap.library.library import build, words_matrix
+from beyond_mocap.library.build import build
+from beyond_mocap.library.describe_clips import words_matrix
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, forward_kinematics

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.library import listing
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 
 
 def test_recordings_are_listed_with_words_length_and_speed(clips_folder, tmp_path):

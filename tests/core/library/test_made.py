@@ -12,7 +12,7 @@ from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.evaluation.feet import stance_travel, stances
 from beyond_mocap.files import bvh
 from beyond_mocap.library.keys import Key, standing_in
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.library.made import BLENDED, FASTEST, KICKED, MADE_FOLDER, TAKEN, gaps
 from beyond_mocap.motion.gestures import strike
 from beyond_mocap.motion.humanoid import identify

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import parse_timeline
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.match import pool
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder

@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.files.take_npz import read_player
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.match.at_ball import OPEN, at_ball
 from beyond_mocap.match.shown import shown
 from beyond_mocap.motion.motion import pose_kinematics

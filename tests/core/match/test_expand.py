@@ -12,6 +12,7 @@ from beyond_mocap.evaluation.played import played_from_take
 from beyond_mocap.match.expand import expanded
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import sample
+from beyond_mocap.resolve_plan import resolve_plan
 from beyond_mocap.synthesize import constructed, synthesize
 
 from .conftest import KICK_TIME
@@ -74,7 +75,7 @@ def test_two_windows_meet_without_a_jump(library, weaving_player):
 
 def test_one_window_is_what_synthesize_makes(library, weaving_plan):
     take = synthesize(library, weaving_plan)
-    again = constructed(library.extended, weaving_plan, take.edit)
+    again = constructed(library.extended, resolve_plan(weaving_plan, library), take.edit)
     assert np.allclose(again.motion.root_positions, take.motion.root_positions, rtol=0.0, atol=1e-9)
     assert (again.keys[0].clip, again.words, again.timeline) == (take.keys[0].clip, take.words, take.timeline)
 

@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.evaluation.played import played_from_take
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.match.figures import combined, per_second, player_report, time_lost
-from beyond_mocap.take import BallPath
+from beyond_mocap.motion.track.ball_path import BallPath
 
 
 def test_time_lost_counts_every_second_once():

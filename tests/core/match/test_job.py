@@ -14,14 +14,15 @@ import pytest
 
 from beyond_mocap.errors import Cancelled
 from beyond_mocap.files import bvh
-from beyond_mocap.files.tables import read_ball, read_provenance, read_rows
+from beyond_mocap.files.tables import read_ball, read_rows
+from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.files.take_npz import read_player
 from beyond_mocap.files.tracking import read_match
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.shown import shown
-from beyond_mocap.take import BallPath
+from beyond_mocap.motion.track.ball_path import BallPath
 from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP, kept_files
 from tests.core.test_command_line import assert_contract
 

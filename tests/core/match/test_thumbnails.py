@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.files.take_npz import read_player
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
 from beyond_mocap.match.shown import shown

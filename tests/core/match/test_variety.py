@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.match.variety import APART, in_step, lags, share_in_step
 from beyond_mocap.motion.track import Track
 from beyond_mocap.plan import Plan
+from beyond_mocap.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.variety import LIKED, PERIOD, taste
-from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.synthesis.wanted import build_order
 from beyond_mocap.synthesize import synthesize
 
 
@@ -76,6 +77,6 @@ def test_a_dozen_who_begin_to_run_at_once_from_short_clips_are_out_of_step(tmp_p
 
 
 def test_no_variety_is_no_taste(library):
-    assert wanted(library, walker(1.0, 0.0)).taste is None
+    assert build_order(library, resolve_plan(walker(1.0, 0.0), library)).taste is None
     with pytest.raises(InputError, match="variety"):
         walker(0.0, -1.0)

@@ -10,7 +10,6 @@ from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics, place
 from beyond_mocap.polish.crowd.attention import looking
-from beyond_mocap.polish.crowd.banded_squares import BandedSquares
 from beyond_mocap.polish.crowd.capsules import nearest, overlap, touching
 from beyond_mocap.polish.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, applied, carried, joined
 from beyond_mocap.polish.crowd.episodes import episodes, joined_spans, meetings
@@ -62,31 +61,6 @@ def test_overlap_of_bodies_side_by_side(walk):
     """The same walk beside itself: hands and shoulders meet first, and it is deeper the nearer they are."""
     depth = [overlap(walk, place(walk, offset=(0.0, away, 0.0))).max() for away in (0.2, 0.4, 0.9)]
     assert depth[0] > depth[1] > 0.0 > depth[2]
-
-
-def test_the_least_of_a_sum_of_squares_is_that_of_dense_algebra():
-    random = np.random.default_rng(1)
-    squares, count = BandedSquares(9, 2), 9
-    dense = [], []
-    for curve in (0, 1):
-        squares.stay(curve, np.full(count, 0.1))
-        squares.smooth(curve, np.full(count, 2.0))
-        for frame in range(count):
-            row = np.zeros(18)
-            row[2 * frame + curve] = np.sqrt(0.1)
-            dense[0].append(row), dense[1].append(0.0)
-        for frame in range(count - 3):
-            row = np.zeros(18)
-            row[2 * (frame + np.arange(4)) + curve] = np.sqrt(2.0) * np.array([-1, 3, -3, 1])
-            dense[0].append(row), dense[1].append(0.0)
-    index, values, goal = np.array([[4, 5], [5, 4], [10, 13]]), random.normal(size=(3, 2)), np.array([1.0, -2.0, 0.5])
-    squares.add(index, values, np.ones(3), goal)
-    for at, value, wish in zip(index, values, goal):
-        row = np.zeros(18)
-        row[at] = value
-        dense[0].append(row), dense[1].append(wish)
-    expected = np.linalg.lstsq(np.array(dense[0]), np.array(dense[1]), rcond=None)[0]
-    assert squares.least().ravel() == pytest.approx(expected, abs=1e-9)
 
 
 def test_episodes_join_what_overlaps_and_shares_a_body():

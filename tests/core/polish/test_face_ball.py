@@ -8,7 +8,7 @@ from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.motion.striking import surfaces
 from beyond_mocap.polish.face_ball import MOST, turned_to_ball
 from beyond_mocap.polish.strike import Touch
-from beyond_mocap.lay_out import faced
+from beyond_mocap.synthesis.construct.construction import apply_heading
 
 KICK = made_strike("kick low inside", fps=60.0)
 WORDS = frozenset({"kick", "low", "inside", "right"})
@@ -38,7 +38,7 @@ def turn_for(degrees, distance=1.0):
 def test_the_foot_comes_near_the_ball(degrees):
     turn, ball, frame = turn_for(degrees)
     before = np.linalg.norm(foot_at(KICK.motion.rotations, frame)[:2] - ball[:2])
-    after = np.linalg.norm(foot_at(faced(KICK.motion.rotations, turn), frame)[:2] - ball[:2])
+    after = np.linalg.norm(foot_at(apply_heading(KICK.motion.rotations, turn), frame)[:2] - ball[:2])
     assert np.sign(turn[frame]) == np.sign(degrees) and after < 0.26 < before
     assert np.argmax(np.abs(turn)) == frame and abs(turn[0]) < 1e-6
     assert np.abs(np.diff(turn, 2)).max() < 0.02

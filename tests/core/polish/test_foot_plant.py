@@ -8,8 +8,8 @@ import pytest
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import identify, leg_length
-from beyond_mocap.motion.motion import place, pose_kinematics
-from beyond_mocap.motion.neutral import _to_local, neutral_stance
+from beyond_mocap.motion.motion import local_rotations, place, pose_kinematics
+from beyond_mocap.motion.neutral import neutral_stance
 from beyond_mocap.polish.foot_plant import MOST_DROP, plant, shift
 from beyond_mocap.polish.reach import two_bone
 
@@ -210,7 +210,7 @@ def test_a_leg_comes_as_straight_as_it_was(walk, levels):
     body = identify(motion.skeleton)
     count, leg = 60, leg_length(motion.skeleton)
     stance = neutral_stance(motion.skeleton)
-    rotations = np.tile(_to_local(motion.skeleton, stance.rotations), (count, 1, 1))
+    rotations = np.tile(local_rotations(motion.skeleton, stance.rotations), (count, 1, 1))
     straight = pose_kinematics(motion.skeleton, np.zeros((1, 3)), rotations[:1])[0][0]
     rise = -0.0025 * leg - 0.02 * (1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, count)))
     root = np.outer(rise - straight[body.left.toe_or_foot, 2], [0.0, 0.0, 1.0])

@@ -3,7 +3,8 @@
 import pytest
 
 from beyond_mocap.plan import Plan
-from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.resolve_plan import resolve_plan
+from beyond_mocap.synthesis.wanted import build_order
 
 
 @pytest.fixture(scope="session")
@@ -11,6 +12,7 @@ def order(library, track_of, timeline_of):
     """order(*lines, track=None, **plan) -> Wanted: by default eight seconds of walking along +x."""
 
     def make(*lines, track=None, **plan):
-        return wanted(library, Plan(track=track or track_of(), timeline=timeline_of(*lines), **plan))
+        plan = Plan(track=track or track_of(), timeline=timeline_of(*lines), **plan)
+        return build_order(library, resolve_plan(plan, library))
 
     return make

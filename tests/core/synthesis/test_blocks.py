@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import Cancelled
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.plan import Plan
+from beyond_mocap.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.annotation_cost import AnnotationCost
 from beyond_mocap.synthesis.blocks import FINEST, BlockSearch
 from beyond_mocap.synthesis.distance import frames_of, straight_edit
-from beyond_mocap.synthesis.wanted import pool_frame, wanted
+from beyond_mocap.synthesis.wanted import build_order, pool_frame
 
 
 def shown(library, order, alpha=0.2):
@@ -111,7 +112,7 @@ def test_clips_shorter_than_the_longest_block(tmp_path, clip_file, track_of, sec
     clip_file(tmp_path / "walk.bvh", 1.4, seconds)
     clip_file(tmp_path / "jog.bvh", 2.8, seconds, "jogging")
     library = build(tmp_path)
-    asked = wanted(library, Plan(track=track_of(1.4, 3.0)))
+    asked = build_order(library, resolve_plan(Plan(track=track_of(1.4, 3.0)), library))
     clip, frame = shown(library, asked)
     assert len(clip) == 91 and {library.clips[c].path for c in clip} <= {"walk.bvh", "jog.bvh"}
     search = BlockSearch(library, asked, 0.2)

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.plan import Plan
+from beyond_mocap.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.dragged import left_out
 from beyond_mocap.synthesis.path_search import PathSearch
 from beyond_mocap.synthesis.slots import KEY_RATES
-from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.synthesis.wanted import build_order
 from beyond_mocap.synthesize import synthesize
 
 KEY, ENTRY = 4.0, 1.2
@@ -30,7 +31,7 @@ def with_header(tmp_path_factory, clip_file):
 def search(with_header, track_of, timeline_of):
     def make(speed):
         plan = Plan(track=track_of(speed), timeline=timeline_of((KEY, "header standing")))
-        return PathSearch(with_header, wanted(with_header, plan))
+        return PathSearch(with_header, build_order(with_header, resolve_plan(plan, with_header)))
 
     return make
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import Cancelled, InputError
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.plan import Plan
+from beyond_mocap.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.path_search import Between, PathSearch
-from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.synthesis.wanted import build_order
 
 
 def found(library, asked):
@@ -132,4 +133,13 @@ def test_clips_shorter_than_a_slot_are_told(tmp_path, clip_file, track_of):
     clip_file(tmp_path / "walk.bvh", 1.4, 0.2)
     library = build(tmp_path)
     with pytest.raises(InputError, match="no clip of more than 8 frames"):
-        found(library, wanted(library, Plan(track=track_of())))
+        found(library, build_order(library, resolve_plan(Plan(track=track_of()), library)))
+
+
+def test_a_narrow_search_is_one_hurried_from_its_second_slot_on(library, order):
+    asked, questions = order((2.0, "kick right")), iter(range(10**6))
+    narrow = PathSearch(library, asked, narrow=True)
+    hurried = PathSearch(library, asked, hurry=lambda: next(questions) > 1)
+    one, other = narrow.run(), hurried.run()
+    assert narrow.hurried == hurried.hurried == narrow.edges[1]
+    assert np.array_equal(one.frame, other.frame) and narrow.width == hurried.width

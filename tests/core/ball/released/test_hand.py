@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.released.hand import hand_of, sharpened
+from beyond_mocap.motion.hand import hand_of
+from beyond_mocap.ball.released.hand import sharpened
 from beyond_mocap.ball.released.without_ball import release_by_hand
 from beyond_mocap.markers.butterworth import butterworth
 from beyond_mocap.markers.planted import planted

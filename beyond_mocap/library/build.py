@@ -1,0 +1,183 @@
+"""Builds a library from a folder: every recording read once, repaired, on one skeleton, indexed and cached."""
+
+from __future__ import annotations
+
+import re
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Callable, Iterable
+
+from ..annotation import ClipAnnotation
+from ..errors import Cancelled, InputError
+from ..files import bvh
+from ..motion.landing import ends_in_flight
+from ..motion.motion import Motion
+from . import cache, landings, one_skeleton, repair
+from .clip import Clip
+from .clusters import BLOCK_LENGTHS, cluster_blocks
+from .describe_clips import described
+from .features import FPS
+from .library import Library, Progress
+from .scan import Annotations, readable_clips
+from .synthetic_files import write_synthetic_clips
+
+
+def build(
+    folder: str | Path,
+    *,
+    rebuild: bool = False,
+    cache_dir: str | Path | None = None,
+    skeleton: str | Path | None = None,
+    unit: float | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Library:
+    """The library of all recordings below `folder`, from its cache where nothing has changed.
+
+    rebuild: ignore the cache. cache_dir: where to keep it (default: the folder itself, else the user's cache folder).
+    skeleton: a BVH file whose skeleton it is (default: the one with most frames, ties by name). unit: metres per file
+    unit (default: guessed per file). seed: of the clustering. threads: how many files are read at once, which
+    changes no bit of what comes out.
+    Clips of other skeletons are brought to this one and all are mended (`one_skeleton`, `repair`); notes say how.
+    Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled.
+    """
+    folder = Path(folder)
+    report = progress or (lambda fraction, text: None)
+    place, where = cache.place(folder, cache_dir)
+    paths, conversions, waiting = readable_clips(folder, place)
+    files = [conversions.readable(path) for path in paths]
+    annotations = Annotations(folder, paths)
+    chosen = Path(skeleton) if skeleton else None
+    key = cache.fingerprint(folder, files, annotations.sources(paths), chosen, unit=unit, seed=seed)
+    if not rebuild:
+        report(0.0, "Reading the cache")
+        found = cache.load(place, key)
+        if found is not None:
+            write_synthetic_clips(place, _completed(found["clips"]), missing_only=True)
+            found["notes"] += tuple(waiting)
+            return Library(folder=str(folder), kept=(place, key), **found)
+    notes: list[str] = [where] if where else []
+    clips = _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled)
+    built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
+    write_synthetic_clips(place, _completed(built.clips))
+    if not cache.save(place, key, built):
+        told = (
+            f"{place} cannot be written: the library is worked out anew each time; give --cache "
+            "(in Blender: Cache Folder in the preferences) a folder of yours"
+        )
+        built = replace(built, notes=(*built.notes, told))
+    report(1.0, "Library ready")
+    return replace(built, kept=(place, key), notes=(*built.notes, *waiting))
+
+
+def _completed(clips: Iterable[Clip]) -> list[Clip]:
+    """Those that go on behind their recording's end."""
+    return [clip for clip in clips if clip.recorded is not None]
+
+
+def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
+    """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
+    read, unpopped, level = zip(*_read_files(paths, files, unit, threads, report, cancelled))
+    notes += _unit_notes(read)
+    carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
+    mended, rows = [], []
+    for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
+        _check(cancelled)
+        report(0.4 + 0.3 * number / len(paths), f"Mending and mirroring {path.name}")
+        one = repair.grounded(motion, standing, moved)
+        mended.append(replace(one, drift=one.drift + level[number][1]))
+        rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
+    notes += repair.told([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
+    originals = _landed([path.relative_to(folder).as_posix() for path in paths], mended, rows, notes)
+    told = [repair.Mended(pops, one.drift, *one.slide) for one, (_, pops) in zip(mended, unpopped)]
+    originals = [replace(clip, mended=what) for clip, what in zip(originals, told)]
+    clips = [clip for original in originals for clip in (original, original.twin())]
+    if not any(clip.annotations for clip in clips):
+        raise InputError(
+            folder, "no annotation for any clip", "NAME.txt beside NAME.bvh or an annotations.csv",
+            "write which frames are standing, walking, jogging, running, kick ...",
+        )
+    return tuple(clips)
+
+
+def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
+    """Each file as read, without pops (and their number), and without drift (and its metres); some at once. files: what
+    to read for each of `paths` (`converted`); the unit is that of the user's own files."""
+
+    def read_one(path: Path, file: Path):
+        source = bvh.read(file, unit if file == path else None)
+        unpopped = repair.without_pops(source.motion)
+        return source, unpopped, repair.without_drift(unpopped[0])
+
+    read = []
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        waiting = [pool.submit(read_one, *both) for both in zip(paths, files)]
+        try:
+            for number, (path, one) in enumerate(zip(paths, waiting)):
+                _check(cancelled)
+                report(0.4 * number / len(paths), f"Reading {path.name}")
+                read.append(one.result())
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+    return read
+
+
+def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[str]) -> list[Clip]:
+    """The clips, those that end in flight with landing and getting up behind them."""
+    flying = [ends_in_flight(one.motion) for one in mended]
+    ways = landings.ways_up([(one.motion, own, one.standing) for one, own in zip(mended, rows)]) if any(flying) else []
+    clips, ends = [], []
+    for name, one, own, flies in zip(names, mended, rows, flying):
+        if flies:
+            ends.append(landings.completed(one.motion, own, one.standing, ways))
+            clips.append(Clip(name, False, ends[-1].motion, ends[-1].rows, ends[-1].standing, ends[-1].recorded))
+        else:
+            clips.append(Clip(name, False, one.motion, own, one.standing))
+    notes += landings.told(ends, ways)
+    return clips
+
+
+def _chosen(path: Path | None, unit: float | None) -> Motion | None:
+    """The recording whose skeleton the user chose."""
+    return bvh.read(path, unit).motion if path is not None else None
+
+
+def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
+    """Rows cut to the clip; InputError for one that begins, or has its key moment, after the clip's end."""
+    for row in rows:
+        if row.start >= count:
+            what = f"a row that begins at frame {row.start:g}"
+            raise InputError(path, what, f"frames 0 to {count - 1}", "mend the row")
+        if row.key is not None and row.key >= count:
+            raise InputError(path, f"a key moment at frame {row.key:g}", f"frames 0 to {count - 1}", "mend the row")
+    return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
+
+
+def _unit_notes(read) -> list[str]:
+    """What the reader decided: each kind of sentence once (numbers apart), with the number of clips it holds for."""
+    kinds: dict[str, list[str]] = {}
+    for source in read:
+        for note in source.notes:
+            kinds.setdefault(re.sub(r"(?<=hips )[\d.]+", "", note), []).append(note)
+    return [f"{told[0]} (so, or nearly so, {len(told)} clips)" if len(told) > 1 else told[0] for told in kinds.values()]
+
+
+def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
+    """Features, words and clusters of `clips`."""
+    _check(cancelled)
+    report(0.7, "Describing frames")
+    frames = described(clips)
+    clusters = {}
+    for number, length in enumerate(BLOCK_LENGTHS):
+        _check(cancelled)
+        report(0.8 + 0.06 * number, f"Clustering blocks of {length} frames")
+        clusters[length] = cluster_blocks(frames, length, seed)
+    return Library(folder, clips[0].motion.skeleton, clips, frames, clusters, FPS, notes)
+
+
+def _check(cancelled) -> None:
+    if cancelled is not None and cancelled():
+        raise Cancelled("library: cancelled")

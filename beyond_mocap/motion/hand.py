@@ -1,0 +1,101 @@
+"""Where a hand is, frame by frame, by its joint of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from . import quaternion
+from .humanoid import identify
+from .motion import Motion, forward_kinematics
+
+USUAL_ALONG, USUAL_OFF = 0.62, 0.035
+"""The centre of a ball that is held ready to be thrown: as a share of the way from wrist to fingertip, and metres out
+of the palm; it lies on the fingers' middle parts."""
+_HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """One hand over T frames.
+
+    side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
+    finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's
+    frame. elbow: (T, 3) m. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are,
+    which the origin has in it.
+    """
+
+    side: str
+    fps: float
+    origin: np.ndarray
+    rotation: np.ndarray
+    finger: np.ndarray
+    reach: float
+    elbow: np.ndarray
+    markers: tuple[str, ...] = ()
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def __len__(self) -> int:
+        return len(self.origin)
+
+    @property
+    def times(self) -> np.ndarray:
+        """(T,) seconds from frame 0."""
+        return np.arange(len(self)) / self.fps
+
+    def carried(self, place: np.ndarray) -> np.ndarray:
+        """(T, 3) m: where a point `place` (3,) m of the hand's frame is."""
+        return self.origin + np.einsum("tij,j->ti", self.rotation, np.asarray(place, float))
+
+    def taken_back(self, points: np.ndarray) -> np.ndarray:
+        """(T, 3) m in the hand's frame of points (T, 3) m of the world, one a frame."""
+        return np.einsum("tji,tj->ti", self.rotation, points - self.origin)
+
+
+def hand_of(motion: Motion, side: str) -> Hand:
+    """The hand of a solved motion. InputError where the skeleton has none."""
+    limb = getattr(identify(motion.skeleton), side)
+    if limb.hand is None or limb.lower_arm is None:
+        raise InputError("release", f"a skeleton without a {side} hand", "joints for the hand and the forearm")
+    places, rotations = forward_kinematics(motion)
+    finger, reach = _finger(motion, limb)
+    return Hand(
+        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach,
+        places[:, limb.lower_arm],
+    )  # fmt: skip
+
+
+def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
+    """Unit direction (3,) of the fingers in the hand's frame, and how far their tips are from the wrist, m.
+
+    The skeleton's own tip where it has a likely one, else straight on from the forearm.
+    """
+    skeleton, hand = motion.skeleton, limb.hand
+    forearm = float(np.linalg.norm(skeleton.offsets[hand]))
+    usual = _HAND_OF_ARM * forearm
+    tips = _tips(skeleton, hand)
+    lengths = np.linalg.norm(tips, axis=-1) if len(tips) else np.zeros(0)
+    if len(lengths) and 0.6 * usual < lengths.max() < 1.5 * usual:
+        tip = tips[int(np.argmax(lengths))]
+        return tip / lengths.max(), float(lengths.max())
+    if len(lengths) and lengths.max() > 0.1 * usual:
+        tip = tips[int(np.argmax(lengths))]
+        return tip / lengths.max(), usual
+    return skeleton.offsets[hand] / max(forearm, 1e-9), usual
+
+
+def _tips(skeleton, hand: int) -> np.ndarray:
+    """(N, 3) m at rest, in the hand's frame: the joints and end sites below the hand."""
+    at = {hand: np.zeros(3)}
+    for joint in range(hand + 1, len(skeleton)):
+        if skeleton.parents[joint] in at:
+            at[joint] = at[skeleton.parents[joint]] + skeleton.offsets[joint]
+    ends = [at[parent] + offset for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets) if parent in at]
+    return np.array([place for joint, place in at.items() if joint != hand] + ends).reshape(-1, 3)
+
+
+def usual_centre(finger: np.ndarray, reach: float, palm: np.ndarray | None = None) -> np.ndarray:
+    """(3,) m: where balls usually lie in a hand. finger (3,), reach: as of `Hand`. palm: (3,) unit, out of the palm."""
+    return USUAL_ALONG * reach * finger + (0.0 if palm is None else USUAL_OFF * np.asarray(palm, float))

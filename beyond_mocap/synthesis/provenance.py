@@ -1,0 +1,77 @@
+"""Provenance: which clip, at which frame, every frame of a take shows; and its table."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..files.tables import format_csv, parse_column, parse_flags, read_rows
+from ..files.whole import atomic_write
+from ..motion.skeleton import frozen_array
+from ..take import Take
+
+PROVENANCE_COLUMNS = (
+    "frame", "time_s", "clip", "clip_frame", "mirrored", "labels", "contact_left", "contact_right",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Provenance:
+    """Where each of T output frames came from: times (T,) s; clip, T paths as below the library; clip_frame (T,)
+    fractional, in the clip's own rate; mirrored (T,) bool; words, T tuples; contacts (T, 2) bool, left and right foot
+    on the ground."""
+
+    times: np.ndarray
+    clip: tuple[str, ...]
+    clip_frame: np.ndarray
+    mirrored: np.ndarray
+    words: tuple[tuple[str, ...], ...]
+    contacts: np.ndarray
+
+    def __post_init__(self):
+        for name, kind in (("times", float), ("clip_frame", float), ("mirrored", bool), ("contacts", bool)):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), kind))
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+
+def provenance_of(take: Take) -> Provenance:
+    """The provenance that a take carries."""
+    return Provenance(
+        times=take.start_time + np.arange(len(take.motion)) / take.motion.fps,
+        clip=tuple(take.clips[index] for index in take.clip),
+        clip_frame=take.clip_frame,
+        mirrored=take.mirrored,
+        words=tuple(map(tuple, take.words)),
+        contacts=take.contacts,
+    )
+
+
+def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
+    """Writes `frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right`, one row per output frame."""
+    table = provenance_of(take) if isinstance(take, Take) else take
+    columns = zip(
+        (f"{time:.6f}" for time in table.times),
+        table.clip,
+        (f"{frame:.4f}" for frame in table.clip_frame),
+        table.mirrored.astype(int),
+        (" ".join(words) for words in table.words),
+        *table.contacts.astype(int).T,
+    )
+    atomic_write(path, format_csv(PROVENANCE_COLUMNS, ((i, *row) for i, row in enumerate(columns))))
+
+
+def read_provenance(path: str | os.PathLike) -> Provenance:
+    """The table that `write_provenance` wrote; InputError with the line of a row that is not of that form."""
+    rows = list(read_rows(path, PROVENANCE_COLUMNS))
+    return Provenance(
+        times=parse_column(rows, "time_s"),
+        clip=tuple(row["clip"] for _, row in rows),
+        clip_frame=parse_column(rows, "clip_frame"),
+        mirrored=parse_flags(rows, "mirrored"),
+        words=tuple(tuple(row["labels"].split()) for _, row in rows),
+        contacts=np.column_stack([parse_flags(rows, "contact_left"), parse_flags(rows, "contact_right")]),
+    )

@@ -1,0 +1,1 @@
+"""Generated throws and kicks within longer motions."""

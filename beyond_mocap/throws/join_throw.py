@@ -1,0 +1,274 @@
+"""A generated throw or kick joined to the motion around it.
+
+    joined = join_throw(run_up.motion, run_up.start, thrown.motion, thrown.release, at=12.4)
+
+Around its release the throw stays bit for bit what was generated, since the ball flies as it left that hand; only its
+first and last parts go over into what surrounds it. It begins on a frame of the motion it is joined to, so the release
+comes up to half a frame sooner or later than asked.
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError, TimedLine
+from ..evaluation.jerk import jerk, uncut_windows, windowed
+from ..library.library import Library
+from ..motion import contacts, quaternion
+from ..motion.humanoid import heading_from_positions, identify
+from ..motion.motion import (
+    Motion, at_frames, forward_kinematics, place, pose_kinematics, resample, world_rotation,
+)
+from ..motion.neutral import neutral_stance
+from ..motion.skeleton import Skeleton
+from ..polish.carry import Body, Resting, leg, limb_carried
+from ..polish.meeting import eased
+from ..polish.stepped_over import stepped_over
+
+FADE = 0.5
+"""Seconds in which a throw goes over into what surrounds it, at either end."""
+
+LEAST_KEPT = 0.25
+"""Seconds before and behind the release that are never faded."""
+
+EASED = {"throw": 0.8, "kick": FADE}
+"""Seconds of that without a library: time for a step of each foot, where the throw leaves it."""
+
+TURNING = 2.0
+"""Radians a second at which a body may be turned towards where the throw begins; further apart it takes longer."""
+
+_WAITS = 0.5  # m/s that no joint of a body is as fast as which only stands
+_PERCENT = 99.0
+_usual: weakref.WeakKeyDictionary[Library, dict] = weakref.WeakKeyDictionary()
+_STEPS_BELOW = 2.0  # m/s; who runs takes no small steps
+_FACES_TELLS, _TURNED_TELLS, _MOVED_TELLS = np.radians(100.0), np.radians(60.0), 0.05  # a throw begins side on
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JoinedThrow:
+    """A longer motion with the throw in it.
+
+    motion: all of it.
+    start: seconds of its first frame on the caller's clock.
+    release: seconds there at which the ball leaves.
+    first, end: frames first .. end of it show the throw from its first to its last.
+    kept: (2,) frames between which it is exactly as generated.
+    moved, turned: (3,) m and rad by which what follows was moved and turned about the vertical to go on from there.
+    warnings: lines for people.
+    """
+
+    motion: Motion
+    start: float
+    release: float
+    first: int
+    end: int
+    kept: tuple[int, int]
+    moved: np.ndarray
+    turned: float
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def release_frame(self) -> float:
+        """Fractional frame of the motion at which the ball leaves."""
+        return (self.release - self.start) * self.motion.fps
+
+
+def join_throw(
+    own: Motion, start: float, throw: Motion, release: float, *, at: float, goes_on: bool = False, fade: float = FADE
+) -> JoinedThrow:
+    """Join a throw to the motion around it.
+
+    Args:
+        own: the motion; where it ends sooner than the throw, its ends are held.
+        start: s of its first frame.
+        throw: on the same skeleton, where it has to be.
+        release: s in the throw at which the ball leaves.
+        at: s on the clock of `own` at about which that is.
+        goes_on: whether what follows is moved and turned so that it goes on from where the throw ends.
+        fade: s in which the one goes over into the other, at either end.
+
+    Raises:
+        InputError: there are two skeletons, or the throw is too short.
+    """
+    if throw.skeleton.names != own.skeleton.names:
+        raise InputError("throw", "the motion of another skeleton", "one on the armature's own skeleton")
+    throw = resample(throw, own.fps)
+    lead, follow = release, throw.duration - release
+    if min(lead, follow) < LEAST_KEPT:
+        raise InputError(
+            "throw", f"{lead:.2f} s before and {follow:.2f} s behind the release", f"{LEAST_KEPT:g} s or more of both"
+        )
+    fps = own.fps
+    first = int(round((at - release - start) * fps))
+    end = first + len(throw)
+    own, start, first, end = hold_ends(own, start, first, end)
+    before = _heading_apart(own, first, throw, 0)
+    into = float(np.clip(max(fade, abs(before) / TURNING), 1.0 / fps, max(lead - LEAST_KEPT, 1.0 / fps)))
+    out = min(fade, follow - LEAST_KEPT)
+    kept = first + int(np.ceil(into * fps)), end - int(np.ceil(out * fps))
+    turned, moved = _continuation(own, throw, kept[1] - first, kept[1], end) if goes_on else (0.0, np.zeros(3))
+    old = _move_rest(own, kept[1], turned, moved)
+    new = own.root_positions.copy(), own.rotations.copy()
+    new[0][first:end], new[1][first:end] = throw.root_positions, throw.rotations
+    share = _old_share(len(own), first, kept, end)
+    pose = blend_bodies(own.skeleton, new, old, share)
+    if goes_on:
+        standing = contacts.points(own)
+        inside = np.flatnonzero(share[first:end] < 0.5) + first
+        standing[inside] = contacts.points(throw)[inside - first]
+        for stretch in ((first, kept[0]), (kept[1], end)):
+            if _mean_speed(old[0], stretch, fps) <= _STEPS_BELOW:
+                pose = stepped_over(own.skeleton, pose, standing, stretch, fps)
+    motion = Motion(own.skeleton, *pose, fps)
+    away = old[0][kept[1]] - own.root_positions[kept[1]]
+    warnings = _turning_warnings(before, start + first / fps, turned, away, start + end / fps)
+    return JoinedThrow(
+        motion=motion, start=start, release=start + first / fps + release, first=first, end=end, kept=kept, moved=away,
+        turned=turned, warnings=warnings,
+    )
+
+
+def hold_ends(own: Motion, start: float, first: int, end: int) -> tuple[Motion, float, int, int]:
+    """The motion with its ends held as long as the throw asks, its start, and the throw's frames in it."""
+    if first >= 0 and end <= len(own):
+        return own, start, first, end
+    added = max(-first, 0)
+    at = np.arange(-added, max(end, len(own)))
+    root, rotations = at_frames(own, at)
+    return Motion(own.skeleton, root, rotations, own.fps), start - added / own.fps, first + added, end + added
+
+
+def blend_bodies(skeleton: Skeleton, new, old, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root (T, 3) m and rotations (T, J, 4) that are `new` where share (T,) is 0 and `old` where it is 1, bit for bit;
+    feet go straight from where the one has them to where the other has them."""
+    root = new[0] + share[:, None] * (old[0] - new[0])
+    rotations = quaternion.slerp(new[1], quaternion.signed_like(old[1], new[1]), share[:, None])
+    body, legs = Body.posed(skeleton, root, rotations), identify(skeleton)
+    ours, theirs = pose_kinematics(skeleton, *new), pose_kinematics(skeleton, *old)
+    for limb in (legs.left, legs.right):
+        place, there = ours[0][:, limb.foot], theirs[0][:, limb.foot]
+        away = place + share[:, None] * (there - place) - body.places[:, limb.foot]
+        rotations = limb_carried(body, Resting.of(body, leg(limb)), away, rotations=rotations)
+        turned = quaternion.slerp(ours[1][:, limb.foot], theirs[1][:, limb.foot], share)
+        above = quaternion.inverse(world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
+        rotations[:, limb.foot] = quaternion.multiply(above, turned)
+    for end, (places, turns) in ((0.0, new), (1.0, old)):
+        same = share == end
+        root[same], rotations[same] = places[same], turns[same]
+    return root, rotations
+
+
+def _heading_apart(own: Motion, frame: int, throw: Motion, shown: int) -> float:
+    """Radians from where `own` faces at its frame to where the throw faces at its."""
+    angles = []
+    for motion, at in ((own, frame), (throw, shown)):
+        places, _ = pose_kinematics(motion.skeleton, motion.root_positions[at], motion.rotations[at])
+        angles.append(float(heading_from_positions(motion.skeleton, places)))
+    return float(quaternion.wrapped(angles[1] - angles[0]))
+
+
+def _continuation(own: Motion, throw: Motion, shown: int, frame: int, end: int) -> tuple[float, np.ndarray]:
+    """Turn (rad) and offset (3,) m that put `own` where the throw is, in the middle of the hand-over."""
+    middle = (end - frame) // 2
+    at, there = min(frame + middle, len(own) - 1), min(shown + middle, len(throw) - 1)
+    turn = _heading_apart(own, at, throw, there)
+    moved = quaternion.rotate(quaternion.about_up(np.array(turn)), own.root_positions[at])
+    away = throw.root_positions[there] - moved
+    return turn, np.array([away[0], away[1], 0.0])
+
+
+def _move_rest(own: Motion, frame: int, turn: float, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root and rotations of `own` with everything from `frame` on turned and moved."""
+    moved = place(own, turn, offset)
+    behind = np.arange(len(own)) >= frame
+    return (
+        np.where(behind[:, None], moved.root_positions, own.root_positions),
+        np.where(behind[:, None, None], moved.rotations, own.rotations),
+    )
+
+
+def _mean_speed(root: np.ndarray, stretch: tuple[int, int], fps: float) -> float:
+    """m/s over the ground of root (T, 3) m within a stretch, on average."""
+    part = root[stretch[0] : stretch[1], :2]
+    return float(np.linalg.norm(np.diff(part, axis=0), axis=1).mean() * fps) if len(part) > 1 else 0.0
+
+
+def _old_share(count: int, first: int, kept: tuple[int, int], end: int) -> np.ndarray:
+    """(count,) share of what surrounds the throw: 0 within `kept`, 1 before its first frame and from its end on."""
+    at = np.arange(count)
+    before, behind = (kept[0] - at) / (kept[0] - first + 1.0), (at - kept[1] + 1) / (end - kept[1] + 1.0)
+    return eased(np.maximum(before, behind), np.ones(count))
+
+
+def _turning_warnings(before: float, begin: float, turned: float, moved: np.ndarray, end: float) -> tuple[str, ...]:
+    told = []
+    if abs(before) > _FACES_TELLS:
+        told.append(TimedLine(
+            f"{begin:.1f} s: the body faces {abs(np.degrees(before)):.0f} degrees away from where the throw begins and "
+            "is turned there; let it face the target, or give a library", (begin, begin),
+        ))  # fmt: skip
+    if np.linalg.norm(moved[:2]) > _MOVED_TELLS or abs(turned) > _TURNED_TELLS:
+        told.append(TimedLine(
+            f"{end:.1f} s: what follows goes on from where the throw ends, {np.degrees(turned):.0f} degrees turned",
+            (end, end),
+        ))  # fmt: skip
+    return tuple(told)
+
+
+def stand_still(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0), facing: float = 0.0) -> Motion:
+    """Somebody who only stands, upright, at `spot` (2,) m, facing `facing` rad."""
+    stance = neutral_stance(skeleton)
+    local = stance.rotations.copy()
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            above = quaternion.inverse(stance.rotations[parent])
+            local[joint] = quaternion.multiply(above, stance.rotations[joint])
+    count = max(int(round(seconds * fps)) + 1, 2)
+    root = np.tile(stance.positions[0], (count, 1))
+    motion = Motion(skeleton, root, np.tile(local, (count, 1, 1)), fps)
+    return place(motion, facing, (spot[0], spot[1], 0.0))
+
+
+def trim_waiting(throw: Motion, release: float, keeps: float = FADE) -> tuple[Motion, float]:
+    """A throw without the time in which the body only stands, before it winds up and behind it, but for `keeps` s of
+    that at either end; and seconds from its first frame to its release. It is bit for bit what it was elsewhere."""
+    fps = throw.fps
+    speed = np.linalg.norm(np.diff(forward_kinematics(throw)[0], axis=0), axis=-1).max(axis=1) * fps
+    moves = np.flatnonzero(speed > _WAITS)
+    if not len(moves):
+        return throw, release
+    least, margin = int(np.ceil(2.0 * LEAST_KEPT * fps)), int(round(keeps * fps))
+    at = release * fps
+    first = int(np.clip(moves[0] - margin, 0, max(at - least, 0)))
+    end = int(np.clip(moves[-1] + 2 + margin, min(at + least + 1, len(throw)), len(throw)))
+    return throw.frames(first, end), release - first / fps
+
+
+def transition_jerk(joined: JoinedThrow) -> np.ndarray:
+    """(2,) m/s^3: the largest third difference of any joint within 8 frames of where the throw is gone over into and
+    out of."""
+    values = windowed(jerk(forward_kinematics(joined.motion)[0], joined.motion.fps))
+    at = 0.5 * np.array([joined.first + joined.kept[0], joined.kept[1] + joined.end])
+    return values[np.clip(np.round(at).astype(int) - 2, 0, len(values) - 1)]
+
+
+def library_jerk(library: Library, fps: float, percent: float = _PERCENT) -> float:
+    """m/s^3 that so many per cent of the library's uncut recordings stay below within any 17 frames, at `fps`; worked
+    out once."""
+    known = _usual.setdefault(library, {})
+    if (fps, percent) not in known:
+        known[fps, percent] = _recorded_jerk(library, fps, percent)
+    return known[fps, percent]
+
+
+def _recorded_jerk(library: Library, fps: float, percent: float) -> float:
+    found = []
+    for clip in library.clips:
+        if not clip.mirrored and not clip.made:
+            places, _ = forward_kinematics(resample(clip.recording, fps))
+            found.append(uncut_windows(jerk(places, fps), np.zeros(len(places)))[0])
+    values = np.concatenate(found) if found else np.zeros(0)
+    return float(np.percentile(values, percent)) if len(values) else np.nan

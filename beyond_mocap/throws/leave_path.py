@@ -1,0 +1,191 @@
+"""A body that leaves its own path for a throw some seconds before it, and is back on it some seconds behind.
+
+The run-up and the recovery come out of a library (`run_up`) for the seconds around the throw; the rest stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import TimedLine
+from ..library.library import Library
+from ..motion.humanoid import stature
+from ..motion.motion import Motion, forward_kinematics, resample
+from ..motion.track import Track, zero_phase_hann
+from ..plan import Plan
+from ..polish.meeting import eased
+from .join_throw import FADE, blend_bodies, hold_ends
+from .run_up import SMOOTH, RunUpResult, construct_run_up
+
+REACH = 4.5
+"""Seconds before and behind a throw in which a body may leave its own path."""
+
+_LEAST_STOP = 1.0  # s that a body stops or sets out in, at least
+_SPEEDS_UP = 2.5  # m/s^2 at which a body stops and sets out
+_TOO_FAST = 1.2  # times what the library, or the body itself, shows
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Stretch:
+    """Frames low .. high of a motion around a throw, which takes first .. end; whether the body comes back to its own
+    path; the motion with its ends held and seconds of its first frame."""
+
+    own: Motion
+    start: float
+    low: int
+    first: int
+    end: int
+    high: int
+    comes_back: bool
+
+
+def leave_path(
+    library: Library, own: Motion, start: float, throw: Motion, release: float, *, at: float, action: str = "throw",
+    progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
+) -> RunUpResult:
+    """Construct `own` with a run-up to the throw and a recovery out of `library`.
+
+    The body leaves its own path and comes back to it where both show poses most alike; elsewhere it is as it was, bit
+    for bit. `join_throw` then puts in the throw.
+
+    Args:
+        library: the clips.
+        own: the body's motion, on the throw's skeleton; its first frame is at `start` s.
+        throw: where it has to be; released at its second `release`, which is at about `at` s.
+    """
+    part = _stretch(own, start, throw, release, at)
+    around = part.own.frames(part.low, part.high)
+    run_up = construct_run_up(
+        library, _plan(library, part), throw, release, at, action=action, progress=progress, cancelled=cancelled,
+        between=around,
+    )  # fmt: skip
+    leaves, comes = _edges(part, run_up.motion, around)
+    root, rotations = _blended(part, run_up.motion, leaves, comes)
+    seams = np.array([part.low + leaves, *(run_up.seams + part.low), part.low + comes])
+    return RunUpResult(
+        motion=Motion(part.own.skeleton, root, rotations, part.own.fps), start=part.start, seams=seams,
+        warnings=(*run_up.warnings, *_warnings(part, library, root)),
+    )
+
+
+def _stretch(own: Motion, start: float, throw: Motion, release: float, at: float) -> _Stretch:
+    """The frames around a throw; where there is no time to come back, what follows goes on from the throw's end."""
+    fps = own.fps
+    first = int(round((at - release - start) * fps))
+    own, start, first, end = hold_ends(own, start, first - 1, first + len(resample(throw, fps)) + 1)
+    low, high = max(first - int(REACH * fps), 0), min(end + int(REACH * fps), len(own))
+    last = throw.root_positions[-1, :2]
+    comes_back = _speed_over(own.root_positions[high - 1, :2] - last, high - end, fps) <= _easy_speed(own)
+    own = own if comes_back else _continue_from(own, end, last)
+    return _Stretch(own=own, start=start, low=low, first=first, end=end, high=high, comes_back=comes_back)
+
+
+def _plan(library: Library, part: _Stretch) -> Plan:
+    """The body's own path around the throw, as a plan."""
+    fps = part.own.fps
+    times = part.start + np.arange(part.low, part.high) / fps
+    path = zero_phase_hann(part.own.root_positions[part.low : part.high, :2], fps, SMOOTH)
+    return Plan(
+        track=Track(times, path, None), library=library.folder, fps=fps, height=stature(part.own.skeleton),
+    )  # fmt: skip
+
+
+def _edges(part: _Stretch, new: Motion, old: Motion) -> tuple[int, int]:
+    """Frames, from `low` on, at which the body leaves its own path and has come back to it."""
+    count, fade = min(len(new), len(old)), int(FADE * part.own.fps)
+    apart = np.linalg.norm(
+        forward_kinematics(new)[0][:count] - forward_kinematics(old)[0][:count], axis=-1
+    ).mean(axis=1)  # fmt: skip
+    leaves = _most_alike(apart, 0, part.first - part.low - fade, fade) if part.low else 0
+    ends = part.high == len(part.own)
+    return leaves, count if ends else _most_alike(apart, part.end - part.low + fade, count, fade)
+
+
+def _blended(part: _Stretch, new: Motion, leaves: int, comes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Root (T, 3) m and rotations (T, J, 4) of the own motion with the new one between its edges."""
+    own, low, fade = part.own, part.low, int(FADE * part.own.fps)
+    at, none = np.arange(len(own)) - low, np.zeros(len(own))
+    before = (leaves + fade - at) / (fade + 1.0) if low else none
+    behind = (at - comes + 1) / (fade + 1.0) if part.high < len(own) else none
+    share = eased(np.maximum(before, behind), np.ones(len(own)))
+    root, rotations = own.root_positions.copy(), own.rotations.copy()
+    count = min(len(new), part.high - low)
+    root[low : low + count], rotations[low : low + count] = new.root_positions[:count], new.rotations[:count]
+    return blend_bodies(own.skeleton, (root, rotations), (own.root_positions, own.rotations), share)
+
+
+def _warnings(part: _Stretch, library: Library, root: np.ndarray) -> list[str]:
+    fps, warnings = part.own.fps, []
+    if not part.comes_back:
+        when = part.start + part.end / fps
+        text = (
+            f"{when:.1f} s: there is no time to get back to the own way: what follows goes on from where the throw ends"
+        )
+        warnings.append(TimedLine(text, (when, when)))
+    fastest = float(np.linalg.norm(np.diff(root[part.low : part.high, :2], axis=0), axis=1).max() * fps)
+    if fastest > _TOO_FAST * max(library.fastest, _easy_speed(part.own)):
+        warnings.append(
+            f"the body would have to go at {fastest:.1f} m/s around the throw: choose another frame or target"
+        )
+    return warnings
+
+
+def is_in_reach(own: Motion, start: float, throw: Motion, release: float, at: float) -> bool:
+    """Whether a body on its own way can be where the throw begins by then, without hurrying much."""
+    first = int(np.clip(round((at - release - start) * own.fps), 0, len(own) - 1))
+    low = max(first - int(REACH * own.fps), 0)
+    away = throw.root_positions[0, :2] - own.root_positions[low, :2]
+    return _speed_over(away, first - low, own.fps) <= _easy_speed(own)
+
+
+def stopping_place(own: Motion, start: float, seconds: float) -> np.ndarray:
+    """(2,) m where a body on its own way comes to a stop at second `seconds`."""
+    frame = int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1))
+    spot, way, _ = _stop(own, frame, -1)
+    return spot + way
+
+
+def _stop(own: Motion, frame: int, side: int) -> tuple[np.ndarray, np.ndarray, int]:
+    """Where (2,) m the own way is some frames before (side -1) or behind a frame, the way (2,) m on which a body that
+    goes at that speed stops or sets out meanwhile, and how many frames that are."""
+    fps, places = own.fps, own.root_positions[:, :2]
+    second = int(fps)
+    near = places[np.clip([frame, frame + side * second], 0, len(own) - 1)]
+    velocity = (near[1] - near[0]) * side
+    seconds = max(_LEAST_STOP, float(np.linalg.norm(velocity)) / _SPEEDS_UP)
+    frames = int(round(seconds * fps))
+    other = int(np.clip(frame + side * frames, 0, len(own) - 1))
+    return places[other], 0.5 * velocity * seconds, frames
+
+
+def _continue_from(own: Motion, end: int, place: np.ndarray) -> Motion:
+    """The motion, everything from frame `end` on moved so that a body which sets out from `place` (2,) m gets into
+    it."""
+    spot, way, _ = _stop(own, min(end, len(own) - 1), 1)
+    root = own.root_positions.copy()
+    root[end:, :2] += place + way - spot
+    return replace(own, root_positions=root)
+
+
+def _speed_over(away: np.ndarray, frames: int, fps: float) -> float:
+    """m/s that it takes to go `away` (2,) m within so many frames."""
+    return float(np.linalg.norm(away)) * fps / max(frames, 1)
+
+
+def _easy_speed(own: Motion) -> float:
+    """m/s that are not asked too much of a body beside what it does anyway: its usual speed and a little."""
+    step = np.linalg.norm(np.diff(own.root_positions[:, :2], axis=0), axis=1) * own.fps
+    usual = float(np.median(step)) if len(step) else 0.0
+    return max(min(1.5 * usual, usual + 0.6), 1.6)
+
+
+def _most_alike(apart: np.ndarray, low: int, high: int, fade: int) -> int:
+    """The frame of low .. high from which on two motions, `apart` (T,) m, are most alike for `fade` frames."""
+    low, high = max(low, 0), min(high, len(apart)) - fade
+    if high <= low:
+        return max(min(low, len(apart) - fade), 0)
+    means = np.convolve(apart, np.ones(fade) / fade, mode="valid")
+    return low + int(np.argmin(means[low : high + 1]))

@@ -1,0 +1,261 @@
+"""The run-up to a generated throw and the recovery from it, out of a library.
+
+    run_up = construct_run_up(library, plan, thrown.motion, thrown.release, 12.4, action="throw")
+
+The throw becomes a clip of the library, in memory, whose key moment is the release. The player's track is led through
+the place where the throw is, for the target is aimed at from there, and the search finds the way in and out. The exact
+throw is then put in by `join_throw`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline
+from ..ball.way import hermite
+from ..errors import InputError, TimedLine, told_time
+from ..known_touches import solve_touches
+from ..library.features import joined as joined_frames
+from ..library.clip import Clip
+from ..library.library import Library
+from ..library.describe_clips import described
+from ..motion import contacts
+from ..motion.humanoid import heading
+from ..motion.motion import Motion, resample
+from ..motion.retarget import Retargeter
+from ..motion.track import SampledTrack, Track, zero_phase_hann
+from ..plan import Plan
+from ..resolve_plan import resolve_plan
+from ..synthesis.balance import balanced
+from ..synthesis.construct.construction import Construction
+from ..synthesis.construct.key_moments import find_touches, key_results
+from ..synthesis.edit_list import EditList
+from ..synthesis.footage import Footage, fetch, output_index
+from ..synthesis.path_search import PathSearch
+from ..synthesis.resolved_plan import ResolvedPlan
+from ..synthesis.search_library import search_library
+from ..synthesis.wanted import Wanted, build_order
+
+OWN_WORD = "generated"
+"""The word that only the generated clip carries."""
+
+ACTIONS = {"throw": ("throwb",), "kick": ("kick",)}
+"""The words of a generated clip beside that."""
+
+SMOOTH = 0.7
+"""Seconds of the window that takes the sway out of a body's own path."""
+
+EDGE = 0.1
+"""Seconds at either end of the generated clip that serve its transitions."""
+
+_CLIP = "generated throw"
+_ENDS = 0.5  # s at either end of a stretch that faces as the motion around it
+_CATCH_UP = 0.8  # m/s by which the track is left behind or caught up with
+_LEADS = (1.0, 4.0)  # s that leading the track to the throw and back takes, at least and at most
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunUpResult:
+    """A player's motion around a throw, on the throw's own skeleton.
+
+    motion: all of it.
+    start: seconds of its first frame on the track's clock.
+    seams: frames that begin another clip.
+    warnings: lines for people.
+    """
+
+    motion: Motion
+    start: float
+    seams: np.ndarray
+    warnings: tuple[str, ...] = ()
+
+
+def construct_run_up(
+    library: Library, plan: Plan, throw: Motion, release: float, at: float, *, action: str = "throw",
+    progress: Progress | None = None, cancelled: Callable[[], bool] | None = None, between: Motion | None = None,
+) -> RunUpResult:
+    """Construct a player's motion with the throw as one of the library's clips, released at about `at` s.
+
+    Args:
+        library: the clips.
+        plan: what the player is asked; its track is led through the throw, and its key moments that, by their solved
+            touches, lie within the throw are left out, with a warning.
+        throw: where it has to be on the pitch, on any humanoid skeleton.
+        release: s in the throw at which the ball leaves.
+        at: s on the track's clock.
+        action: one of ACTIONS.
+        between: the motion that it comes from and goes back to, frame for frame: it faces as that does at either end.
+
+    Raises:
+        InputError: the throw lies outside the track.
+    """
+    from threadpoolctl import threadpool_limits
+
+    _check(plan, throw, at - release)
+    with threadpool_limits(limits=1):
+        known = solve_touches(plan)
+    led, warnings = _plan_with_throw(known, throw, release, at, action)
+    resolved = resolve_plan(led, library, touches_solved=True)
+    size = resolved.size
+    bones = library.skeleton.scaled(size)
+    same = throw.skeleton.same_bones(bones, 1e-5)
+    own = throw if same else Retargeter(throw, bones, keeps_travel=True).carry(throw)
+    own = Motion(library.skeleton, own.root_positions / size, own.rotations, own.fps)
+    report = progress or (lambda done, text: None)
+    more = add_throw_clip(search_library(library, resolved, report), own, release, action)
+    with threadpool_limits(limits=1):
+        order = _order(more, resolved)
+        edit = _search(more, order, plan.alpha, report, cancelled)
+        report(0.8, "Laying out")
+        construction = _construction(more, resolved, order, edit, _heading_of(own, at - release, between))
+        planted, _ = construction.lay_out()
+    motion = Motion(bones, planted.root * size, planted.rotations, plan.fps)
+    if not same:
+        motion = Retargeter(motion, throw.skeleton, example=throw, keeps_travel=True).carry(motion)
+    start, seams = float(resolved.track.times[0]), construction.source.seams
+    return RunUpResult(motion=motion, start=start, seams=seams, warnings=(*warnings, *order.warnings))
+
+
+def _check(plan: Plan, throw: Motion, begin: float) -> None:
+    finish, times = begin + throw.duration, plan.track.times
+    if begin < times[0] - 0.5 / plan.fps or finish > times[-1] + 0.5 / plan.fps:
+        raise InputError(
+            "throw", f"from {begin:.2f} to {finish:.2f} s", f"within the track, {times[0]:.2f} to {times[-1]:.2f} s",
+            "choose another time, or a longer track",
+        )
+
+
+def _order(library: Library, plan: ResolvedPlan) -> Wanted:
+    """What the search is asked for; the generated clip is played at its own rate only."""
+    order = build_order(library, plan)
+    keys = tuple(replace(key, rates=(1.0,)) if OWN_WORD in key.asked.words else key for key in order.keys)
+    return replace(order, keys=keys)
+
+
+def _search(library: Library, order: Wanted, alpha: float, report: Progress, cancelled) -> EditList:
+    def tell(done, text):
+        report(0.8 * done, text)
+
+    return PathSearch(library, order, balanced(alpha), tell, cancelled).run()
+
+
+def _construction(
+    library: Library, plan: ResolvedPlan, order: Wanted, edit: EditList, heading_of: Callable
+) -> Construction:
+    track = plan.sampled(plan.fps)
+    index = output_index(len(track.times), library, plan.fps, len(edit))
+    source = fetch(library, edit, index, plan.fps)
+    touches = find_touches(library, plan.fps, edit, key_results(library, plan.fps, order, edit, source))
+    heading_given = heading_of(track, source, len(library.clips) - 1)
+    return Construction(
+        library=library, plan=plan, track=track, source=source, touches=touches, heading=heading_given,
+        faces_ball=False,
+    )
+
+
+def _heading_of(throw: Motion, begin: float, between: Motion | None) -> Callable:
+    """heading(track, source, clip) -> (T,) rad, NaN where it is free: as the throw, which is that clip and begins at
+    second `begin`, while it is shown; at both ends as `between`."""
+    def given(track: SampledTrack, source: Footage, clip: int) -> np.ndarray:
+        kept = np.full(len(track.times), np.nan)
+        is_throw = source.clip == clip
+        seconds = track.times[is_throw] - begin
+        kept[is_throw] = np.interp(seconds, np.arange(len(throw)) / throw.fps, heading(throw))
+        if between is not None:
+            faces, count = heading(between), int(_ENDS * track.fps)
+            for end in (slice(None, count), slice(-count, None)):
+                kept[end] = np.where(np.isnan(kept[end]), faces[end], kept[end])
+        return kept
+
+    return given
+
+
+def add_throw_clip(library: Library, motion: Motion, release: float, action: str = "throw") -> Library:
+    """The library with one clip more, in memory only: `motion`, on the library's skeleton, whose key moment lies
+    `release` s behind its first frame."""
+    edge = int(EDGE * motion.fps)
+    words = (*ACTIONS[action], OWN_WORD)
+    key = float(np.clip(release * motion.fps, edge, len(motion) - 1 - edge))
+    row = ClipAnnotation(edge, len(motion) - 1 - edge, key, words)
+    clip = Clip(_CLIP, False, motion, (row,), contacts.points(motion))
+    frames = joined_frames(library.frames, described([clip], library.frames))
+    return replace(library, clips=(*library.clips, clip), frames=frames, clusters={}, kept=None)
+
+
+def _plan_with_throw(plan: Plan, throw: Motion, release: float, at: float, action: str) -> tuple[Plan, list[str]]:
+    """The plan with the throw in its track and timeline, and lines about what it leaves no room for."""
+    begin = at - release
+    asked, told = _timeline_with_throw(plan.timeline, begin, begin + throw.duration, at, ACTIONS[action])
+    if plan.pins:
+        told.append("the plan's pins count for nothing beside a throw")
+    track = _lead_through(plan, throw, release, at)
+    return replace(plan, track=track, timeline=asked, pins=(), method="path"), told
+
+
+def _timeline_with_throw(
+    timeline: Timeline, begin: float, finish: float, at: float, words: tuple[str, ...]
+) -> tuple[Timeline, list[str]]:
+    """The timeline with the throw's key moment, without what it leaves no room for; lines about that."""
+    kept = [key for key in timeline.keys if not begin < key.in_force < finish]
+    told = [
+        TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' lies within the throw, it is not played",
+                  (key.time, key.time))
+        for key in timeline.keys if key not in kept
+    ]  # fmt: skip
+    spans = [part for span in timeline.spans for part in _outside(span, begin, finish)]
+    return Timeline(tuple(spans), (*kept, KeyMoment(at, (*words, OWN_WORD)))), told
+
+
+def _outside(span: Span, begin: float, finish: float) -> list[Span]:
+    """What is left of a span outside the throw."""
+    if span.end <= begin or span.start >= finish:
+        return [span]
+    parts = [(span.start, min(span.end, begin)), (max(span.start, finish), span.end)]
+    return [replace(span, start=a, end=b) for a, b in parts if b - a > 0.1]
+
+
+def _lead_through(plan: Plan, throw: Motion, release: float, at: float) -> Track:
+    """The plan's track, going where the throw is as long as it lasts: on either side it is left and met again at a
+    pace that bodies can go."""
+    fps = plan.fps
+    track = plan.sampled(fps)
+    own = resample(throw, fps)
+    path = zero_phase_hann(own.root_positions[:, :2], fps, SMOOTH)
+    begin = at - release
+    seconds = begin + np.arange(len(path)) / fps
+    places, times = track.raw.copy(), track.times
+    inside = (times >= seconds[0]) & (times <= seconds[-1])
+    for axis in (0, 1):
+        places[inside, axis] = np.interp(times[inside], seconds, path[:, axis])
+    for way, edge in ((-1, 0), (1, -1)):
+        there = float(seconds[edge]), path[edge], _velocity(path, edge, fps)
+        places = _bridge(places, times, track, there, way)
+    ball = None if plan.track.ball is None else track.ball
+    return Track(times, places, ball)
+
+
+def _bridge(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: tuple, way: int) -> np.ndarray:
+    """The places (T, 2) m with a way from the track to the throw (way -1) or back to it (1)."""
+    edge = there[0]
+    off = np.linalg.norm([np.interp(edge, times, track.positions[:, axis]) - there[1][axis] for axis in (0, 1)])
+    seconds = float(np.clip(2.0 * off / _CATCH_UP, *_LEADS))
+    far = float(np.clip(edge + way * seconds, times[0], times[-1]))
+    if abs(far - edge) < 2.0 / track.fps:
+        return places
+    here = far, *(np.array([np.interp(far, times, column) for column in values.T])
+                  for values in (track.positions, track.velocity))  # fmt: skip
+    low, high = (here, there) if way < 0 else (there, here)
+    between = (times > low[0]) & (times < high[0])
+    out = places.copy()
+    out[between] = hermite(times[between], low, high)
+    return out
+
+
+def _velocity(path: np.ndarray, edge: int, fps: float) -> np.ndarray:
+    few = path[:4] if edge == 0 else path[-4:]
+    return (few[-1] - few[0]) / (len(few) - 1) * fps

@@ -1,0 +1,163 @@
+"""The plan of the house: which room may import which, and what the source really imports, read without running it.
+
+`tests/core/test_house.py` keeps the plan, `packaging/draw_house.py` draws it. Every import is written as one dotted name
+from the clone's top: `from ..plan import Plan` in `beyond_mocap/synthesis/search/wanted.py` is
+`beyond_mocap.synthesis.plan.Plan`.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import pathlib
+import sys
+from collections.abc import Iterator
+from typing import NamedTuple
+
+TOP = pathlib.Path(__file__).resolve().parents[1]
+CORE = "beyond_mocap"
+FEATURES = ("path_editing", "passes", "throws", "markers", "study")
+LAYERS = (
+    ("base",), ("motion",), ("annotation", "appearance"), ("synthetic",), ("files", "ball"), ("library",),
+    ("synthesis",), ("evaluation",), FEATURES, ("match",), ("cli",),
+)  # fmt: skip
+"""The rooms of the core from the ground up: a room imports rooms of lower layers only, never one beside it."""
+GROUND_TRUTH = "synthetic.ground_truth"
+"""Recordings with known answers, made with the features that tests ask about them: above the features, below `match`."""
+FILES_MAY = ("base", "motion", "annotation")
+BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui", "bl_operators", "bmesh",
+           "addon_utils", "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}  # fmt: skip
+MOST_FILES = 25
+"""Files side by side in one folder."""
+parse_source = functools.cache(ast.parse)
+
+
+class Import(NamedTuple):
+    """One imported name: where it stands, dotted from the top, whether inside a function, whether written relatively."""
+
+    where: str
+    name: str
+    lazy: bool
+    relative: bool
+
+
+def list_sources(*folders: str) -> list[pathlib.Path]:
+    """Paths of the Python files below these folders, relative to the top."""
+    return sorted(path.relative_to(TOP) for folder in folders for path in (TOP / folder).rglob("*.py"))
+
+
+def read_imports(path: pathlib.Path, text: str) -> list[Import]:
+    """All imports in the text of the file at `path` (relative to the top)."""
+    found: list[Import] = []
+
+    def visit(node: ast.AST, lazy: bool) -> None:
+        where = f"{path}:{getattr(node, 'lineno', 0)}"
+        if isinstance(node, ast.Import):
+            found.extend(Import(where, alias.name, lazy, False) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            found.extend(Import(where, name, lazy, node.level > 0) for name in _absolute_names(path, node))
+        lazy = lazy or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+        for child in ast.iter_child_nodes(node):
+            visit(child, lazy)
+
+    visit(parse_source(text), False)
+    return found
+
+
+def _absolute_names(path: pathlib.Path, node: ast.ImportFrom) -> list[str]:
+    if node.level == 0:
+        return [node.module or ""]
+    above = path.parts[: len(path.parts) - node.level]
+    module = ".".join([*above, *(node.module.split(".") if node.module else [])])
+    return [f"{module}.{alias.name}".lstrip(".") for alias in node.names]
+
+
+def is_below(name: str, prefix: str) -> bool:
+    """Whether a dotted name is a prefix or lies below it."""
+    return name == prefix or name.startswith(prefix + ".")
+
+
+def room_of(name: str) -> str:
+    """The room of a dotted name of the core; "" for what stands at the core's top."""
+    inner = name.removeprefix(CORE + ".")
+    return GROUND_TRUTH if is_below(inner, GROUND_TRUTH) else inner.partition(".")[0] if "." in inner else ""
+
+
+def layer_of(room: str) -> float:
+    """The height of a room; higher ones import lower ones."""
+    if room == GROUND_TRUTH:
+        return layer_of("match") - 0.5
+    return next((height for height, rooms in enumerate(LAYERS) if room in rooms), len(LAYERS))
+
+
+def may_import(room: str, other: str) -> bool:
+    """Whether a file of `room` may import from `other`."""
+    if room == other or not other:
+        return True
+    return layer_of(other) < layer_of(room) and (room != "files" or other in FILES_MAY)
+
+
+@functools.cache
+def module_files() -> dict[str, pathlib.Path]:
+    """Dotted name of every module of the product -> its file, relative to the top."""
+    files = list_sources(CORE, "scene", "operators", "panels")
+    return {".".join(path.with_suffix("").parts).removesuffix(".__init__"): path for path in files}
+
+
+def file_of(name: str) -> pathlib.Path | None:
+    """The file that an imported dotted name comes from: the module itself, or the one that defines it."""
+    files = module_files()
+    return files.get(name) or files.get(name.rpartition(".")[0])
+
+
+def file_graph() -> dict[pathlib.Path, set[pathlib.Path]]:
+    """For each file of the product the files that it imports, inside functions too."""
+    graph = {}
+    for path in module_files().values():
+        imported = (file_of(one.name) for one in read_imports(path, (TOP / path).read_text("utf-8")))
+        graph[path] = {other for other in imported if other is not None and other != path}
+    return graph
+
+
+def find_circles(graph: dict) -> list[list]:
+    """Groups of nodes that reach one another (Tarjan's strongly connected components of more than one node)."""
+    sys.setrecursionlimit(max(sys.getrecursionlimit(), 10 * len(graph) + 1000))
+    order: dict = {}
+    low: dict = {}
+    stack: list = []
+    circles: list[list] = []
+
+    def visit(node) -> None:
+        order[node] = low[node] = len(order)
+        stack.append(node)
+        for other in graph.get(node, ()):
+            if other not in order:
+                visit(other)
+            if other in stack:
+                low[node] = min(low[node], low[other])
+        if low[node] == order[node]:
+            group = stack[stack.index(node) :]
+            del stack[stack.index(node) :]
+            if len(group) > 1:
+                circles.append(sorted(group))
+
+    for node in graph:
+        if node not in order:
+            visit(node)
+    return circles
+
+
+def room_graph() -> dict[str, set[str]]:
+    """For each room of the core the rooms that it imports."""
+    graph: dict[str, set[str]] = {room: set() for rooms in LAYERS for room in rooms}
+    for path, others in file_graph().items():
+        if path.parts[0] != CORE or len(path.parts) < 3:
+            continue
+        graph[path.parts[1]] |= {o.parts[1] for o in others if o.parts[0] == CORE and len(o.parts) > 2}
+    return {room: others - {room} for room, others in graph.items()}
+
+
+def count_side_by_side(*folders: str) -> Iterator[tuple[str, int]]:
+    """(folder, how many Python files lie in it) of each folder."""
+    parents = [path.parent.as_posix() for path in list_sources(*folders)]
+    yield from ((folder, parents.count(folder)) for folder in sorted(set(parents)))

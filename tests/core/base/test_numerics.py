@@ -1,0 +1,66 @@
+"""Vectors, easing, values over time and digests: what every room relies on, edge cases included."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from beyond_mocap.base.digest import byte_digest, hex_digest
+from beyond_mocap.base.easing import hermite, quintic_step, quintic_step_by_powers, smoothstep
+from beyond_mocap.base.time_series import gaussian_smooth, hann_smooth, interpolate, time_derivative
+from beyond_mocap.base.vectors import cross_level, distance_along, nearest_axis, skew_matrix, unit_vector, unit_vectors
+
+
+def test_zero_vectors_stay_zero_or_become_what_is_asked():
+    vectors = np.array([[3.0, 0.0, 4.0], [0.0, 0.0, 0.0]])
+    assert np.array_equal(unit_vectors(vectors), [[0.6, 0.0, 0.8], [0.0, 0.0, 0.0]])
+    assert np.array_equal(unit_vectors(vectors, [0.0, 0.0, 1.0]), [[0.6, 0.0, 0.8], [0.0, 0.0, 1.0]])
+    assert np.isnan(unit_vectors(vectors, np.nan, 1e-300)[1]).all()
+    assert np.array_equal(unit_vector(vectors[1]), np.zeros(3))
+    assert np.array_equal(unit_vector(vectors[1], np.array([0.0, 1.0, 0.0])), [0.0, 1.0, 0.0])
+    assert unit_vector(vectors[0], np.ones(3)) == pytest.approx([0.6, 0.0, 0.8])
+
+
+def test_products_agree_with_numpy():
+    a, b = np.random.default_rng(0).normal(size=(2, 5, 3))
+    assert np.allclose((skew_matrix(a) @ b[..., None])[..., 0], np.cross(a, b))
+    assert np.allclose(cross_level(a, b), np.cross(a, b * [1, 1, 0])[:, 2])
+    assert np.array_equal(nearest_axis(np.array([0.2, -0.9, 0.3])), [0.0, -1.0, 0.0])
+
+
+@pytest.mark.parametrize("step", [smoothstep, quintic_step, quintic_step_by_powers])
+def test_steps_run_from_0_to_1_level_at_their_ends(step):
+    x = np.linspace(-1.0, 2.0, 301)
+    y = step(x)
+    assert y[:101].max() == 0.0 and y[200:].min() == 1.0 and np.all(np.diff(y) >= 0.0)
+    assert y + y[::-1] == pytest.approx(np.ones(301))
+    assert step(np.array([1e-4, 1.0 - 1e-4])) == pytest.approx([0.0, 1.0], abs=1e-7)
+
+
+def test_a_step_between_edges_may_fall():
+    assert smoothstep(np.array([0.5, 2.0, 3.5]), 3.0, 1.0) == pytest.approx([1.0, 0.5, 0.0])
+
+
+def test_hermite_is_the_cubic_itself():
+    share = np.linspace(0.0, 1.0, 11)
+    assert hermite(share, 1.0, 2.0, 1.0 + 2.0 - 3.0 + 4.0, 2.0 - 6.0 + 12.0) == pytest.approx(
+        1.0 + 2.0 * share - 3.0 * share**2 + 4.0 * share**3
+    )
+
+
+def test_values_over_time():
+    line = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]])
+    assert np.array_equal(distance_along(line), [0.0, 5.0, 6.0])
+    assert np.array_equal(time_derivative(line, 2.0)[1], [3.0, 5.0]) and not time_derivative(line[:1], 2.0).any()
+    held = interpolate(np.array([-1.0, 0.5]), np.arange(3.0), line)
+    assert np.array_equal(held, [[0.0, 0.0], [1.5, 2.0]])
+    assert np.isnan(interpolate(np.array([-1.0, 0.5]), np.arange(3.0), line, np.nan)[:, 0]).tolist() == [True, False]
+    flat = np.full((9, 2), 7.0)
+    assert gaussian_smooth(flat, 2.0) == pytest.approx(flat) and hann_smooth(flat[:, 0], 3) == pytest.approx(flat[:, 0])
+
+
+def test_digests_are_those_of_the_joined_bytes():
+    table = np.arange(24.0).reshape(2, 3, 4)[:, :, ::2]
+    joined = "\u00e9".encode() + table.tobytes() + b"x"
+    assert hex_digest("\u00e9", table, b"x", digits=8) == hashlib.sha256(joined).hexdigest()[:8]
+    assert byte_digest("\u00e9", table, np.zeros((0, 3)), b"x") == hashlib.blake2b(joined, digest_size=16).digest()
