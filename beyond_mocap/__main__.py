@@ -14,18 +14,17 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 
 from . import __version__
+from .base.settings.options import add_options, option_values
 from .commands import (
     learning, matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches,
 )
-from .commands.numbers import between, positive, rate, seed
 from .commands.outputs import Writer, check_outputs, writer_of
 from .commands.told import Told
 from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
-from .plan import HEIGHTS, LIMITS, METHODS, Plan, gait_choices
+from .plan import Plan
 
 
 Apart = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
@@ -60,18 +59,12 @@ def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
 def _add_library(verbs) -> argparse.ArgumentParser:
     verb = verbs.add_parser("library", help="read a folder of BVH clips and annotations and print what it holds")
     verb.add_argument("library", type=Path, metavar="LIBRARY")
-    verb.add_argument("--rebuild", action="store_true", help="ignore the cache")
-    _add_library_options(verb)
+    add_options(verb, "library.build")
+    add_options(verb, "library")
     verb.add_argument("--report", type=Path, metavar="R.json")
     learning.add_options(verb)
     verb.set_defaults(run=run_library)
     return verb
-
-
-def _add_library_options(verb) -> None:
-    verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
-    verb.add_argument("--skeleton", type=Path, metavar="CLIP.bvh", help="whose skeleton the library has")
-    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of the BVH files")
 
 
 def _add_take_files(verb) -> None:
@@ -87,74 +80,19 @@ def _add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     _add_take_files(verb)
     verb.add_argument("--report", type=Path, metavar="R.json")
-    verb.add_argument("--method", choices=METHODS, default="path")
-    verb.add_argument("--no-catch-up", action="store_true", help="'distance' without regaining lost distance")
-    verb.add_argument("--fps", type=rate, default=30.0)
-    verb.add_argument("--seed", type=seed, default=0, help="of the clustering that blocks and distance search in")
-    verb.add_argument(
-        "--solve-touches", action="store_true",
-        help="key moments move to the touches that the ball's samples tell; the ball goes as physics has it and is "
-        "dribbled step by step",
-    )
-    _add_settings(verb)
-    verb.add_argument("--no-mirror", action="store_true", help="do not use mirrored clips")
-    verb.add_argument("--no-made", action="store_true", help="no made or blended clips where recordings lack a speed")
-    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words that the library has")
-    _add_player(verb)
-    _add_library_options(verb)
+    add_options(verb, "synthesis")
+    verb.add_argument("--pins", type=Path, metavar="P.csv", help="where hands, feet and gaze have to be, and when")
+    add_options(verb, "player")
+    add_options(verb, "library")
     verb.set_defaults(run=run_synthesize)
     return verb
-
-
-def _add_settings(verb) -> None:
-    """The numbers of a plan, their defaults and limits its own."""
-    for name, unit, meaning in (
-        ("alpha", "SHARE", "words against continuity"),
-        ("delta", "METRES", "travelled distance that may stay wrong ('distance')"),
-        (
-            "omega", "NUMBER",
-            "between two gaits' speeds the faster gait begins at 1/omega of the way up; 0: as the recordings are "
-            "labelled ('path'), else 4",
-        ),
-        ("seam-window", "SECONDS", "over which the jump at a cut is spread"),
-        ("track-window", "SECONDS", "of the window that takes the jitter out of the track"),
-        ("root-window", "SECONDS", "of the window behind which the body is on the track ('path')"),
-    ):
-        field = name.replace("-", "_")
-        low, high = LIMITS[field]
-        of = partial(between, low=low, high=high, expected=f"between {low:g} and {high:g}")
-        default = getattr(Plan, field)
-        verb.add_argument(f"--{name}", type=of, default=default, metavar=unit, help=f"{meaning}; default {default:g}")
-    verb.add_argument(
-        "--gait", action="append", default=[], metavar="WORD=CLIP",
-        help="the clip that stands for a gait, such as walking=folder/walk.bvh; once for each gait",
-    )
-
-
-def _add_player(verb) -> None:
-    """What is one player's own."""
-    verb.add_argument("--pins", type=Path, metavar="P.csv", help="where hands, feet and gaze have to be, and when")
-    tall = partial(between, low=HEIGHTS[0], high=HEIGHTS[1], expected=f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} metres")
-    verb.add_argument("--height", type=tall, default=0.0, metavar="METRES", help="of the player; else the library's")
-    verb.add_argument("--strong-foot", choices=("left", "right", "any"), default="any")
-    verb.add_argument(
-        "--style", action="append", default=[], metavar="NAME",
-        help="a word, or a folder or clip (with * and ?), whose clips are taken rather than others; may be repeated",
-    )
-    low, high = LIMITS["style_weight"]
-    worth = partial(between, low=low, high=high, expected=f"between {low:g} and {high:g}")
-    default = Plan.style_weight
-    verb.add_argument(
-        "--style-weight", type=worth, default=default, metavar="NUMBER",
-        help=f"m/s of missed speed that a clip of the style is worth; default {default:g}",
-    )
 
 
 def _add_mirror(verbs) -> argparse.ArgumentParser:
     verb = verbs.add_parser("mirror", help="left becomes right")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
     verb.add_argument("output", type=Path, metavar="OUT.bvh")
-    verb.add_argument("--unit", type=positive, metavar="METRES")
+    add_options(verb, "mirror")
     verb.set_defaults(run=run_mirror)
     return verb
 
@@ -165,8 +103,7 @@ def _add_retarget(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a recording or a pose of it")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     verb.add_argument("--map", type=Path, metavar="M.json", help="a JSON object, joint of IN -> joint of SKELETON")
-    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of IN.bvh")
-    verb.add_argument("--to-unit", type=positive, metavar="METRES", help="metres per unit of SKELETON.bvh")
+    add_options(verb, "retarget")
     verb.set_defaults(run=run_retarget)
     return verb
 
@@ -178,7 +115,7 @@ def _add_evaluate(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--annotations", type=Path, metavar="A.txt")
     _add_take_files(verb)
     verb.add_argument("--library", type=Path)
-    _add_library_options(verb)
+    add_options(verb, "library")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
     verb.add_argument("--html", type=Path, metavar="R.html", help="a page with pictures; needs matplotlib")
     verb.set_defaults(run=run_evaluate)
@@ -245,13 +182,8 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
     validate(timeline, library.words, float(track.times[0]), float(track.times[-1]), str(options.annotations))
     ready = time.perf_counter()
     plan = Plan(
-        track=track, timeline=timeline, library=str(options.library), method=options.method,
-        catch_up=not options.no_catch_up, fps=options.fps, alpha=options.alpha, mirror=not options.no_mirror,
-        nearest=options.nearest, seed=options.seed, made=not options.no_made, delta=options.delta, omega=options.omega,
-        seam_window=options.seam_window, track_window=options.track_window, root_window=options.root_window,
-        gaits=gait_choices(options.gait), pins=read_pins(options.pins) if options.pins else (),
-        height=options.height, strong_foot=options.strong_foot.replace("any", ""), style=tuple(options.style),
-        style_weight=options.style_weight, solve_touches=options.solve_touches,
+        track=track, timeline=timeline, library=str(options.library),
+        pins=read_pins(options.pins) if options.pins else (), **option_values(Plan, options, "synthesis", "player"),
     )
     try:
         take = synthesize(library, plan, told.progress, told.cancelled)

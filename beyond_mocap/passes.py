@@ -23,6 +23,7 @@ from .ball.physics import BALLS, Ball
 from .ball.strike_choice import Choice, unsaid
 from .ball.strike_moments import StrikeMoments, strike_moments
 from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
+from .base.settings import setting
 from .errors import Cancelled, InputError, NotInLibrary
 from .library.library import Library
 from .motion.humanoid import stature
@@ -35,10 +36,10 @@ MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""
 
 BALL_LIMITS = {
-    "radius": (0.01, 0.5), "mass": (0.001, 20.0), "gravity": (0.5, 30.0), "linear_drag": (0.0, 2.0), "drag": (0.0, 0.5),
-    "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "restitution": (0.0, 0.95), "friction": (0.0, 5.0),
-    "rolling": (0.01, 20.0),
-    "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
+    **{name: (setting("passes", name).least, setting("passes", name).most)
+       for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
+    "mass": (0.001, 20.0), "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "friction": (0.0, 5.0),
+    "rolling": (0.01, 20.0), "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
 }  # fmt: skip
 """Least and most of a ball's numbers."""
 

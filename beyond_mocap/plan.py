@@ -4,38 +4,25 @@ and how to go about it."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .annotation import Timeline
+from .base.settings import defaults, rows_of, setting
+from .base.settings.setting import check_limits
 from .errors import InputError, told_time
 from .motion.skeleton import frozen_array
-from .motion.track import SMOOTHING_SECONDS, SampledTrack, Track, sample
+from .motion.track import SampledTrack, Track, sample
 
-METHODS = ("path", "distance", "blocks")
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
 FEET = ("", "left", "right")
-LIMITS = {
-    "alpha": (0.0, 1.0),
-    "delta": (0.0, 100.0),
-    "omega": (0.0, 100.0),
-    "seam_window": (0.0, 4.0),
-    "track_window": (0.2, 5.0),
-    "root_window": (0.2, 5.0),
-    "style_weight": (0.0, 10.0),
-    "variety": (0.0, 10.0),
-    "lag": (0.0, 60.0),
-}
-"""Least and most of a plan's numbers; outside them there is no sense in it."""
+METHODS = setting("synthesis", "method").choice_names
+_DEFAULTS = defaults("synthesis", "player")
+_HEIGHT = setting("player", "height")
 
 LATER = {"later": True}
 """Marks fields that came after files were saved with fingerprints of the others."""
-
-HEIGHTS = (0.5, 3.0)
-"""Metres that a player is tall at least and at most."""
-
 
 @dataclass(frozen=True)
 class Pin:
@@ -102,74 +89,58 @@ class SolvedCourse:
 
 @dataclass(frozen=True)
 class Plan:
-    """One player's order.
+    """One player's order. The fields with a default of the settings table mean what is said there.
 
     track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it. timeline: the
-    asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. method: one of
-    METHODS. catch_up: Faustino's logistic catch-up of §3.3.2 (method "distance" only). fps: output frames per second.
-    alpha: weight of annotation against continuity (Faustino eq. 13; for "path" `synthesis.balance`). mirror: whether
-    mirrored clips may be used.
-    nearest: go on with the nearest words where the library lacks a key moment. seed: of every random choice.
-    delta: metres of travelled distance that may stay wrong (Faustino §3.2.4). omega: gait thresholds (§3.1.1), 1 or
-    more; 0: by "path" where the recordings' own labels change, else the paper's 4.
-    made: whether made clips may stand in where recordings lack a speed (method "path" only; `library.made`).
-    seam_window: seconds over which a jump at a seam is spread (eq. 25, twice its s; "path" fades over half of it).
-    track_window: seconds of the window that takes the feed's jitter out (`motion.track.smoothed`). root_window: seconds
-    of the window behind which the root is pulled onto the track (method "path" only; the root error is measured with
-    1.5). gaits: (gait word, clip) pairs, which clip stands for which gait (§3.1.1); other gaits are found among all
-    clips.
-    pins: where hands, feet and gaze have to be, in the order of time. height: of the player, m; 0: as tall as the
-    library's skeleton. strong_foot: one of FEET; key moments that name no side take this foot's clips where that costs
-    little. style: words, or names or patterns of folders and clips ("academy", "lmd/*"), whose clips are taken rather
-    than others by style_weight (m/s of missed speed that they are worth).
-    solve_touches: whether key moments move to the touches that the ball's samples tell, and the ball goes as physics
-    has it, touched step by step in dribbles (`known_touches`). variety: m/s of missed speed that
-    it is worth to show clips with this player's own lag against the clock, so that neighbours are not in step (method
-    "path"); lag: which, s (`match.variety.lags`). solved: the ball's course where it is known already,
-    such as from a whole match.
+    asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. pins: where hands,
+    feet and gaze have to be, in the order of time. gaits: (gait word, clip) pairs; other gaits are found among all
+    clips. strong_foot: one of FEET. style: words, or names or patterns of folders and clips ("academy", "lmd/*").
+    solved: the ball's course where it is known already, such as from a whole match.
 
-    InputError for a number outside LIMITS or HEIGHTS, and for two pins of one part at one time.
+    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.balance`), delta §3.2.4, omega and gaits
+    §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`, track_window
+    `motion.track.smoothed`, solve_touches `known_touches`, lag `match.variety.lags`; the root error is always measured
+    with a root_window of 1.5.
+
+    InputError for a number outside the limits of its setting, and for two pins of one part at one time.
     """
 
     track: Track
     timeline: Timeline = field(default_factory=Timeline)
     library: str = ""
-    method: str = "path"
-    catch_up: bool = True
-    fps: float = 30.0
-    alpha: float = 0.2
-    mirror: bool = True
-    nearest: bool = False
-    seed: int = 0
-    delta: float = 0.5
-    omega: float = 0.0
-    made: bool = True
-    seam_window: float = 0.8
-    track_window: float = SMOOTHING_SECONDS
-    root_window: float = 1.5
+    method: str = _DEFAULTS["method"]
+    catch_up: bool = _DEFAULTS["catch_up"]
+    fps: float = _DEFAULTS["fps"]
+    alpha: float = _DEFAULTS["alpha"]
+    mirror: bool = _DEFAULTS["mirror"]
+    nearest: bool = _DEFAULTS["nearest"]
+    seed: int = _DEFAULTS["seed"]
+    delta: float = _DEFAULTS["delta"]
+    omega: float = _DEFAULTS["omega"]
+    made: bool = _DEFAULTS["made"]
+    seam_window: float = _DEFAULTS["seam_window"]
+    track_window: float = _DEFAULTS["track_window"]
+    root_window: float = _DEFAULTS["root_window"]
     gaits: tuple[tuple[str, str], ...] = ()
     pins: tuple[Pin, ...] = ()
     height: float = 0.0
     strong_foot: str = ""
     style: tuple[str, ...] = ()
-    style_weight: float = 0.5
-    solve_touches: bool = field(default=False, metadata=LATER)
-    variety: float = field(default=0.0, metadata=LATER)
-    lag: float = field(default=0.0, metadata=LATER)
+    style_weight: float = _DEFAULTS["style_weight"]
+    solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
+    variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
+    lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
     solved: SolvedCourse | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
         object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
-        for name, (least, most) in LIMITS.items():
-            if not least <= getattr(self, name) <= most:
-                raise InputError(name, f"{getattr(self, name):g}", f"{least:g} to {most:g}")
+        check_limits(self, (*rows_of("synthesis"), *rows_of("player")))
         if 0.0 < self.omega < 1.0:
             raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the usual thresholds")
-        if self.height and not HEIGHTS[0] <= self.height <= HEIGHTS[1]:
-            raise InputError(
-                "height", f"{self.height:g} m", f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} m, or 0 for the library's"
-            )
+        if self.height and not _HEIGHT.least <= self.height <= _HEIGHT.most:
+            limits = f"{_HEIGHT.least:g} to {_HEIGHT.most:g} m, or 0 for the library's"
+            raise InputError("height", f"{self.height:g} m", limits)
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
         self._check_pins()
@@ -203,17 +174,3 @@ def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, wi
         sampled, ball=np.where(known[:, None] & (~measured[:, None] | [False, False, True]), ball, sampled.ball),
         ball_measured=measured,
     )  # fmt: skip
-
-
-def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
-    """(gait word, clip) of each text "WORD=CLIP", blanks around either left out; InputError for any other text and for
-    a word that comes twice."""
-    pairs = []
-    for text in texts:
-        word, _, clip = (part.strip() for part in text.partition("="))
-        if not word or not clip:
-            raise InputError("--gait", f"{text!r}", "WORD=CLIP, such as walking=folder/walk.bvh")
-        if word.lower() in dict(pairs):
-            raise InputError("--gait", f"{word!r} twice", "one clip for each gait")
-        pairs.append((word.lower(), clip.replace("\\", "/")))
-    return tuple(pairs)

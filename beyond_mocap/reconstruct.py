@@ -10,20 +10,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from . import __version__
+from .base.settings import defaults, setting
 from .errors import Cancelled, InputError
-from .markers.butterworth import CUTOFF
 from .markers.clean import Cleaned, clean
 from .markers.model import MarkerModel
 from .markers.pose import HeldBall, PoseSettings, Solved, solve
 from .markers.trial import MarkerTrial
 from .motion.motion import Motion
 
-FILTERS = ("butterworth", "kalman", "none")
-RELEASES = ("auto", "yes", "no")
+_DEFAULTS = defaults("markers")
+FILTERS = setting("markers", "filter").choice_names
+RELEASES = setting("markers", "release").choice_names
+_SMOOTHNESS = setting("markers", "smoothness")
 LEAST_MARKERS = 0.5
 """Share of a model's markers that a trial must have."""
-MOST_SMOOTHNESS = 0.2
-"""Seconds: so far on a body hardly follows its markers any more."""
 _TOLD_FLOOR = 0.02  # metres
 _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
 
@@ -32,32 +32,29 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class ReconstructSettings:
-    """What may be chosen. marker_set: whose markers these are; None: the shipped set that fits. weights, limits,
-    smoothness: of the pose (`markers.pose`). filter: one of FILTERS, at `cutoff` hertz. plant: standing feet are held.
-    floor: motion and markers are moved up or down so that the feet stand at height 0.
-    radius: metres of a ball that carries a marker, None where not known. hold_ball: its marker takes part in the pose
-    until the release. ball: its kind, one of `ball.physics.THROWN`. release: whether a throw's release is looked for;
-    "auto": where a marker is on a ball, or the file's name tells a throw's speed."""
+    """What may be chosen; the settings table says what each means. marker_set: None: the shipped set that fits.
+    release: "auto": looked for where a marker is on a ball, or the file's name tells a throw's speed."""
 
     marker_set: object | None = None
-    weights: bool = True
-    limits: bool = True
-    smoothness: float = 0.0
-    filter: str = "butterworth"
-    cutoff: float = CUTOFF
-    plant: bool = True
-    floor: bool = False
-    radius: float | None = None
-    hold_ball: bool = False
-    ball: str = "baseball"
-    release: str = "auto"
+    weights: bool = _DEFAULTS["weights"]
+    limits: bool = _DEFAULTS["limits"]
+    smoothness: float = _DEFAULTS["smoothness"]
+    filter: str = _DEFAULTS["filter"]
+    cutoff: float = _DEFAULTS["cutoff"]
+    plant: bool = _DEFAULTS["plant"]
+    floor: bool = _DEFAULTS["floor"]
+    radius: float | None = _DEFAULTS["radius"]
+    hold_ball: bool = _DEFAULTS["hold_ball"]
+    ball: str = _DEFAULTS["ball"]
+    release: str = _DEFAULTS["release"]
 
     def __post_init__(self):
         for name, choices in (("filter", FILTERS), ("release", RELEASES)):
             if getattr(self, name) not in choices:
                 raise InputError(name, f"{getattr(self, name)!r}", f"one of {', '.join(choices)}")
-        if not 0.0 <= self.smoothness <= MOST_SMOOTHNESS:
-            raise InputError("smoothness", f"{self.smoothness} s", f"0 to {MOST_SMOOTHNESS:g} seconds")
+        least, most = _SMOOTHNESS.least, _SMOOTHNESS.most
+        if not least <= self.smoothness <= most:
+            raise InputError("smoothness", f"{self.smoothness} s", _SMOOTHNESS.limits_text(least, most))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ import numpy as np
 
 from .ball.flight import Launch, fly
 from .ball.physics import THROWN, Ball
+from .base.settings import setting
 from .ball.released.carry import carried_and_thrown
 from .ball.released.first_guess import by_distance, fastest, speeds
 from .motion.hand import Hand, hand_of
@@ -59,7 +60,7 @@ class ReleaseSettings:
     ball_marker: str | None = None
     radius: float | None = None
     hand: str | None = None
-    ball: str = "baseball"
+    ball: str = setting("release", "ball").default
     window: float = 0.12
     centre: tuple[float, float, float] | None = None
 

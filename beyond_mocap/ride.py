@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .base.settings import defaults, setting
 from .errors import InputError, TimedLine
 from .motion import contacts, quaternion
 from .motion.arc_length import ArcLength
@@ -48,8 +49,9 @@ from .polish.path_time import (
 )
 from .polish.underfoot import footing, is_level, mesh_surface, path_surface
 
-ENDS = ("stop", "repeat")
-SPEEDS = (0.05, 20.0)
+_DEFAULTS = defaults("path_editing")
+ENDS = setting("path_editing", "end").choice_names
+_SPEED = setting("path_editing", "speed")
 LEANS_FROM = (0.7, 1.5)
 """m/s below which nobody leans into a bend, and from which on all of it counts: walkers lean too, on a path that is as
 smooth as these."""
@@ -67,26 +69,22 @@ STILL = 0.05
 
 @dataclass(frozen=True)
 class RideSettings:
-    """What a user chooses. fit: kind of the motion's own path, one of `path_fit.KINDS`, a polynomial of `degree`.
-    by_arc_length: as fast as the motion was, else in as much time. speed: times as fast. end: what happens where the
-    path ends before the motion, one of ENDS; cycle: repeat the motion until the path ends. frame: one of FRAMES. plant,
-    lean, slopes: feet are held where they stand, bodies lean into bends, feet follow the ground's slopes. bends: bends
-    slow the motion (the two-thirds power law). climbs: slopes slow it (Tobler's hiking function). delay: seconds that
-    it begins later. detours: (arc m, width m, offset m to the left) each."""
+    """What a user chooses; the settings table says what each means.
+    detours: (arc m, width m, offset m to the left) each."""
 
-    fit: str = "spline"
-    degree: int = 13
-    by_arc_length: bool = True
-    speed: float = 1.0
-    end: str = "stop"
-    cycle: bool = False
-    frame: str = "path"
-    plant: bool = True
-    lean: bool = True
-    bends: bool = False
-    slopes: bool = True
-    climbs: bool = False
-    delay: float = 0.0
+    fit: str = _DEFAULTS["fit"]
+    degree: int = _DEFAULTS["degree"]
+    by_arc_length: bool = _DEFAULTS["by_arc_length"]
+    speed: float = _DEFAULTS["speed"]
+    end: str = _DEFAULTS["end"]
+    cycle: bool = _DEFAULTS["cycle"]
+    frame: str = _DEFAULTS["frame"]
+    plant: bool = _DEFAULTS["plant"]
+    lean: bool = _DEFAULTS["lean"]
+    bends: bool = _DEFAULTS["bends"]
+    slopes: bool = _DEFAULTS["slopes"]
+    climbs: bool = _DEFAULTS["climbs"]
+    delay: float = _DEFAULTS["delay"]
     detours: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self):
@@ -95,8 +93,8 @@ class RideSettings:
             raise InputError("end of path", str(self.end), " or ".join(ENDS))
         if self.fit not in KINDS:
             raise InputError("path fit", str(self.fit), " or ".join(KINDS))
-        if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
-            raise InputError("speed", f"{self.speed:g} times", f"{SPEEDS[0]:g} to {SPEEDS[1]:g}")
+        if not _SPEED.least <= self.speed <= _SPEED.most:
+            raise InputError("speed", f"{self.speed:g} times", f"{_SPEED.least:g} to {_SPEED.most:g}")
         if not 0.0 <= self.delay < 86400.0:
             raise InputError("delay", f"{self.delay:g} s", "0 or more seconds")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
+from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..beyond_mocap.errors import InputError
 from ..scene import preview, session
-from ..scene.settings import FORMS
 from .verb import Verb
 
 

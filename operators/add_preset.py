@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 from bl_operators.presets import AddPresetBase
 
+from ..beyond_mocap.base.settings import rows_of
+
 
 class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
     """Keep the settings of Synthesize (method, weights, windows) under a name, for this and all other files"""
@@ -14,8 +16,4 @@ class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
     preset_menu = "BEYOND_MOCAP_MT_presets"
     preset_subdir = "beyond_mocap/synthesis"
     preset_defines = ["settings = bpy.context.scene.beyond_mocap"]
-    preset_values = [
-        f"settings.{name}"
-        for name in ("method", "catch_up", "mirror", "nearest", "rate", "alpha", "delta", "omega", "made",
-                     "seam_window", "track_window", "root_window", "seed", "solve_touches")
-    ]
+    preset_values = [f"settings.{row.identifier}" for row in rows_of("synthesis") if row.in_preset]

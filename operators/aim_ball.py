@@ -7,13 +7,15 @@ from dataclasses import replace
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from ..beyond_mocap.base.settings.aim import TIMES, WAYS
+from ..beyond_mocap.base.settings.choices import BALLS, PARTS, SIDES
 from ..scene import ball as balls
 from ..scene import linked
 from ..scene.aimed import shots
-from ..scene.aimed.settings import TIMES, WAYS, aimed, aimed_ball
+from ..scene.aimed.settings import aimed, aimed_ball
 from ..scene.aimed.subject import ball_meant, body_meant, stretch_of, target_meant
 from ..scene.measure import units_per_metre
-from ..scene.passes.settings import BALLS, KEPT, PARTS, SIDES
+from ..scene.passes.settings import KEPT
 from .verb import Verb
 
 FAR = 10.0  # metres to a target that is made

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty, IntProperty
 
+from ..beyond_mocap.base.settings.choices import BALLS
 from ..scene.aimed import handover
 from ..scene.aimed.subject import ball_meant
-from ..scene.passes.settings import BALLS
 from .verb import Verb
 
 

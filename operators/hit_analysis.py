@@ -5,10 +5,11 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..beyond_mocap.base.settings.choices import PARTS, SIDES
 from ..beyond_mocap.errors import InputError
 from ..scene import channels, linked
 from ..scene.passes import hits_shown
-from ..scene.passes.settings import PARTS, SIDES, found_of, subject
+from ..scene.passes.settings import found_of, subject
 from .verb import Verb
 
 

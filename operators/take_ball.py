@@ -5,9 +5,10 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
+from ..beyond_mocap.base.settings.choices import HOLDS, PARTS, SIDES
 from ..beyond_mocap.errors import InputError
 from ..scene.passes import possession
-from ..scene.passes.settings import HOLDS, PARTS, SIDES, ball_of, subject
+from ..scene.passes.settings import ball_of, subject
 from .verb import Verb
 
 

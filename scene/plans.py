@@ -5,8 +5,9 @@ from __future__ import annotations
 from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.errors import InputError
 from ..beyond_mocap.motion.track import Track, clean
-from ..beyond_mocap.plan import Plan, gait_choices
+from ..beyond_mocap.plan import Plan
 from . import pins, strips
+from .core.properties import property_values
 from .settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 from .tracks import read_track
 from .written import written_in, written_words
@@ -29,26 +30,9 @@ def plan_of(
         track=track,
         timeline=timeline_of(player, settings.rate, track),
         library=absolute(settings.library_folder),
-        method=settings.method,
-        catch_up=settings.catch_up,
-        fps=settings.rate,
-        alpha=settings.alpha,
-        mirror=settings.mirror,
-        nearest=settings.nearest,
-        seed=settings.seed,
-        delta=settings.delta,
-        omega=settings.omega,
-        made=settings.made,
-        seam_window=settings.seam_window,
-        track_window=settings.track_window,
-        root_window=settings.root_window,
-        gaits=gait_choices(text for text in settings.gaits.split(";") if text.strip()),
         pins=pins.read(player.id_data, player),
-        height=player.height,
-        strong_foot=player.strong_foot.replace("any", ""),
-        style=tuple(text.strip() for text in player.style.split(";") if text.strip()),
-        style_weight=player.style_weight,
-        solve_touches=settings.solve_touches,
+        **property_values(Plan, settings, "synthesis"),
+        **property_values(Plan, player, "player"),
     )
     return plan, found.warnings
 

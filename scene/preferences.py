@@ -9,24 +9,15 @@ import os
 from pathlib import Path
 
 import bpy
-from bpy.props import IntProperty, StringProperty
+
+from .core.properties import with_settings
 
 EXTENSION = __package__.rpartition(".")[0]
 
 
+@with_settings("preferences")
 class Preferences:
     """The properties; panels/preferences.py draws and registers them."""
-
-    cache_folder: StringProperty(
-        name="Cache Folder", subtype="DIR_PATH",
-        description="Where built libraries are kept, each in a folder of its own. Empty: beside the recordings, in "
-        "a folder .beyond_mocap",
-    )
-    threads: IntProperty(
-        name="Threads", default=0, min=0, max=256,
-        description="How many recordings are read at once when a library is built. 0: as many as there are processor "
-        "cores. A synthesis itself keeps to one, so that the same input always gives the same motion",
-    )
 
 
 def get() -> "Preferences | None":

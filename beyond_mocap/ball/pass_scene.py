@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 
+from ..base.settings import defaults, setting
 from ..errors import InputError
 from .contact import Tool
 from .hits import HitMotion
@@ -19,10 +20,13 @@ ERRORS = ("", "missed", "dropped")
 GROUND = "ground"
 LEAST_APART = 0.5
 """Metres between two players' places."""
+_DEFAULTS = defaults("passes")
+_ROWS = (
+    *(setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
+    *(setting("passes.pass", name) for name in ("bounces", "seconds")), setting("passes.player", "height"),
+)  # fmt: skip
 LIMITS = {
-    "fps": (10.0, 240.0), "transition": (0.1, 2.0), "lead_in": (0.0, 60.0), "lead_out": (0.0, 60.0),
-    "repeat": (1, 1000),
-    "bounces": (0, 5), "seconds": (0.2, 10.0), "height": (0.5, 3.0), "net": (0.1, 10.0), "weight": (0.0, 1000.0),
+    **{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 1000.0), "fps": (10.0, 240.0),
     "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1),
 }  # fmt: skip
 """Least and most of a scene's numbers."""
@@ -124,11 +128,9 @@ class BallChoice:
 
 @dataclass(frozen=True)
 class PassScene:
-    """What is asked. players; passes in their order, played `repeat` times. fps: of the output. seed: of what is left
-    to chance. serve: where the ball comes from first: a player's name, (x, y, z) m, GROUND, or None: the player who
-    would pass to the first one. missed, dropped: how likely each ball is. transition: seconds from one motion into the
-    next. lead_in, lead_out: s before the first strike, at least, and after the last. directions: 8: strikes turn in
-    steps of 45 degrees; 0: any way. watch: heads follow the ball.
+    """What is asked. players; passes in their order. fps: of the output. serve: where the ball comes from first: a
+    player's name, (x, y, z) m, GROUND, or None: the player who would pass to the first one. directions: 8: strikes turn
+    in steps of 45 degrees; 0: any way. The settings table says what the other fields mean.
 
     InputError for what cannot be: two players on one spot or of one name, a pass to oneself or to somebody unknown,
     passes that do not go on where the one before went, numbers outside LIMITS.
@@ -136,19 +138,19 @@ class PassScene:
 
     players: tuple[Player, ...]
     passes: tuple[Pass, ...]
-    repeat: int = 1
+    repeat: int = _DEFAULTS["repeat"]
     fps: float = 30.0
-    seed: int = 0
+    seed: int = _DEFAULTS["seed"]
     ball: BallChoice = BallChoice()
     net: Net | None = None
     serve: str | tuple[float, float, float] | None = None
-    missed: float = 0.0
-    dropped: float = 0.0
-    transition: float = 0.4
-    lead_in: float = 1.0
-    lead_out: float = 1.5
+    missed: float = _DEFAULTS["missed"]
+    dropped: float = _DEFAULTS["dropped"]
+    transition: float = _DEFAULTS["transition"]
+    lead_in: float = _DEFAULTS["lead_in"]
+    lead_out: float = _DEFAULTS["lead_out"]
     directions: int = 0
-    watch: bool = True
+    watch: bool = _DEFAULTS["watch"]
     weights: Weights = Weights()
 
     def __post_init__(self):
@@ -330,7 +332,7 @@ def _check_numbers(scene: PassScene) -> None:
 def _check_net(net: Net) -> None:
     for place in (net.start, net.end):
         _check_place(place, "net")
-    number_within(net.height, "net", "net: height")
+    number_within(net.height, "net_height", "net: height")
     if math.dist(net.start, net.end) < 0.1:
         raise InputError("net", f"{math.dist(net.start, net.end):.2f} m wide", "two places apart")
 

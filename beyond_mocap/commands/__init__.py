@@ -1,6 +1,5 @@
 """What verbs of the command line share, and verbs with a file of their own.
 
-- `numbers`      kinds of options
 - `outputs`      where results may be written, and who writes them
 - `told`         progress, notes, Ctrl-C
 - `ride_path`    the verb `path`; `keep_apart`: a rider that goes round others

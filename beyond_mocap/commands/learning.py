@@ -6,8 +6,8 @@ import csv
 import io
 from pathlib import Path
 
+from ..base.settings.options import add_options as add_settings
 from ..errors import InputError
-from .numbers import share
 from .outputs import check_outputs
 from .told import Told
 
@@ -19,7 +19,7 @@ def add_options(verb) -> None:
     verb.add_argument("--learn", type=Path, metavar="MODEL.npz", help="learn from the clips that have words")
     verb.add_argument("--propose", type=Path, metavar="OUT.csv", help="words for the clips that have none")
     verb.add_argument("--learned", type=Path, metavar="MODEL.npz", help="what was learned; without it rules alone")
-    verb.add_argument("--least", type=share, default=0.5, help="how sure a proposal has to be (default 0.5)")
+    add_settings(verb, "library.learn")
 
 
 def run(options, told: Told) -> None:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
+from ..base.settings.options import add_options, option_values
 from ..errors import BeyondMocapError, InputError
-from .numbers import positive, rate, seed, whole
-from .outputs import Writer, check_outputs
+from .outputs import Writer, check_outputs, named_folder
 from .told import Told
-
-MOST_WORKERS = 256
 
 
 def add(verbs):
@@ -26,44 +22,16 @@ def add(verbs):
     verb.add_argument("--events-provider", metavar="NAME", default="", help="whose form the events have; as above")
     verb.add_argument("--provider", metavar="NAME", default="", help="whose form FILE has; default: guessed")
     verb.add_argument("--library", type=Path, required=True)
-    verb.add_argument("--out", type=_named, required=True, metavar="FOLDER", help="is made; goes on where it was left")
-    verb.add_argument("--from", dest="start", type=float, metavar="SECONDS", help="of the match's clock, from then on")
-    verb.add_argument("--to", dest="end", type=float, metavar="SECONDS", help="up to then")
-    verb.add_argument("--players", nargs="+", default=[], metavar="ID", help="only these, by id; default: everybody")
-    _add_work(verb)
-    _add_results(verb)
-    verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
-    verb.add_argument("--skeleton", type=Path, metavar="CLIP.bvh", help="whose skeleton the library has")
-    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of the BVH files")
+    verb.add_argument(
+        "--out", type=named_folder, required=True, metavar="FOLDER", help="is made; goes on where it was left"
+    )
+    add_options(verb, "match.section")
+    add_options(verb.add_mutually_exclusive_group(), "match.work")
+    add_options(verb, "match")
+    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words; the default")
+    add_options(verb, "library")
     verb.set_defaults(run=run)
     return verb
-
-
-def _add_work(verb) -> None:
-    """Who does it."""
-    many = partial(whole, low=1, high=MOST_WORKERS, expected=f"1 to {MOST_WORKERS}")
-    who = verb.add_mutually_exclusive_group()
-    who.add_argument("--workers", type=many, metavar="N", help="processes on this machine; default: one per core")
-    who.add_argument("--scheduler", default="", metavar="ADDRESS", help="of a Dask cluster whose workers do it")
-
-
-def _add_results(verb) -> None:
-    """What comes out, and how."""
-    verb.add_argument("--no-solve-touches", action="store_true", help="the ball as the feed has it, and no touches")
-    verb.add_argument("--annotations", type=Path, metavar="DIR", help="words of players as DIR/ID.txt, not found ones")
-    verb.add_argument("--bvh", action="store_true", help="every player as BVH too")
-    verb.add_argument(
-        "--scene", type=Path, metavar="FILE",
-        help="everybody, ball and pitch in one file; inside Blender: .blend, .fbx, .glb, .usdc",
-    )
-    verb.add_argument("--no-figures", action="store_true", help="no reports, no provenance, no page")
-    verb.add_argument("--fps", type=rate, default=30.0)
-    verb.add_argument("--seed", type=seed, default=0)
-    verb.add_argument(
-        "--exact", dest="nearest", action="store_false",
-        help="a player whose words the library lacks fails, instead of going on with the nearest it has",
-    )
-    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words; the default")
 
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
@@ -75,11 +43,8 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     order = MatchOrder(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
         events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider,
-        cache=options.cache, skeleton=options.skeleton, unit=options.unit, start=options.start, end=options.end,
-        players=tuple(dict.fromkeys(options.players)), fps=options.fps,
-        seed=options.seed, nearest=options.nearest, solve_touches=not options.no_solve_touches,
-        annotations=options.annotations, bvh=options.bvh, figures=not options.no_figures,
-        workers=options.workers or len(_cores()), scheduler=options.scheduler,
+        **{**option_values(MatchOrder, options, "match.section", "match.work", "match", "library"),
+           "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_cores())},
     )  # fmt: skip
     if options.apart is None:
         made = make_match(order, told.progress, told.cancelled)
@@ -127,10 +92,3 @@ def without(arguments: Sequence[str], option: str) -> list[str]:
 def _cores() -> range | set[int]:
     """The cores that this process may use."""
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-
-
-def _named(text: str) -> Path:
-    """A folder that has a name: an empty one would be the folder at hand."""
-    if not text.strip():
-        raise argparse.ArgumentTypeError("no folder is named")
-    return Path(text)

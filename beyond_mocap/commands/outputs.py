@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -46,3 +47,10 @@ def check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> N
             what = "named for an output and for something else"
             raise InputError(path, what, "a file for each", "rename one of them")
         taken.add(path.resolve())
+
+
+def named_folder(text: str) -> Path:
+    """A folder that has a name: an empty one would be the folder at hand."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("no folder is named")
+    return Path(text)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from collections.abc import Mapping
@@ -11,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..base.settings.options import add_options
 from ..errors import InputError
-from .numbers import positive
-from .outputs import Writer
+from .outputs import Writer, named_folder
 from .told import Told
 
 
@@ -22,10 +21,8 @@ def add(verbs):
     verb = verbs.add_parser("passes", help="several players keep a ball going")
     verb.add_argument("scene", type=Path, metavar="SCENE.json", help="who passes to whom; docs/passes.md has its form")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
-    verb.add_argument("--out", type=_named, required=True, metavar="FOLDER", help="is made where there is none")
-    verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
-    verb.add_argument("--skeleton", type=Path, metavar="CLIP.bvh", help="whose skeleton the library has")
-    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of the BVH files")
+    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made where there is none")
+    add_options(verb, "library")
     verb.set_defaults(run=run)
     return verb
 
@@ -63,13 +60,6 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
     print(f"{options.out}: {len(played.players)} players, {len(table)} strikes in {played.plan.seconds:.1f} s, "
           f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
-
-
-def _named(text: str) -> Path:
-    """A folder that has a name: an empty one would be the folder at hand."""
-    if not text.strip():
-        raise argparse.ArgumentTypeError("no folder is named")
-    return Path(text)
 
 
 class _naming:

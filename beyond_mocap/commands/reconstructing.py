@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.settings.options import add_options, option_values
 from ..errors import InputError
-from .numbers import between
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
 
 _MOST_LINES = 12
-_FILTERS = ("butterworth", "kalman", "none")  # reconstruct.FILTERS, which takes long to import
 
 
 def add(verbs):
@@ -28,49 +27,9 @@ def add(verbs):
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh", help="for a folder of trials: a folder")
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--save-model", type=Path, metavar="MODEL.json")
-    _add_reading(verb)
-    _add_posing(verb)
-    _add_ball(verb)
-    _add_library(verb)
+    add_options(verb, "markers")
     verb.set_defaults(run=run)
     return verb
-
-
-def _add_reading(verb) -> None:
-    verb.add_argument("--marker-set", metavar="FILE|NAME", help="whose markers these are; default: what fits")
-    verb.add_argument("--subject", metavar="NAME", help="whose markers, where a file holds several bodies")
-    verb.add_argument("--unit", metavar="UNIT", help="of the files: m, cm, mm, in; default: as they say")
-    verb.add_argument("--up", metavar="AXIS", help="of the files that points up: X, Y, Z or --up=-Y; default: found")
-    faster = partial(between, low=1.0, high=20000.0, expected="1 to 20000 frames per second")
-    verb.add_argument("--fps", type=faster, metavar="RATE", help="of the trial, where its file says something else")
-
-
-def _add_posing(verb) -> None:
-    verb.add_argument("--filter", choices=_FILTERS, default="butterworth")
-    verb.add_argument("--cutoff", type=partial(between, low=0.1, high=1000.0, expected="0.1 to 1000 hertz"),
-                      default=13.4, metavar="HERTZ", help="of the filter; default 13.4")  # fmt: skip
-    verb.add_argument("--no-plant", action="store_true", help="do not hold standing feet")
-    verb.add_argument("--floor", action="store_true", help="move the motion up or down so that the feet stand at 0")
-    verb.add_argument("--no-limits", action="store_true", help="joints may turn as far as they like")
-    verb.add_argument("--no-weights", action="store_true", help="all markers count alike")
-    more = partial(between, low=0.0, high=0.2, expected="0 to 0.2 seconds")
-    verb.add_argument("--smoothness", type=more, default=0.0, metavar="SECONDS",
-                      help="it all moves smoothly: 0.02 for a walk, 0.004 for a throw; default 0")  # fmt: skip
-
-
-def _add_ball(verb) -> None:
-    from ..ball.physics import THROWN
-
-    small = partial(between, low=0.005, high=0.5, expected="0.005 to 0.5 metres")
-    verb.add_argument("--ball-radius", type=small, metavar="METRES", help="of a ball that carries a marker")
-    verb.add_argument("--ball-kind", choices=tuple(THROWN), default="baseball")
-    verb.add_argument("--hold-ball", action="store_true", help="its marker takes part in the pose until the release")
-    verb.add_argument("--release", choices=("auto", "yes", "no"), default="auto", help="look for a throw's release")
-
-
-def _add_library(verb) -> None:
-    verb.add_argument("--add-to", type=Path, metavar="LIBRARY", help="adds the motion to a library as NAME.bvh")
-    verb.add_argument("--words", nargs="+", default=[], metavar="WORD", help="its annotation; a throw's key: release")
 
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
@@ -227,15 +186,10 @@ def settings_of(options):
     from ..files.marker_set_text import chosen_set
     from ..reconstruct import ReconstructSettings
 
-    release = "yes" if _is_throw(options.words) and options.release == "auto" else options.release
-    return ReconstructSettings(
-        marker_set=options.marker_set and chosen_set(options.marker_set), weights=not options.no_weights,
-        limits=not options.no_limits,
-        smoothness=options.smoothness, filter=options.filter, cutoff=options.cutoff, plant=not options.no_plant,
-        floor=options.floor,
-        radius=options.ball_radius, hold_ball=options.hold_ball, ball=options.ball_kind,
-        release=release,
-    )  # fmt: skip
+    found = option_values(ReconstructSettings, options, "markers")
+    if _is_throw(options.words) and options.release == "auto":
+        found["release"] = "yes"
+    return ReconstructSettings(marker_set=options.marker_set and chosen_set(options.marker_set), **found)
 
 
 def read_trial(path: Path, options):

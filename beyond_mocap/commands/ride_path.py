@@ -5,18 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from ..base.settings.options import add_options, option_values
 from ..errors import InputError
-from .numbers import between, positive, whole
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
 
-_FRAMES = ("path", "tangent", "absolute")  # those of path_frame, which takes scipy to import
-_FRAME_HELP = "what the recording is taken relative to: the path (default); its full tangent or the world, to compare"
 _WHOLE = 0.95  # of a path, that is as good as all of it
 
 
@@ -26,45 +23,10 @@ def add(verbs):
     verb.add_argument("input", type=Path, metavar="IN.bvh")
     verb.add_argument("--path", type=Path, required=True, metavar="CURVE.csv", help="x_m,y_m[,z_m]: the new path")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
-    verb.add_argument(
-        "--degree", type=partial(whole, low=1, high=200, expected="a whole number from 1 to 200"), metavar="N",
-        help="of a polynomial fitted to the recording's own path; default: a smoothing spline",
-    )
-    verb.add_argument("--no-arc-length", action="store_true", help="by time: the path's ends at the recording's ends")
-    # Blender's own Cycles add-on reads what stands behind `--` (batch.py) and ends Blender over `--cycle`
-    verb.add_argument("--cycle", "--loop", action="store_true", help="repeat the best stretch until the path's end")
-    verb.add_argument("--end", choices=("stop", "repeat"), default="stop", help="where the path is shorter")
-    verb.add_argument("--no-plant", action="store_true", help="leave the feet as the path carries them")
-    faster = partial(between, low=0.1, high=10.0, expected="a number from 0.1 to 10")
-    verb.add_argument("--speed", type=faster, default=1.0, metavar="FACTOR", help="of playing; default 1")
-    verb.add_argument("--frame", choices=_FRAMES, default="path", help=_FRAME_HELP)
-    verb.add_argument("--no-lean", action="store_true", help="do not lean into bends")
-    verb.add_argument("--slow-in-bends", action="store_true", help="slow down in tight bends as people do")
-    verb.add_argument("--slow-on-slopes", action="store_true", help="slow down on slopes as people do")
-    verb.add_argument("--no-slopes", action="store_true", help="feet do not follow slopes, as if in a lift")
-    _add_curve(verb)
-    verb.add_argument("--delay", type=partial(between, low=0.0, high=3600.0, expected="0 to 3600 seconds"), default=0.0,
-                      metavar="SECONDS", help="that it waits before it sets out")  # fmt: skip
-    verb.add_argument("--avoid", type=Path, action="append", default=[], metavar="OTHER.bvh",
-                      help="a moving body to keep clear of, by waiting or going round; may be repeated")  # fmt: skip
-    verb.add_argument("--distance", type=partial(between, low=0.05, high=20.0, expected="0.05 to 20 metres"),
-                      metavar="METRES", help="between two bodies' middles, with --avoid; default 0.6")  # fmt: skip
-    verb.add_argument("--ground", type=Path, metavar="HILL.obj", help="a mesh for the feet to stand on: metres, Y up")
-    verb.add_argument("--report", type=Path, metavar="R.json")
-    verb.add_argument("--provenance", type=Path, metavar="P.csv")
-    verb.add_argument("--unit", type=positive, metavar="METRES", help="metres per unit of IN.bvh")
+    # Blender's own Cycles add-on reads what stands behind `--` (batch.py) and ends Blender over `--cycle`: hence --loop
+    add_options(verb, "path_editing")
     verb.set_defaults(run=run)
     return verb
-
-
-def _add_curve(verb) -> None:
-    """How the rows of CURVE.csv are meant."""
-    verb.add_argument("--closed", action="store_true", help="the last point joins the first: round and round")
-    verb.add_argument("--control-points", action="store_true", help="the points of CURVE.csv are a B-spline's controls")
-    verb.add_argument(
-        "--control-degree", type=partial(whole, low=1, high=20, expected="a whole number from 1 to 20"), metavar="K",
-        help="of that B-spline; default 3",
-    )
 
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
@@ -167,10 +129,7 @@ def _prepared(motion, options):
     from ..ride import RideSettings, prepare
 
     settings = RideSettings(
-        fit="polynomial" if options.degree else "spline", degree=options.degree or RideSettings.degree,
-        by_arc_length=not options.no_arc_length, speed=options.speed, end=options.end, cycle=options.cycle,
-        frame=options.frame, plant=not options.no_plant, lean=not options.no_lean, bends=options.slow_in_bends,
-        slopes=not options.no_slopes, climbs=options.slow_on_slopes, delay=options.delay,
+        fit="polynomial" if options.degree else "spline", **option_values(RideSettings, options, "path_editing")
     )
     try:
         return prepare(motion, settings), settings

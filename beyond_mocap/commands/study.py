@@ -9,11 +9,10 @@ import os
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
+from ..base.settings.options import add_options
 from ..errors import InputError
-from .numbers import seed, whole
 from .outputs import Writer, check_outputs
 from .told import Told
 
@@ -37,12 +36,7 @@ def add(verbs):
 def _add_order(verbs):
     verb = verbs.add_parser("order", help="neutral names for clips, and an order for each rater")
     verb.add_argument("clips", type=Path, metavar="CLIPS.csv", help="file,system,scenario; two are 'training'")
-    many = partial(whole, low=1, high=1000, expected="1 to 1000")
-    verb.add_argument("--raters", type=many, required=True, metavar="N")
-    verb.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new or an empty folder")
-    verb.add_argument("--seed", type=seed, default=0)
-    verb.add_argument("--pairs", action="store_true", help="compare two clips at a time instead of rating each")
-    verb.add_argument("--copy", action="store_true", help="copy what is a movie to its neutral name")
+    add_options(verb, "study.order")
     verb.set_defaults(run=run_order)
     return verb
 
@@ -50,7 +44,7 @@ def _add_order(verbs):
 def _add_form(verbs):
     verb = verbs.add_parser("form", help="a page, and a table, for each rater")
     verb.add_argument("study", type=Path, metavar="FOLDER", help="what study order wrote")
-    verb.add_argument("--embed", action="store_true", help="movies within the page: one file to send")
+    add_options(verb, "study.form")
     verb.set_defaults(run=run_form)
     return verb
 
@@ -59,10 +53,7 @@ def _add_analyse(verbs):
     verb = verbs.add_parser("analyse", help="one-sided tests, effect sizes and pictures of the answers")
     verb.add_argument("study", type=Path, metavar="FOLDER")
     verb.add_argument("--answers", type=Path, nargs="+", metavar="FILE", help="files or folders; else FOLDER/answers")
-    verb.add_argument(
-        "--better", nargs=2, action="append", default=[], metavar=("NEW", "OLD"),
-        help="a hypothesis: NEW looks more natural than OLD; may be repeated; else the first system against each other",
-    )
+    add_options(verb, "study.analyse")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
     verb.add_argument("--html", type=Path, metavar="R.html", help="a page with pictures; needs matplotlib")
     verb.set_defaults(run=run_analyse)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 
 from .. import __version__
+from ..base.settings.options import add_options
 from ..errors import InputError
-from .numbers import whole
 from .outputs import Writer, check_outputs
 from .told import Told
 
@@ -19,13 +18,7 @@ def add(verbs):
     verb = verbs.add_parser("evaluate", help="how good trained networks are on recorded throws or kicks")
     verb.add_argument("--model", type=Path, required=True, metavar="W.npz", help="what throw train wrote")
     verb.add_argument("--examples", type=Path, required=True, metavar="FOLDER", help="recordings with annotations")
-    verb.add_argument("--subject", action="append", default=[], metavar="S", help="only this one's; repeatable")
-    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
-    verb.add_argument("--html", type=Path, metavar="R.html", help="the same as a page for a browser")
-    verb.add_argument("--raw", action="store_true", help="networks alone: no pose iterations, no inverse kinematics")
-    verb.add_argument("--as-they-are", action="store_true", help="do not scale what is asked for by height")
-    most = partial(whole, low=1, high=1_000_000, expected="1 to 1000000")
-    verb.add_argument("--motions", type=most, metavar="N", help="of each subject at most, evenly chosen")
+    add_options(verb, "throw.evaluate")
     verb.set_defaults(run=run)
     return verb
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 
-from .numbers import whole
+from ..base.settings.options import add_options
 from .outputs import Writer
 from .told import Told
 
@@ -16,13 +15,7 @@ def add(verbs):
     """The verb's parser."""
     verb = verbs.add_parser("examples", help="make throws or kicks with known targets, to train on and to test with")
     verb.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new or an empty folder")
-    verb.add_argument("--action", choices=("throw", "kick"), default="throw")
-    people = partial(whole, low=1, high=1000, expected="1 to 1000 people")
-    verb.add_argument("--subjects", type=people, default=4, metavar="N", help="different people; default 4")
-    each = partial(whole, low=1, high=10000, expected="1 to 10000 of each")
-    verb.add_argument("--throws", type=each, default=40, metavar="M", help="of each of them; default 40")
-    seeds = partial(whole, low=0, high=10**6, expected="0 to 1000000")
-    verb.add_argument("--seed", type=seeds, default=1, help="of the first of them; default 1")
+    add_options(verb, "throw.examples")
     verb.set_defaults(run=run)
     return verb
 

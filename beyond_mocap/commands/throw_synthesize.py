@@ -6,16 +6,13 @@ import argparse
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from .. import __version__
+from ..base.settings.options import add_options
 from ..errors import InputError, told_time
-from .numbers import between, positive, whole
 from .outputs import Writer, check_outputs, writer_of
 from .told import Told
-
-LIMBS = ("left_hand", "right_hand", "left_foot", "right_foot")
 
 
 def add(verbs):
@@ -24,28 +21,16 @@ def add(verbs):
     verb.add_argument("--target", type=_point, required=True, metavar="X,Y,Z", help="metres, Z up")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     verb.add_argument("--model", type=Path, metavar="W.npz", help="default: the weights that come with the project")
-    verb.add_argument("--limb", choices=LIMBS, help="default: what most examples of the model use")
-    verb.add_argument("--skeleton", type=Path, metavar="S.bvh", help="whose bones throw; default: the model's")
-    speed = partial(between, low=0.5, high=80.0, expected="0.5 to 80 m/s")
-    verb.add_argument("--speed", type=speed, metavar="M/S", help="of the ball as it leaves; default: what suits")
-    moment = partial(between, low=-1e5, high=1e5, expected="seconds")
-    verb.add_argument("--time", type=moment, metavar="SECONDS", help="at which it leaves; default: frame 0 is 0 s")
-    rates = partial(between, low=10.0, high=480.0, expected="10 to 480 frames per second, in which a throw can be seen")
-    verb.add_argument("--fps", type=rates, help="default: the model's, 30 with --library")
+    add_options(verb, "throw")
     place = verb.add_mutually_exclusive_group()
     place.add_argument("--start", type=_place, metavar="X,Y", help="where the hips are in the first frame; default 0,0")
     place.add_argument("--over", type=_place, metavar="X,Y", help="where the hips are at the release")
     place.add_argument("--ball-place", type=_place, metavar="X,Y", help="where the ball lies that is kicked")
-    verb.add_argument("--ball-kind", metavar="KIND", help="baseball, tennis, handball, volleyball, football, paper")
-    verb.add_argument("--ball", type=Path, metavar="B.csv", help="the ball's way")
-    verb.add_argument("--report", type=Path, metavar="R.json")
-    seeds = partial(whole, low=0, high=2**31 - 1, expected="0 to 2147483647")
-    verb.add_argument("--seed", type=seeds, default=0, help="another motion with the same aim; default 0")
+    add_options(verb, "throw.ball")
     verb.add_argument("--library", type=Path, metavar="L", help="with --track: run-up and recovery from it")
     verb.add_argument("--track", type=Path, metavar="T.csv", help="the player's track; the throw is on it at --time")
     verb.add_argument("--annotations", type=Path, metavar="A.txt", help="what else the player does on the track")
-    verb.add_argument("--cache", type=Path, metavar="DIR", help="where the library's cache is kept")
-    verb.add_argument("--unit", metavar="METRES", type=positive, help="metres per unit of the BVH files")
+    add_options(verb, "library", "cache", "unit")
     verb.set_defaults(run=run)
     return verb
 
@@ -147,7 +132,7 @@ def _order(options, player):
         over = player.place(options.time)
     fps = options.fps or (player.plan.fps if player else None)
     return Order(
-        target=options.target, limb=options.limb, speed=options.speed, ball=options.ball_kind, start=options.start,
+        target=options.target, limb=options.limb, speed=options.speed, ball=options.kind, start=options.start,
         over=over, ball_place=options.ball_place, release_time=options.time, fps=fps, seed=options.seed,
     )
 

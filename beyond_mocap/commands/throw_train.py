@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 
+from ..base.settings.options import add_options
 from ..errors import InputError
-from .numbers import between, whole
 from .outputs import Writer, check_outputs
 from .told import Told
 
@@ -22,18 +21,7 @@ def add(verbs):
     verb = verbs.add_parser("train", help="train networks on a folder of BVH and annotations (see make training)")
     verb.add_argument("folder", type=Path, metavar="FOLDER", help="recordings, annotations and, if any, throws.csv")
     verb.add_argument("--out", type=Path, required=True, metavar="W.npz", help="the trained model")
-    verb.add_argument("--action", choices=("throw", "kick"), default="throw")
-    verb.add_argument("--config", type=Path, metavar="C.json", help="sizes and rates; default: as shipped weights have")
-    verb.add_argument("--subject", action="append", default=[], metavar="S", help="train on this one only; repeatable")
-    verb.add_argument("--skeleton", type=Path, metavar="S.bvh", help="whose bones the model has; default: the first's")
-    verb.add_argument("--resume", action="store_true", help="go on from the checkpoint beside W.npz")
-    seeds = partial(whole, low=0, high=2**31 - 1, expected="0 to 2147483647")
-    verb.add_argument("--seed", type=seeds, help="of first weights, batches and dropout; default: the config's, else 0")
-    minutes = partial(between, low=0.01, high=1e5, expected="0.01 to 100000 minutes")
-    verb.add_argument("--minutes", type=minutes, metavar="M", help="stop after so many minutes with what stands then")
-    epochs = partial(whole, low=0, high=1_000_000, expected="0 to 1000000")
-    verb.add_argument("--epochs", type=epochs, metavar="N", help="times through the examples; default: the config's")
-    verb.add_argument("--half", action="store_true", help="store the weights as 16 bits")
+    add_options(verb, "throw.train")
     verb.set_defaults(run=run)
     return verb
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..base.settings.options import add_options
 from ..errors import InputError, told_time
 from .outputs import Writer, check_outputs
 from .told import Told
@@ -21,9 +22,7 @@ def add(verbs):
     verb = verbs.add_parser("touches", help="who touched the ball and when, from tracking")
     verb.add_argument("input", type=Path, metavar="FILE", help="a provider's tracking, or one player's track as CSV")
     verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: looked for beside")
-    verb.add_argument("--provider", metavar="NAME", help="whose form FILE has; default: guessed from its content")
-    verb.add_argument("--from", dest="start", type=float, metavar="SECONDS", help="solve from this time on")
-    verb.add_argument("--to", dest="end", type=float, metavar="SECONDS", help="solve up to this time")
+    add_options(verb, "touches")
     verb.add_argument("--out", type=Path, required=True, metavar="TOUCHES.csv")
     verb.add_argument("--ball", type=Path, metavar="BALL.csv", help="the solved path at the times of the samples")
     verb.add_argument("--report", type=Path, metavar="R.json")

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.settings import setting
 from ..errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion
 
-CUTOFF = 13.4
+CUTOFF = setting("markers", "cutoff").default
 """Hertz; Fredriksson §5.4."""
 LEAST_RATE = 2.2
 """Frames per second for each hertz of cutoff: below twice the cutoff there is nothing to filter out."""

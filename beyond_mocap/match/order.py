@@ -7,11 +7,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .. import __version__
+from ..base.settings import defaults
 from ..errors import InputError, told_time
 from ..files.event_providers import EVENT_PROVIDERS
 from .content_digest import digest_of_file
 from .units import OVERLAP, WINDOW
 
+_DEFAULTS = defaults("match")
 FORM = 3
 """Raised whenever the same order would give other results, so that kept ones are not taken for them."""
 
@@ -26,12 +28,10 @@ class MatchOrder:
     tracking, meta, events: the provider's files (None: looked for beside, none); provider: whose form, "" guessed.
     events_meta, events_provider: the same of the events.
     library, cache, skeleton, unit: as `library.build` has them. out: the folder of the results. start, end: seconds on
-    the match's clock, None from its first to its last sample. players: ids, () everybody. fps: of what comes out. seed:
-    of every random choice. nearest: whether words that the library lacks give way to the nearest it has. solve_touches:
-    whether the ball is solved. annotations: folder with a text for players (ID.txt), instead of automatic words.
-    bvh: whether every player is written as BVH too; figures: whether reports, provenance and the page are made. window,
-    overlap: seconds that a piece of the search has, and shares with the next. variety: as a plan has it. workers,
-    scheduler: `pool.Workplace`.
+    the match's clock, None from its first to its last sample. players: ids, () everybody. annotations: folder with a
+    text for players (ID.txt), instead of automatic words. window, overlap: seconds that a piece of the search has, and
+    shares with the next. variety: as a plan has it. workers, scheduler: `pool.Workplace`. The settings table says what
+    the other fields mean.
     InputError for numbers outside their limits, a span that ends before it begins, times that are no numbers, and
     what is said of events where there are none or of a provider whose events nobody reads.
     """
@@ -48,13 +48,13 @@ class MatchOrder:
     start: float | None = None
     end: float | None = None
     players: tuple[str, ...] = ()
-    fps: float = 30.0
-    seed: int = 0
-    nearest: bool = True
-    solve_touches: bool = True
+    fps: float = _DEFAULTS["fps"]
+    seed: int = _DEFAULTS["seed"]
+    nearest: bool = _DEFAULTS["nearest"]
+    solve_touches: bool = _DEFAULTS["solve_touches"]
     annotations: Path | None = None
-    bvh: bool = False
-    figures: bool = True
+    bvh: bool = _DEFAULTS["bvh"]
+    figures: bool = _DEFAULTS["figures"]
     window: float = WINDOW
     overlap: float = OVERLAP
     variety: float = 0.3

@@ -1,1 +1,1 @@
-"""What every feature in `scene/` stands on: the one watcher, and what is hung over Blender's windows."""
+"""What every room of the scene stands on: channels, clock, jobs, the live watcher, registration, settings."""

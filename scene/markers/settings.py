@@ -7,6 +7,8 @@ from bpy.props import (
     BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty,
 )
 
+from ..core.properties import with_settings
+
 ROLES = (
     ("NEEDED", "Needed", "It is in every recording of this marker set", "BLANK1", 0),
     ("OPTIONAL", "Optional", "It may be missing", "CHECKBOX_DEHLT", 1),
@@ -14,16 +16,6 @@ ROLES = (
     ("BALL", "Ball", "It is on a ball", "MESH_UVSPHERE", 3),
     ("OTHER", "Other", "It is neither on the body nor on a ball", "CANCEL", 4),
 )
-FILTERS = (
-    ("butterworth", "Butterworth", "Zero-phase low-pass filter of fourth order"),
-    ("kalman", "Kalman", "Smoothing by how a body moves, forwards and backwards"),
-    ("none", "None", "As it was solved"),
-)
-_THROWN = ("baseball", "tennis", "handball", "volleyball", "football")
-THROWN = tuple((name, name.capitalize(), f"A {name}") for name in _THROWN)
-HANDS = (
-    ("AUTO", "Found", "The hand that throws"), ("left", "Left", "The left hand"), ("right", "Right", "The right hand"),
-)  # fmt: skip
 
 
 def redraw(label, _context) -> None:
@@ -87,19 +79,14 @@ def a_cloud(_own, thing) -> bool:
     return is_cloud(thing)
 
 
+@with_settings("markers.cloud", update=shown)
+@with_settings("markers.model")
 class BeyondMocapCloud(bpy.types.PropertyGroup):
     """A trial that stands in the scene as a cloud of markers."""
 
     on: BoolProperty(name="Markers", description="Whether this object is a cloud of markers")
     labels: CollectionProperty(type=BeyondMocapMarker, description="The markers, in the order of the recording")
     active_label: IntProperty(name="Marker", description="The marker chosen in the list")
-    lines: BoolProperty(
-        name="Lines", default=True, update=shown, description="Draw lines between the markers of a segment"
-    )
-    size: FloatProperty(
-        name="Size", default=0.007, min=0.0, soft_max=0.05, unit="LENGTH", update=shown,
-        description="Radius of the spheres at the markers",
-    )
     events: CollectionProperty(type=BeyondMocapMarkerEvent, description="Events of the recording")
     fps: FloatProperty(name="Rate", description="Samples a second")
     start: FloatProperty(name="Start", description="Seconds on the recording's clock at the first sample")
@@ -121,9 +108,6 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
         description="The body's joints and where the markers lie on it, as the last reconstruction left it or as read "
         "from a file",
     )
-    use_model: BoolProperty(
-        name="Use Model", description="Take joints and markers from the model instead of finding them anew"
-    )
     made: StringProperty(name="Made", options={"HIDDEN"}, description="The reconstruction in this session's memory")
     body: PointerProperty(name="Body", type=bpy.types.Object, description="The armature that was reconstructed from it")
     ball: PointerProperty(name="Ball", type=bpy.types.Object, description="The ball that was thrown")
@@ -133,39 +117,9 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
     release: StringProperty(name="Release", options={"HIDDEN"}, description="Lines about the ball's release")
 
 
+@with_settings("markers", "release")
 class BeyondMocapMarkers(bpy.types.PropertyGroup):
     """How recordings of markers are read and worked on, per scene."""
-
-    names: BoolProperty(name="Names", default=True, description="Write the labels of the active cloud at its markers")
-    unit: FloatProperty(
-        name="Unit", default=0.0, min=0.0, max=10.0, precision=4,
-        description="Metres in one unit of a recording; 0: as its file says, or by the body's size",
-    )
-    filter: EnumProperty(name="Filter", items=FILTERS, default="butterworth", description="How the motion is smoothed")
-    cutoff: FloatProperty(
-        name="Cutoff", default=13.4, min=0.5, max=100.0, precision=1,
-        description="Hertz up to which the Butterworth filter lets movements through",
-    )
-    plant: BoolProperty(name="Plant Feet", default=True, description="Hold feet where they stand")
-    weights: BoolProperty(
-        name="Weigh Markers", default=True, description="Trust markers less while their segment is deformed"
-    )
-    limits: BoolProperty(name="Joint Limits", default=True, description="Joints turn no further than a body's")
-    smoothness: FloatProperty(
-        name="Smoothness", default=0.0, min=0.0, max=0.2, precision=3, unit="TIME_ABSOLUTE",
-        description="Seconds over which the whole sequence is solved as one that moves smoothly: 0.003 to 0.005 for "
-        "throws, 0.02 for noisy walks; 0: each frame for itself",
-    )
-    floor: BoolProperty(name="Floor at 0", description="Move the body so that its lowest foot stands at height 0")
-    dressed: BoolProperty(name="Make Body", default=True, description="Give the armature a simple body")
-    add: BoolProperty(name="Add to Library", description="Write the motion with its words into the library's folder")
-    words: StringProperty(name="Words", default="throwb", description="The words of the clip that is added")
-    hand: EnumProperty(name="Hand", items=HANDS, default="AUTO", description="The hand that throws")
-    thrown: EnumProperty(name="Ball", items=THROWN, default="baseball", description="What is thrown")
-    radius: FloatProperty(
-        name="Radius", default=0.0, min=0.0, max=0.5, precision=4,
-        description="Metres; 0: fitted where a marker lies on the ball, else that of the ball's kind",
-    )
 
 
 def is_cloud(thing: bpy.types.Object | None) -> bool:

@@ -12,6 +12,7 @@ from mathutils import Matrix
 
 from ...beyond_mocap.errors import InputError
 from .. import action, armature, bake, body, channels, linked
+from ..core.properties import property_values
 from ..measure import frames_per_second
 from ..settings import absolute
 from . import cloud as clouds
@@ -77,10 +78,9 @@ def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) ->
     assigned = any(row.segment for row in cloud.beyond_mocap_cloud.labels)
     throw = any(word.startswith("throw") for word in words)
     return ReconstructSettings(
-        marker_set=sets.of_cloud(cloud) if assigned else None, weights=chosen.weights, limits=chosen.limits,
-        smoothness=chosen.smoothness, filter=chosen.filter, cutoff=chosen.cutoff, plant=chosen.plant,
-        floor=chosen.floor, radius=chosen.radius or None, release="yes" if throw else "auto",
-    )  # fmt: skip
+        marker_set=sets.of_cloud(cloud) if assigned else None, release="yes" if throw else "auto",
+        **property_values(ReconstructSettings, chosen, "markers"),
+    )
 
 
 def clip_place(scene: bpy.types.Scene, name: str) -> Path:

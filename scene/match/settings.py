@@ -11,6 +11,7 @@ from bpy.props import (
 
 from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.providers import PROVIDERS
+from ..core.properties import with_settings
 from .kits import USUAL, linear, repaint, written
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
@@ -40,6 +41,7 @@ class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
     position: StringProperty(name="Position", description="Where he plays, where the feed tells")
 
 
+@with_settings("match.section", "match.work", "match")
 class BeyondMocapMatch(bpy.types.PropertyGroup):
     """A match: what it is made from, what is wanted of it, and what is shown."""
 
@@ -60,25 +62,6 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Where everybody's motion is kept, some megabytes a match. Empty: one for each stretch and choice, "
         "beside the saved file or the tracking",
-    )
-    start: FloatProperty(
-        name="From", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1, description="Second of the match's clock"
-    )
-    end: FloatProperty(
-        name="To", default=0.0, min=0.0, unit="TIME_ABSOLUTE", precision=1,
-        description="Second of the match's clock; 0: to its end",
-    )
-    first_frame: IntProperty(name="First Frame", default=1, description="Scene frame on which the stretch begins")
-    solve_touches: BoolProperty(
-        name="Solve Touches", default=True,
-        description="Find out of the ball's course who touches it and when, and have it go as physics has it",
-    )
-    workers: IntProperty(
-        name="Processes", default=0, min=0, max=256,
-        description="How many work at once, beside Blender; 0: one for each processor core",
-    )
-    scheduler: StringProperty(
-        name="Scheduler", description="Address of a Dask cluster that does the work instead, such as tcp://host:8786"
     )
     home_colour: FloatVectorProperty(
         name="Home Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["home"]),

@@ -4,50 +4,27 @@ undo."""
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from ..passes.settings import SIDES
+from ..core.properties import with_settings
 from ..result import BeyondMocapBefore
 
-KINDS = (
-    ("usual", "Usual", "A baseball for throws, a football for kicks"),
-    ("baseball", "Baseball", "73 mm, 145 g"),
-    ("tennis", "Tennis Ball", "67 mm, 58 g"),
-    ("handball", "Handball", "Size 3: 188 mm, 450 g"),
-    ("volleyball", "Volleyball", "209 mm, 270 g"),
-    ("football", "Football", "Size 5: 220 mm, 430 g"),
-)
 USUAL = {"throw": "baseball", "kick": "football"}
 LIMBS = {"throw": "hand", "kick": "foot"}
 MARK = "beyond_mocap_thrown"
 """Custom property of what a throw has made; no group has its name."""
 
 
+@with_settings("throw", "throw.ball")
 class BeyondMocapThrow(bpy.types.PropertyGroup):
     """How an armature is to throw or kick, and what came of it."""
 
-    side: EnumProperty(name="Side", items=SIDES, default="right", description="With which hand or foot")
     target: PointerProperty(
         name="Target", type=bpy.types.Object, description="What is to be hit: any object's origin; none: the 3D cursor"
-    )
-    frame: IntProperty(
-        name="On Frame", default=0, min=0,
-        description="Scene frame on which the ball leaves hand or foot, up to half a frame sooner or later; 0: the "
-        "current frame",
-    )
-    speed: FloatProperty(
-        name="Ball Speed", default=0.0, min=0.0, max=60.0, precision=1,
-        description="How fast the ball leaves, m/s; 0: as in examples that are thrown or kicked as far",
     )
     ball: PointerProperty(
         name="Ball", type=bpy.types.Object, poll=lambda _own, thing: thing.type in {"MESH", "EMPTY"},
         description="The ball that flies; a kick strikes it where it lies. None: one is made",
-    )
-    kind: EnumProperty(name="Kind", items=KINDS, default="usual", description="What kind of ball it is, in the air")
-    library: BoolProperty(
-        name="Run-Up by Library", default=True,
-        description="Let the synthesizer find the way into the throw and out of it among the clips of the library "
-        "(step 1); without one the throw is eased into the armature's own motion",
     )
     throw_model: StringProperty(
         name="Throw Model", subtype="FILE_PATH",
@@ -56,13 +33,6 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
     kick_model: StringProperty(
         name="Kick Model", subtype="FILE_PATH",
         description="A trained model (.npz) of kicks; empty: the one that comes with the extension",
-    )
-    seed: IntProperty(name="Seed", default=0, min=0, description="Another number, another throw at the same target")
-    live: BoolProperty(
-        name="Follow",
-        default=True,
-        description="Make what is shown again when the target is dragged or these settings are edited, "
-        "until it is kept",
     )
     made_of: StringProperty(name="Made of", options={"HIDDEN"}, description="The settings that it was made of")
     asked: IntProperty(name="Asked", options={"HIDDEN"}, description="The frame on which it was made to leave")

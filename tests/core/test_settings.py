@@ -5,7 +5,8 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.motion.track import Track, sample
-from beyond_mocap.plan import LIMITS, Plan
+from beyond_mocap.base.settings import rows_of
+from beyond_mocap.plan import Plan
 from beyond_mocap.synthesis.balance import balanced
 from beyond_mocap.synthesis.path_costs import Weights
 from beyond_mocap.synthesize import synthesize
@@ -88,9 +89,13 @@ def test_a_shorter_root_window_keeps_less_sway(take_of, track_of):
     assert off[0] < 0.7 * off[1]
 
 
-@pytest.mark.parametrize("name, value", [(name, side) for name in LIMITS for side in (0, 1)])
-def test_numbers_beyond_their_limits_are_told_in_one_line(track_of, name, value):
-    beyond = LIMITS[name][value] + (0.01 if value else -0.01)
+LIMITED = [row for row in (*rows_of("synthesis"), *rows_of("player")) if row.least is not None]
+
+
+@pytest.mark.parametrize(
+    "name, beyond", [(row.name, value) for row in LIMITED for value in (row.least - 0.01, row.most + 0.01)]
+)
+def test_numbers_beyond_their_limits_are_told_in_one_line(track_of, name, beyond):
     with pytest.raises(InputError, match=f"^{name}: ") as told:
         Plan(track=track_of(), **{name: beyond})
     assert "\n" not in str(told.value)

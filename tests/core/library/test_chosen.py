@@ -5,7 +5,8 @@ import pytest
 
 from beyond_mocap.errors import InputError
 from beyond_mocap.library.chosen import with_chosen_gaits
-from beyond_mocap.plan import Plan, gait_choices
+from beyond_mocap.base.settings.synthesis import gait_choices
+from beyond_mocap.plan import Plan
 from beyond_mocap.synthesize import synthesize
 
 

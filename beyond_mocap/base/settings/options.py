@@ -1,0 +1,53 @@
+"""The settings as options of the command line."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from functools import partial
+
+from . import rows_of
+from .setting import Setting, collect
+
+
+def add_options(parser, group: str, *names: str) -> None:
+    """Adds the options of a group of settings, in their order; of `names` alone, where there are any.
+    parser: of argparse, or a group of one."""
+    for row in rows_of(group):
+        if row.option and (not names or row.name in names):
+            parser.add_argument(*row.option.split(), **_arguments(row))
+
+
+def option_values(record: type, options: argparse.Namespace, *groups: str) -> dict[str, object]:
+    """What the command line says about fields of the dataclass `record`, in groups of settings."""
+    rows = [row for group in groups for row in rows_of(group) if row.option]
+    return collect(record, rows, lambda row: getattr(options, row.name))
+
+
+def _arguments(row: Setting) -> dict:
+    """The arguments of `add_argument`."""
+    more = {name: value for name, value in row.option_more.items() if name not in ("least", "most")}
+    out = {"dest": row.name, "help": row.help, "default": [] if row.kind is tuple else row.default}
+    if row.kind is bool:
+        return {**out, "action": "store_false" if row.default else "store_true", **more}
+    if row.choices:
+        out["choices"] = row.choice_names
+    elif row.kind not in (str, tuple):
+        out["type"] = _reader(row)
+    unit = row.unit.upper() if row.unit and " " not in row.unit else None
+    return {**out, "metavar": row.metavar or unit, **more}
+
+
+def _reader(row: Setting):
+    """What turns an option's text into the setting's value."""
+    least, most = (row.option_more.get(name, getattr(row, name)) for name in ("least", "most"))
+    return row.kind if least is None else partial(read_number, row=row, least=least, most=most)
+
+
+def read_number(text: str, row: Setting, least: float, most: float) -> float:
+    """The number that an option's text says; ArgumentTypeError where it is none or outside the limits."""
+    with contextlib.suppress(ValueError):
+        value = row.kind(text)
+        if least <= value <= most:
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} is not {row.limits_text(least, most)}")

@@ -1,0 +1,86 @@
+"""docs/settings.md, made from the table of settings: `python packaging/settings_page.py` in the project's folder."""
+
+from __future__ import annotations
+
+import re
+import sys
+from itertools import groupby
+from pathlib import Path
+
+TOP = Path(__file__).resolve().parents[1]
+PAGE = TOP / "docs" / "settings.md"
+HEAD = """# Settings
+
+All settings, by feature. This page is made from the table in `beyond_mocap/base/settings` by
+`python packaging/settings_page.py`; a test checks that it is up to date. Options are those of the command line, panel
+names those in Blender. Files and objects that are only read or written are on the feature's own page.
+"""
+COLUMNS = ("setting", "option", "in Blender", "default", "limits", "meaning")
+
+
+def settings_page() -> str:
+    """The page as text."""
+    from beyond_mocap.base.settings import TABLES
+
+    parts = [HEAD]
+    tables = [(rows[0].feature, group, rows) for group, rows in TABLES.items()]
+    for feature, groups in groupby(tables, key=lambda table: table[0]):
+        parts.append(f"\n## {feature}\n")
+        for _, group, rows in groups:
+            parts.append(f"\n`{group}`\n\n" + _line(COLUMNS) + _line(["---"] * len(COLUMNS)))
+            parts.extend(_line(_cells(row)) for row in rows)
+    return "".join(parts)
+
+
+def _cells(row) -> list[str]:
+    """The cells of a setting."""
+    option = " ".join(f"`{flag}`" for flag in row.option.split())
+    return [f"`{row.name}`", option, row.title if row.tooltip else "", _default(row), _limits(row), _meaning(row)]
+
+
+def _default(row) -> str:
+    """The default in code; behind it that of the panel, where it differs."""
+    usual, shown = (_written(value) for value in (row.default, row.panel_more.get("default", row.default)))
+    return usual if usual == shown else f"{usual}; in Blender {shown}"
+
+
+def _written(value) -> str:
+    """A value as users write it."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if value is None or value in ("", ()):
+        return "not set"
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _limits(row) -> str:
+    """The choices or the limits; those of the option and of the panel where they differ."""
+    if row.choices:
+        return ", ".join(f"`{name}`" for name in row.choice_names)
+    own, option, panel = (row.least, row.most), row.option_more, row.panel_more
+    asked = (option.get("least", row.least), option.get("most", row.most))
+    shown = (panel.get("min", row.least), panel.get("max", row.most))
+    parts = [_range(own), *(f"{place} {_range(pair)}" for place, pair in (("option", asked), ("Blender", shown))
+                            if pair not in (own, (None, None)))]  # fmt: skip
+    return "; ".join(filter(None, parts)) + (f" {row.unit}" if row.unit and any(parts) else "")
+
+
+def _range(pair: tuple) -> str:
+    least, most = (None if limit is None else _written(limit) for limit in pair)
+    return "" if least is None else f"{least} or more" if most is None else f"{least} to {most}"
+
+
+def _meaning(row) -> str:
+    """The sentence of the panel, else that of the option."""
+    return row.tooltip or re.sub(r"[;(] ?default %\(default\)[gs]\)?", "", row.help or "").strip()
+
+
+def _line(cells) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(TOP))
+    PAGE.write_text(settings_page(), "utf-8")

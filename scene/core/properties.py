@@ -1,0 +1,52 @@
+"""The settings as properties of Blender's classes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from inspect import get_annotations
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from ...beyond_mocap.base.settings import rows_of
+from ...beyond_mocap.base.settings.setting import Setting, collect
+
+_MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: StringProperty, Path: StringProperty,
+           tuple: StringProperty}
+
+
+def with_settings(*groups: str, **callbacks: Callable) -> Callable[[type], type]:
+    """A class decorator that gives a class the properties of groups of settings; callbacks: such as `update`."""
+
+    def add(cls: type) -> type:
+        made = {row.identifier: property_of(row, **callbacks) for row in _shown(groups)}
+        cls.__annotations__ = {**get_annotations(cls), **made}
+        return cls
+
+    return add
+
+
+def property_of(row: Setting, **more):
+    """A setting as a property of bpy, with further arguments."""
+    arguments = {
+        "name": row.title, "description": row.tooltip, "default": row.default or None, "min": row.least,
+        "max": row.most, "precision": row.precision, "unit": "TIME_ABSOLUTE" if row.unit == "seconds" else None,
+        **row.panel_more, **more,
+    }  # fmt: skip
+    maker = _MAKERS[type(arguments["default"])] if arguments["default"] is not None else _MAKERS[row.kind]
+    if row.choices:
+        maker, arguments["items"] = EnumProperty, row.choices
+    elif row.kind is tuple and row.default:
+        maker, arguments["size"] = FloatVectorProperty, len(row.default)
+    return maker(**{name: value for name, value in arguments.items() if value is not None})
+
+
+def property_values(record: type, properties: bpy.types.PropertyGroup, *groups: str) -> dict[str, object]:
+    """What the properties say about fields of the dataclass `record`, in groups of settings."""
+    return collect(record, _shown(groups), lambda row: getattr(properties, row.identifier))
+
+
+def _shown(groups: tuple[str, ...]) -> list[Setting]:
+    """The settings of groups that panels have."""
+    return [row for group in groups for row in rows_of(group) if row.tooltip]
