@@ -13,7 +13,7 @@ def test_text_is_escaped_wherever_it_is_put():
     table = build_table([BAD], [build_row(BAD, element("td", BAD, class_=BAD))])
     parts = (link, BAD, table, build_section(BAD, BAD), build_list([BAD]), build_image(b"png", BAD), fragment(BAD))
     page = build_page(BAD, *parts)
-    assert "<b>" not in page and page.count(ESCAPED) == 12
+    assert "<b>" not in page and page.count(ESCAPED) == 13
 
 
 def test_joined_html_is_no_longer_trusted():
