@@ -6,9 +6,7 @@ import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from types import ModuleType
 
 from ..errors import InputError
 from .event_tables import read_metrica_events, read_plain_events
@@ -20,23 +18,19 @@ class EventProvider(Provider):
     """What is known of a provider's events.
 
     Args:
-        load: kloppy's module, the events' file and the second one -> kloppy's dataset in the provider's own
-            coordinates; None where all files are tables.
-        second: what the second file begins with; None where there is no second file.
-        renamed: parts of the events' name and what stands there in the second file's.
+        arguments: kloppy's names for "events", the file, and "meta", the second one; none where kloppy reads nothing.
+        second: what the second file begins with; empty where there is no second file.
         read_table: reads a CSV, which has no second file; None where kloppy reads all.
         tells_foot: whether it tells left feet from right ones; where not, kloppy says "right" for either.
     """
 
-    load: Callable[[ModuleType, str, str], object] | None = None
-    second: re.Pattern[bytes] | None = None
-    renamed: tuple[tuple[str, str], ...] = ()
+    second: bytes = b""
     read_table: Callable | None = None
     tells_foot: bool = True
 
     def has_table(self, path: Path) -> bool:
         """Whether a file of this provider is one for `read_table`."""
-        return self.read_table is not None and (self.load is None or path.suffix.lower() == ".csv")
+        return self.read_table is not None and (not self.arguments or path.suffix.lower() == ".csv")
 
 
 def guessed_event_provider(path: Path) -> EventProvider:
@@ -51,7 +45,7 @@ def guessed_event_provider(path: Path) -> EventProvider:
 def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | None) -> Path | None:
     """The lineups or metadata that an events file needs: `meta`, else the one beside it whose name, or else whose
     form fits; None where it needs none. InputError where there is none."""
-    if provider.second is None or provider.has_table(path):
+    if not provider.second or provider.has_table(path):
         return None
     if meta is not None:
         if not Path(meta).is_file():
@@ -64,7 +58,7 @@ def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | No
         if beside.is_file() and beside != path:
             return beside
     fitting = [one for one in sorted(path.parent.glob("*.[xj]*")) if one != path
-               and provider.second.match(read_head(one))]  # fmt: skip
+               and re.match(provider.second, read_head(one))]  # fmt: skip
     if len(fitting) == 1:
         return fitting[0]
     expected = f"one as {names[0]}" if names[0] != path.name else "the provider's lineups or metadata"
@@ -74,70 +68,64 @@ def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | No
 def load_events(path: Path, provider: EventProvider, meta: Path | None):
     """kloppy's dataset in the provider's own coordinates. InputError where kloppy is not installed or cannot read the
     files."""
+    known = {"events": str(path), "meta": str(meta)}
+    arguments = {key: known[name] for key, name in provider.arguments.items()}
     others = f" and their {meta.name}" if meta else ""
-    load = partial(provider.load, events=str(path), meta=str(meta))
-    return load_through_kloppy(provider, path, load, f"{provider.name} events", others)
+    return load_through_kloppy(path, provider.name, provider.loader, arguments, f"{provider.name} events", others)
 
 
 _XML = rb"(?s)\s*(<\?xml[^>]*>\s*)?"
+_ALONE, _WITH_METADATA = {"event_data": "events"}, {"event_data": "events", "meta_data": "meta"}
+_WITH_LINEUPS = {"event_data": "events", "lineup_data": "meta"}
 _LINEUPS = (("events", "lineups"), ("event", "lineup"))
 
 # in the order of the choices that saved scenes number: a new one goes to the end
 EVENT_PROVIDERS: dict[str, EventProvider] = {record.name: record for record in (
     EventProvider(
-        name="opta", title="Opta", files="F24 or F73 with F7",
-        patterns=(re.compile(_XML + rb"(<!--.{0,400}?-->\s*)?<Games\b"),), second=re.compile(_XML + rb"<SoccerFeed\b"),
-        renamed=(("f24", "f7"), ("F24", "F7"), ("f73", "f7")),
-        load=lambda kloppy, events, meta: kloppy.load(f7_data=meta, f24_data=events),
+        name="opta", title="Opta", files="F24 or F73 with F7", renamed=(("f24", "f7"), ("F24", "F7"), ("f73", "f7")),
+        patterns=(_XML + rb"(<!--.{0,400}?-->\s*)?<Games\b",), second=_XML + rb"<SoccerFeed\b",
+        arguments={"f24_data": "events", "f7_data": "meta"},
     ),
     EventProvider(
         name="sportec", title="Sportec (DFL)", files="events with the tracking's metadata",
-        patterns=(re.compile(_XML + rb"<PutDataRequest\b.{0,2000}<Event\b"),),
-        second=re.compile(_XML + rb"<PutDataRequest\b.{0,900}<MatchInf"),
+        patterns=(_XML + rb"<PutDataRequest\b.{0,2000}<Event\b",),
+        second=_XML + rb"<PutDataRequest\b.{0,900}<MatchInf", loader="load_event", arguments=_WITH_METADATA,
         renamed=(("events", "meta"), ("events_raw", "matchinformation")),
-        load=lambda kloppy, events, meta: kloppy.load_event(event_data=events, meta_data=meta),
     ),
     EventProvider(
-        name="statsbomb", title="StatsBomb", files="events with their lineups",
-        patterns=(re.compile(rb'(?s)\s*\[\s*\{.{0,600}"possession"'),),
-        second=re.compile(rb'(?s)\s*\[\s*\{.{0,300}"lineup"'), renamed=_LINEUPS,
-        load=lambda kloppy, events, meta: kloppy.load(event_data=events, lineup_data=meta),
+        name="statsbomb", title="StatsBomb", files="events with their lineups", renamed=_LINEUPS,
+        patterns=(rb'(?s)\s*\[\s*\{.{0,600}"possession"',), second=rb'(?s)\s*\[\s*\{.{0,300}"lineup"',
+        arguments=_WITH_LINEUPS,
     ),
     EventProvider(
         name="metrica", title="Metrica", files="events with the tracking's metadata; CSV alone",
-        patterns=(re.compile(rb"Team,Type,Subtype,Period"),
-                  re.compile(rb'(?s)\s*\{\s*"data"\s*:\s*\[.{0,600}"subtypes"')),
-        second=re.compile(_XML + rb"<main\b.{0,900}<Metadata\b"),
+        patterns=(rb"Team,Type,Subtype,Period", rb'(?s)\s*\{\s*"data"\s*:\s*\[.{0,600}"subtypes"'),
+        second=_XML + rb"<main\b.{0,900}<Metadata\b", loader="load_event", arguments=_WITH_METADATA,
         renamed=(("events", "metadata"), ("events.json", "metadata.xml")), read_table=read_metrica_events,
-        load=lambda kloppy, events, meta: kloppy.load_event(event_data=events, meta_data=meta),
     ),
     EventProvider(
-        name="wyscout", title="Wyscout", files="alone (2 and 3)",
-        patterns=(re.compile(rb'(?s)\s*\{.{0,4000}("eventSec"|"matchTimestamp")'),),
-        load=lambda kloppy, events, meta: kloppy.load(event_data=events),
+        name="wyscout", title="Wyscout", files="alone (2 and 3)", arguments=_ALONE,
+        patterns=(rb'(?s)\s*\{.{0,4000}("eventSec"|"matchTimestamp")',),
     ),
     EventProvider(
-        name="datafactory", title="DataFactory", files="alone",
-        patterns=(re.compile(rb'(?s)\s*\{\s*"match"\s*:\s*\{.{0,600}"homeTeamId"'),),
-        load=lambda kloppy, events, meta: kloppy.load(event_data=events),
+        name="datafactory", title="DataFactory", files="alone", arguments=_ALONE,
+        patterns=(rb'(?s)\s*\{\s*"match"\s*:\s*\{.{0,600}"homeTeamId"',),
     ),
     EventProvider(
-        name="statsperform", title="Stats Perform", files="MA3 with MA1",
-        patterns=(re.compile(_XML + rb"<matchEvents\b"), re.compile(rb'(?s)\s*\{\s*"matchInfo"')),
-        second=re.compile(_XML + rb'(<match\b|\{.{0,9000}"(lineUp|liveData)")'),
-        renamed=(("ma3", "ma1"), ("MA3", "MA1")),
-        load=lambda kloppy, events, meta: kloppy.load_event(ma1_data=meta, ma3_data=events),
+        name="statsperform", title="Stats Perform", files="MA3 with MA1", renamed=(("ma3", "ma1"), ("MA3", "MA1")),
+        patterns=(_XML + rb"<matchEvents\b", rb'(?s)\s*\{\s*"matchInfo"'),
+        second=_XML + rb'(<match\b|\{.{0,9000}"(lineUp|liveData)")', loader="load_event",
+        arguments={"ma3_data": "events", "ma1_data": "meta"},
     ),
     EventProvider(
-        name="impect", title="Impect", files="events with their lineups",
-        patterns=(re.compile(rb'(?s)\s*\[\s*\{.{0,400}"gameTimeInSec"'),),
-        second=re.compile(rb'(?s)\s*\{.{0,900}"squadHome"'), renamed=_LINEUPS, tells_foot=False,
-        load=lambda kloppy, events, meta: kloppy.load(event_data=events, lineup_data=meta),
+        name="impect", title="Impect", files="events with their lineups", renamed=_LINEUPS, arguments=_WITH_LINEUPS,
+        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"gameTimeInSec"',), second=rb'(?s)\s*\{.{0,900}"squadHome"',
+        tells_foot=False,
     ),
     EventProvider(
         name="csv", title="CSV",
         files="`time_s,type,player[,detail,success,x,y,period,part,side]`, seconds of the match, or of the period "
               "where a column names it",
-        patterns=(re.compile(rb"[^\r\n{<\[]{0,400}time_s"),), read_table=read_plain_events,
+        patterns=(rb"[^\r\n{<\[]{0,400}time_s",), read_table=read_plain_events,
     ),
 )}  # fmt: skip

@@ -7,9 +7,8 @@ import logging
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 
 from ..errors import InputError
 
@@ -27,43 +26,44 @@ class Provider:
     """What is known of a provider's form.
 
     Args:
-        name: on the command line and in saved scenes.
+        name: on the command line and in saved scenes; kloppy's module of this name reads the files.
         title: as the provider spells it.
         files: which files a match has, for people.
         patterns: the beginning of a file, 8 kB, matches one of them, and none of another provider's.
-        module: of kloppy, "" where it has the provider's name.
+        loader: kloppy's function.
+        arguments: its arguments' names -> what they are.
+        renamed: parts of a file's name and what stands there in the name of the second file.
     """
 
     name: str
     title: str
     files: str
-    patterns: tuple[re.Pattern[bytes], ...]
-    module: str = ""
+    patterns: tuple[bytes, ...]
+    loader: str = "load"
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    renamed: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingProvider(Provider):
-    """What is known of a provider's tracking.
+    """What is known of a provider's tracking; `arguments` are of `providers.load_tracking`.
 
     Args:
-        load: kloppy's module, the feed and the pitch's length and width, m -> kloppy's dataset in the provider's own
-            coordinates.
-        needs_metadata: whether there is always a second file.
-        renamed: parts of a tracking file's name and what stands there in the second file's; see `_META_NAMES` too.
+        coordinates: kloppy's name of the provider's own, "" for that of the provider.
+        needs_metadata: whether there is always a second file; its name is also found without `renamed`.
         find_files: the tracking file, its metadata, and lines to add to -> all files of the match.
-        has_team_files: whether its CSV has a file for each team; kloppy calls their y downward though it turns it up.
-        has_pitch_size: whether it has the pitch's size, and not only kloppy's guess.
+        team_loader: kloppy's function for a CSV of each team, "" where there is none.
+        has_pitch_size: whether the pitch's size is in the files.
         has_own_roster: whether names come in a further file that nothing else depends on.
-        number_in_tracking, number_in_metadata: the match's number, None where it is not found; from the beginnings of
-            the files.
+        number_in_tracking, number_in_metadata: from the beginning of a file to the match's number, None if not found.
         read_referees: the referees' samples, which kloppy leaves out; None where the provider has none.
     """
 
-    load: Callable[[ModuleType, Feed, tuple[float, float]], object]
+    arguments: Mapping[str, str] = field(default_factory=lambda: {"meta_data": "meta", "raw_data": "raw"})
+    coordinates: str = ""
     needs_metadata: bool = True
-    renamed: tuple[tuple[str, str], ...] = ()
     find_files: Callable[[Path, Path | None, list[str]], Files] = lambda path, meta, notes: ((path,), (meta,))
-    has_team_files: bool = False
+    team_loader: str = ""
     has_pitch_size: bool = True
     has_own_roster: bool = False
     number_in_tracking: Callable[[bytes], str | None] | None = None
@@ -93,11 +93,7 @@ class Feed:
     @property
     def by_teams(self) -> bool:
         """Whether each team has a tracking file of its own."""
-        return self.provider.has_team_files and not self.meta
-
-    def name_of_meta(self, index: int) -> str | None:
-        """One of the metadata's files as kloppy takes it."""
-        return str(self.meta[index]) if index < len(self.meta) else None
+        return bool(self.provider.team_loader) and not self.meta
 
 
 def read_head(path: Path) -> bytes:
@@ -111,24 +107,14 @@ def read_head(path: Path) -> bytes:
 def find_provider(path: Path, providers: Mapping[str, Provider]) -> Provider | None:
     """The provider whose form a file has; None where it is none that is known."""
     head = read_head(path)
-    return next((one for one in providers.values() if any(form.match(head) for form in one.patterns)), None)
+    return next((one for one in providers.values() if any(re.match(form, head) for form in one.patterns)), None)
 
 
-def load_through_kloppy(
-    provider: Provider, path: Path, load: Callable[[ModuleType], object], form: str, others: str
-) -> object:
-    """Reads files with kloppy's module for a provider.
-
-    Args:
-        path: the file that messages name.
-        load: from kloppy's module to its dataset.
-        form, others: for messages: what `path` should be, and what belongs to it.
-
-    Raises:
-        InputError: where kloppy is not installed or cannot read the files.
-    """
+def load_through_kloppy(path: Path, provider: str, loader: str, arguments: dict[str, object], form: str, others: str):
+    """kloppy's dataset. path, form, others: for messages: the file, what it should be, and what belongs to it.
+    InputError where kloppy is not installed or cannot read the files."""
     try:
-        module = importlib.import_module(f"kloppy.{provider.module or provider.name}")
+        module = importlib.import_module(f"kloppy.{provider}")
     except ImportError as error:
         raise InputError(
             path, f"kloppy cannot be imported ({error})", "kloppy 3.19 or newer", "pip install 'beyond-mocap[tracking]'"
@@ -137,7 +123,7 @@ def load_through_kloppy(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return load(module)
+            return getattr(module, loader)(**arguments)
     except Exception as error:  # kloppy raises whatever its parsers meet in a wrong file
         found = f"not readable as {form} ({type(error).__name__}: {str(error)[:120]})"
         raise InputError(path, found, f"{form}{others}", "check the files, and the provider") from None

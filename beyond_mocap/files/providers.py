@@ -32,10 +32,17 @@ def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider:
 def load_tracking(feed: Feed, pitch: tuple[float, float]):
     """kloppy's dataset in the provider's own coordinates; pitch: length and width, m, for a feed without them.
     InputError where kloppy is not installed or cannot read the files."""
-    name = feed.provider.name
+    record, files, half = feed.provider, list(map(str, feed.tracking)), len(feed.tracking) // 2
+    meta, more, *_ = [*map(str, feed.meta), None, None]
+    known = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
+             "length": pitch[0], "width": pitch[1]}  # fmt: skip
+    arguments = {key: known[name] for key, name in record.arguments.items()}
+    if feed.by_teams:
+        arguments = {"home_data": files[0], "away_data": files[1]}
+    arguments["coordinates"] = record.coordinates or record.name
     others = f" and its metadata {', '.join(one.name for one in feed.meta) or feed.tracking[-1].name}"
-    load = partial(feed.provider.load, feed=feed, pitch=pitch)
-    return load_through_kloppy(feed.provider, feed.path, load, f"{name} tracking", others)
+    loader = record.team_loader if feed.by_teams else record.loader
+    return load_through_kloppy(feed.path, record.name, loader, arguments, f"{record.name} tracking", others)
 
 
 def _check_file(path: str | os.PathLike) -> Path:
@@ -96,35 +103,23 @@ def _find_number(pattern: bytes, content: bytes) -> str | None:
     return found and found[1].decode("utf-8", "replace")
 
 
-# --- Metrica: CSV, a file for each team, or EPTS, text with XML
+_find_sportec_number = partial(_find_number, rb'MatchId="([^"]{1,60})"')
 
 
 def _find_metrica(path: Path, meta: Path, notes: list[str]) -> Files:
+    """CSV, a file for each team, or EPTS, text with XML."""
     if path.suffix.lower() != ".csv":
         return (path,), (meta,)
     return ((meta, path) if "away" in path.name.lower() else (path, meta)), ()
 
 
-def _load_metrica(kloppy, feed: Feed, pitch: tuple[float, float]):
-    if feed.by_teams:
-        home, away = map(str, feed.tracking)
-        return kloppy.load_tracking_csv(home_data=home, away_data=away, coordinates="metrica")
-    meta = feed.name_of_meta(0)
-    return kloppy.load_tracking_epts(meta_data=meta, raw_data=str(feed.path), coordinates="metrica")
-
-
-# --- Second Spectrum: a JSON beside the XML brings names
-
-
 def _find_secondspectrum(path: Path, meta: Path, notes: list[str]) -> Files:
+    """A JSON beside the XML brings names."""
     names = meta.with_suffix(".json")
     if meta.suffix.lower() != ".xml" or not names.is_file():
         return (path,), (meta,)
     notes.append(f"{names.name} taken for the names of the players")
     return (path,), (meta, names)
-
-
-# --- PFF: a roster in a file of its own
 
 
 def _find_pff(path: Path, meta: Path, notes: list[str]) -> Files:
@@ -138,20 +133,16 @@ def _find_pff_number(metadata: bytes) -> str | None:
     return None
 
 
-# --- Signality: a file for each half, where the name has p1 or p2 in it, and the venue
-
-
 def _find_signality(path: Path, meta: Path, notes: list[str]) -> Files:
+    """A file for each half, where the name has p1 or p2 in it, and the venue."""
     names = [re.sub(r"(?i)(?<![a-z0-9])(p)[1-5](?![0-9])", rf"\g<1>{number}", path.name) for number in range(1, 6)]
     found = tuple(dict.fromkeys(path.with_name(name) for name in names if path.with_name(name).is_file()))
     notes += [f"{', '.join(one.name for one in found)} taken as one match"] * (len(found) > 1)
     return found or (path,), (meta, _find_beside(meta, "venue", path, notes))
 
 
-# --- HawkEye: all files of a folder, one a minute: the players', then as many of the ball
-
-
 def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
+    """All files of a folder, one a minute: the players', then as many of the ball."""
     def minute(file: Path) -> list[int]:
         return [int(number) for number in re.findall(r"\d+", file.name)]
 
@@ -164,93 +155,63 @@ def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
     return (*players, *balls), (meta,) if meta else ()
 
 
-def _load_hawkeye(kloppy, feed: Feed, pitch: tuple[float, float]):
-    files, half = list(map(str, feed.tracking)), len(feed.tracking) // 2
-    return kloppy.load(
-        ball_feeds=files[half:], player_centroid_feeds=files[:half], meta_data=feed.name_of_meta(0),
-        pitch_length=pitch[0], pitch_width=pitch[1], coordinates="hawkeye",
-    )
-
-
-# --- the records, in the order of the choices that saved scenes number: a new one goes to the end
-
+# in the order of the choices that saved scenes number: a new one goes to the end
 PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     TrackingProvider(
         name="tracab", title="TRACAB", files="`.dat` or `.json`, metadata `.xml` or `.json`; referees too",
-        patterns=(re.compile(rb"\s*\d+:-?\d+,-?\d+,-?\d+,-?\d+,-?\d+,"), re.compile(rb'\s*\{[^{]{0,200}"FrameData"')),
-        load=lambda kloppy, feed, pitch: kloppy.load(
-            meta_data=feed.name_of_meta(0), raw_data=str(feed.path), coordinates="tracab"),
+        patterns=(rb"\s*\d+:-?\d+,-?\d+,-?\d+,-?\d+,-?\d+,", rb'\s*\{[^{]{0,200}"FrameData"'),
         read_referees=read_tracab_referees,
     ),
     TrackingProvider(
         name="metrica", title="Metrica", files="CSV, a file per team; or EPTS text with its XML",
-        patterns=(re.compile(rb"\s*,,,(Home|Away|[^,\r\n]*),", re.IGNORECASE),
-                  re.compile(rb"\s*\d+:(-?\d*\.\d+|NaN),(-?\d*\.\d+|NaN)", re.IGNORECASE)),
+        patterns=(rb"(?i)\s*,,,(Home|Away|[^,\r\n]*),", rb"(?i)\s*\d+:(-?\d*\.\d+|NaN),(-?\d*\.\d+|NaN)"),
         renamed=(("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home")),
-        find_files=_find_metrica, load=_load_metrica, has_team_files=True,
+        find_files=_find_metrica, loader="load_tracking_epts", team_loader="load_tracking_csv",
     ),
     TrackingProvider(
         name="skillcorner", title="SkillCorner", files="`.json` or `.jsonl` with the match's JSON",
-        patterns=(re.compile(
-            rb'(?s)\s*[\[{].{0,4000}("trackable_object"|"image_corners_projection"|"player_data")'),),
-        load=lambda kloppy, feed, pitch: kloppy.load(
-            meta_data=feed.name_of_meta(0), raw_data=str(feed.path), coordinates="skillcorner"),
+        patterns=(rb'(?s)\s*[\[{].{0,4000}("trackable_object"|"image_corners_projection"|"player_data")',),
     ),
     TrackingProvider(
         name="sportec", title="Sportec (DFL)",
         files="positions XML with the match information XML; referees, colours of shirts",
-        patterns=(re.compile(rb"(?s)\s*<.{0,4000}<Positions\b"),),
-        load=lambda kloppy, feed, pitch: kloppy.load_tracking(
-            meta_data=feed.name_of_meta(0), raw_data=str(feed.path), coordinates="sportec"),
-        number_in_tracking=partial(_find_number, rb'MatchId="([^"]{1,60})"'),
-        number_in_metadata=partial(_find_number, rb'MatchId="([^"]{1,60})"'),
+        patterns=(rb"(?s)\s*<.{0,4000}<Positions\b",), loader="load_tracking",
+        number_in_tracking=_find_sportec_number, number_in_metadata=_find_sportec_number,
         read_referees=read_sportec_referees,
     ),
     TrackingProvider(
         name="secondspectrum", title="Second Spectrum",
         files="`.jsonl` with its XML (a JSON of the same name brings names), or with its JSON",
-        patterns=(re.compile(rb'(?s)\s*\{(?!.{0,400}"gameRefId").{0,4000}"homePlayers"'),),
-        find_files=_find_secondspectrum,
-        load=lambda kloppy, feed, pitch: kloppy.load(
-            meta_data=feed.name_of_meta(0), raw_data=str(feed.path), additional_meta_data=feed.name_of_meta(1),
-            coordinates="secondspectrum"),
-        has_own_roster=True,
+        patterns=(rb'(?s)\s*\{(?!.{0,400}"gameRefId").{0,4000}"homePlayers"',), find_files=_find_secondspectrum,
+        arguments={"meta_data": "meta", "raw_data": "raw", "additional_meta_data": "more"}, has_own_roster=True,
     ),
     TrackingProvider(
-        name="statsperform", title="Stats Perform", files="MA25 text with MA1",
-        patterns=(re.compile(rb"\s*\d{10,};\d"),),
-        load=lambda kloppy, feed, pitch: kloppy.load_tracking(
-            ma1_data=feed.name_of_meta(0), ma25_data=str(feed.path), pitch_length=pitch[0], pitch_width=pitch[1],
-            coordinates="sportvu"),
-        has_pitch_size=False,
+        name="statsperform", title="Stats Perform", files="MA25 text with MA1", patterns=(rb"\s*\d{10,};\d",),
+        loader="load_tracking", coordinates="sportvu", has_pitch_size=False,
+        arguments={"ma1_data": "meta", "ma25_data": "raw", "pitch_length": "length", "pitch_width": "width"},
     ),
     TrackingProvider(
         name="pff", title="PFF",
         files="`.jsonl`, metadata, and the roster (in the same folder, or in one with `roster` in its name); colours "
               "of shirts",
-        patterns=(re.compile(rb'(?s)\s*\{.{0,400}"gameRefId"'),),
-        find_files=_find_pff,
-        load=lambda kloppy, feed, pitch: kloppy.load_tracking(
-            meta_data=feed.name_of_meta(0), roster_meta_data=feed.name_of_meta(1), raw_data=str(feed.path),
-            coordinates="pff"),
+        patterns=(rb'(?s)\s*\{.{0,400}"gameRefId"',), find_files=_find_pff, loader="load_tracking",
+        arguments={"meta_data": "meta", "raw_data": "raw", "roster_meta_data": "more"},
         number_in_tracking=partial(_find_number, rb'"gameRefId"\s*:\s*"?(\d+)'), number_in_metadata=_find_pff_number,
     ),
     TrackingProvider(
         name="signality", title="Signality",
         files="`..p1...json` (the other half's is found by its name), metadata, and the file with `venue` in its "
               "name; referees",
-        patterns=(re.compile(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"'),),
-        find_files=_find_signality,
-        load=lambda kloppy, feed, pitch: kloppy.load(
-            meta_data=feed.name_of_meta(0), raw_data_feeds=list(map(str, feed.tracking)),
-            venue_information=feed.name_of_meta(1), coordinates="signality"),
+        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"',), find_files=_find_signality,
+        arguments={"meta_data": "meta", "raw_data_feeds": "all", "venue_information": "more"},
         read_referees=read_signality_referees,
     ),
     TrackingProvider(
         name="hawkeye", title="HawkEye",
         files="any file of a folder: all its `.samples.centroids` and `.samples.ball` are taken; metadata if there is "
               "any",
-        patterns=(re.compile(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"'),),
-        needs_metadata=False, find_files=_find_hawkeye, load=_load_hawkeye,
+        patterns=(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"',), find_files=_find_hawkeye, needs_metadata=False,
+        arguments={"player_centroid_feeds": "first", "ball_feeds": "second", "meta_data": "meta",
+                   "pitch_length": "length", "pitch_width": "width"},
     ),
 )}  # fmt: skip

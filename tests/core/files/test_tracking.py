@@ -1,8 +1,8 @@
 """Tracking in: the contract's CSV, and providers' files through kloppy and their cache."""
 
 import pathlib
-import re
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -279,20 +279,20 @@ def test_every_provider_is_known_by_its_form(tmp_path, raw, meta, provider, play
 
 def test_a_provider_is_one_record(tmp_path, monkeypatch, capsys):
     """A made-up form, TRACAB's below a line of its own, is guessed, read, named and documented by its record alone."""
-    pytest.importorskip("kloppy")
+    kloppy = pytest.importorskip("kloppy.tracab")
     file, players = made_tracab(tmp_path)
     (tmp_path / "game.acme").write_text("ACME 1\n" + file.read_text())
 
-    def load(kloppy, feed, pitch):
-        lines = feed.path.read_text().partition("\n")[2]
-        (tmp_path / "lines.dat").write_text(lines)
-        return kloppy.load(meta_data=feed.name_of_meta(0), raw_data=str(tmp_path / "lines.dat"), coordinates="tracab")
+    def load(meta, lines, coordinates):
+        (tmp_path / "lines.dat").write_text(pathlib.Path(lines).read_text().partition("\n")[2])
+        return kloppy.load(meta_data=meta, raw_data=str(tmp_path / "lines.dat"), coordinates="tracab")
 
     acme = TrackingProvider(
-        name="acme", title="Acme Sports", files="`.acme` with TRACAB's metadata", patterns=(re.compile(rb"ACME \d"),),
-        module="tracab", load=load, read_referees=lambda feed: iter([(1, "referee_1", 0.0, 500.0)]),
-        find_files=lambda path, meta, notes: ((path,), (meta,)),
+        name="acme", title="Acme Sports", files="`.acme` with TRACAB's metadata", patterns=(rb"ACME \d",),
+        loader="load_lines", arguments={"meta": "meta", "lines": "raw"},
+        read_referees=lambda feed: iter([(1, "referee_1", 0.0, 500.0)]),
     )
+    monkeypatch.setitem(sys.modules, "kloppy.acme", types.SimpleNamespace(load_lines=load))
     monkeypatch.setitem(PROVIDERS, "acme", acme)
     match = read_match(tmp_path / "game.acme", cache_dir=tmp_path / "cache")
     assert match.provider == "acme" and "game.acme read as acme" in match.notes
