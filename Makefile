@@ -8,7 +8,7 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training test test-core test-blender test-oldest test-training demo bench weights extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training test test-core test-blender test-oldest test-training demo bench weights tables extension extension-all window-test window-bench \
   pictures clean
 
 help:
@@ -18,6 +18,7 @@ help:
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
 	@echo 'make weights        the shipped networks anew: made throws and kicks, trained on; some minutes'
+	@echo 'make tables         the tables in docs/ that come from the code: providers'
 	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
 	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
 	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
@@ -73,6 +74,9 @@ weights: training
 	  $(TRAINED) throw train build/examples/$$action --action $$action --half --out build/examples/$$action.npz; \
 	  mv build/examples/$$action.npz $(WEIGHTS)/$$action.npz; \
 	done
+
+tables: venv
+	.venv/bin/python packaging/provider_tables.py
 
 extension: venv
 	.venv/bin/python packaging/build.py --platforms $(PLATFORMS)

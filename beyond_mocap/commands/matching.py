@@ -14,13 +14,18 @@ from .told import Told
 
 def add(verbs):
     """The verb's parser."""
+    from ..files.event_providers import EVENT_PROVIDERS
+    from ..files.providers import PROVIDERS
+
     verb = verbs.add_parser("match", help="everybody's motion and the ball of a tracked match, resumable")
     verb.add_argument("--tracking", type=Path, required=True, metavar="FILE", help="a provider's tracking")
     verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: looked for beside")
     verb.add_argument("--events", type=Path, metavar="FILE", help="what happened, from a provider or as CSV")
     verb.add_argument("--events-meta", type=Path, metavar="FILE", help="of the events; default: looked for beside them")
-    verb.add_argument("--events-provider", metavar="NAME", default="", help="whose form the events have; as above")
-    verb.add_argument("--provider", metavar="NAME", default="", help="whose form FILE has; default: guessed")
+    verb.add_argument("--events-provider", metavar="NAME", default="",
+                      help=f"whose form the events have: {', '.join(EVENT_PROVIDERS)}; default: guessed")
+    verb.add_argument("--provider", metavar="NAME", default="",
+                      help=f"whose form FILE has: {', '.join(PROVIDERS)}; default: guessed")
     verb.add_argument("--library", type=Path, required=True)
     verb.add_argument(
         "--out", type=named_folder, required=True, metavar="FOLDER", help="is made; goes on where it was left"

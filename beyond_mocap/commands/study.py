@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import base64
 import mimetypes
 import os
 import shutil
@@ -138,13 +137,14 @@ def run_form(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 def _embedded(folder: Path, found: Mapping[str, Path]) -> dict[str, str]:
     """Data addresses of all clips."""
+    from ..evaluation.html_page import build_data_address
+
     size = sum(path.stat().st_size for path in found.values())
     if size > _EMBED_MOST:
         what = f"{size / 1e6:.0f} MB of movies"
         raise InputError(folder / CLIPS, what, f"{_EMBED_MOST / 1e6:.0f} MB at most in a page", "leave --embed out")
     kinds = {name: mimetypes.guess_type(path.name)[0] or "video/mp4" for name, path in found.items()}
-    return {name: f"data:{kinds[name]};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
-            for name, path in found.items()}  # fmt: skip
+    return {name: build_data_address(path.read_bytes(), kinds[name]) for name, path in found.items()}
 
 
 def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:

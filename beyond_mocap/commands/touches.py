@@ -19,9 +19,13 @@ from .told import Told
 
 def add(verbs):
     """The verb's parser."""
+    from ..files.providers import PROVIDERS
+
     verb = verbs.add_parser("touches", help="who touched the ball and when, from tracking")
     verb.add_argument("input", type=Path, metavar="FILE", help="a provider's tracking, or one player's track as CSV")
     verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: looked for beside")
+    verb.add_argument("--provider", metavar="NAME",
+                      help=f"whose form FILE has: {', '.join(PROVIDERS)}; default: guessed from its content")
     add_options(verb, "touches")
     verb.add_argument("--out", type=Path, required=True, metavar="TOUCHES.csv")
     verb.add_argument("--ball", type=Path, metavar="BALL.csv", help="the solved path at the times of the samples")

@@ -8,9 +8,7 @@ The page loads nothing and runs nothing: pictures are inside it, all names are e
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
-from html import escape
 
 import numpy as np
 
@@ -19,6 +17,9 @@ from ..library.library import Library
 from ..motion.track import Track
 from . import jerk, plots
 from .feet import contact_speeds
+from .html_page import (
+    Html, build_image, build_list, build_page, build_row, build_section, build_table, build_title, element, fragment,
+)
 from .judged import judged
 from .played import Played
 from .view import View
@@ -33,16 +34,7 @@ _KEY_TEXTS = {
     "ball_shift_m": "ball moved {:.3f} m",
 }
 _STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 1120px; margin: 1.5em auto;
-  padding: 0 1em }
-h1 { font-size: 1.5em; margin-bottom: 0 } h2 { font-size: 1.15em; margin: 1.6em 0 .4em }
-h3 { font-size: 1em; margin: 1em 0 .2em } p { margin: .3em 0 } .quiet { color: #666; font-weight: normal }
-img { max-width: 100%; height: auto; display: block }
-table { border-collapse: collapse; font-size: 14px } tr { border-bottom: 1px solid #eee }
-th, td { padding: .18em .8em .18em 0; text-align: left; vertical-align: top }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums }
 .keys td { max-width: 16em; overflow-wrap: break-word }
-.met { color: #23703a } .missed { color: #b3261e; font-weight: 600 } .scroll { overflow-x: auto }
 .chips span { display: inline-block; margin: 0 1em .2em 0; overflow-wrap: anywhere }
 .chips i { display: inline-block; width: .9em; height: .9em; margin-right: .35em; border-radius: 2px }
 """
@@ -63,67 +55,61 @@ def html_report(
     """
     plots.require_matplotlib()
     view = View(played, track, timeline, library)
-    sections = [
-        _head(view, report, title),
-        _warnings(report),
-        _section("Over time", _image(plots.curves(view), "distance from the track, toe heights, speed, smoothness")),
-        _clips(view),
-        _words(view),
-        _moments(view, report),
-        _worst(view),
-        _figures(report),
-    ]
-    body = "\n".join(section for section in sections if section)
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f'<meta name="viewport" content="width=device-width"><style>{_STYLE}</style></head>\n'
-        f"<body>\n{body}\n</body></html>\n"
-    )
+    over_time = build_image(plots.curves(view), "distance from the track, toe heights, speed, smoothness")
+    return build_page(
+        title, _head(view, report, title), _warnings(report), build_section("Over time", over_time), _clips(view),
+        _words(view), _moments(view, report), _worst(view), _figures(report), style=_STYLE,
+    )  # fmt: skip
 
 
-def _head(view: View, report: Mapping, title: str) -> str:
+def _head(view: View, report: Mapping, title: str) -> Html:
     statuses = [row.status for row in judged(report) if row.status]
-    method = f"method {escape(str(report['method']))}, " if report.get("method") else ""
+    method = f"method {report['method']}, " if report.get("method") else ""
     told = f"{view.count} frames at {view.fps:g} per second, {view.played.motion.duration:.1f} s, {method}"
-    return (
-        f"<h1>{escape(title)}</h1>\n<p class=quiet>{told}{statuses.count('met')} of {len(statuses)} targets met</p>"
-    )
+    met = f"{statuses.count('met')} of {len(statuses)} targets met"
+    return fragment(element("h1", title), element("p", told + met, class_="quiet"), between="\n")
 
 
-def _warnings(report: Mapping) -> str:
-    lines = "".join(f"<li>{escape(str(line))}</li>" for line in report.get("warnings") or ())
-    return _section("Warnings", f"<ul>{lines}</ul>") if lines else ""
+def _warnings(report: Mapping) -> Html:
+    lines = build_list(report.get("warnings") or ())
+    return build_section("Warnings", lines) if lines else Html()
 
 
-def _clips(view: View) -> str:
+def _clips(view: View) -> Html:
     names = plots.legend(view)
     if not names:
-        return _section("Clips", "<p class=quiet>No provenance was given: it is not known which clips are played.</p>")
-    chips = "".join(
-        f'<span><i style="background:{colour}"></i>{number}: {escape(view.played.clips[clip])}, '
-        f"{np.sum(view.played.clip == clip) / view.fps:.1f} s</span>"
-        for clip, (number, colour) in names.items()
-    )
-    picture = _image(plots.clips(view), "clips, seams and time warp")
-    return _section("Clips", f"{picture}\n<p class=chips>{chips}</p>")
+        unknown = "No provenance was given: it is not known which clips are played."
+        return build_section("Clips", element("p", unknown, class_="quiet"))
+    chips = [
+        element(
+            "span", element("i", style=f"background:{colour}"), f"{number}: {view.played.clips[clip]}, "
+            f"{np.sum(view.played.clip == clip) / view.fps:.1f} s",
+        ) for clip, (number, colour) in names.items()
+    ]  # fmt: skip
+    picture = build_image(plots.clips(view), "clips, seams and time warp")
+    return build_section("Clips", picture, element("p", *chips, class_="chips"))
 
 
-def _words(view: View) -> str:
+def _words(view: View) -> Html:
     picture = plots.words(view)
-    return _section("Words", _image(picture, "words asked and got")) if picture else ""
+    return build_section("Words", build_image(picture, "words asked and got")) if picture else Html()
 
 
-def _moments(view: View, report: Mapping) -> str:
+def _moments(view: View, report: Mapping) -> Html:
     if not view.moments:
-        return ""
+        return Html()
     parts = []
     for moment, told in list(zip(view.moments, report["keys"]))[:MOST_MOMENTS]:
         name = f"{moment.asked.time:.2f} s: {' '.join(moment.asked.words)}"
-        picture = _image(plots.strip(view, _around(view, moment.frame), moment.frame), f"stick figures at {name}")
-        parts.append(f"<h3>{escape(name)}</h3>\n<p class=quiet>{escape(_told(told))}</p>\n{picture}")
+        parts += [element("h3", name), element("p", _told(told), class_="quiet"), _strip(view, moment.frame, name)]
     left = len(view.moments) - MOST_MOMENTS
-    more = f"<p class=quiet>and {left} more, in the table below</p>" if left > 0 else ""
-    return _section("Key moments", "\n".join(parts) + more)
+    if left > 0:
+        parts.append(element("p", f"and {left} more, in the table below", class_="quiet"))
+    return build_section("Key moments", *parts)
+
+
+def _strip(view: View, frame: int, name: str) -> Html:
+    return build_image(plots.strip(view, _around(view, frame), frame), f"stick figures at {name}")
 
 
 def _told(key: Mapping) -> str:
@@ -136,13 +122,12 @@ def _told(key: Mapping) -> str:
     return "; ".join(out)
 
 
-def _worst(view: View) -> str:
+def _worst(view: View) -> Html:
     parts = []
     for frame, reason in worst_frames(view):
         name = f"{view.played.times[frame]:.2f} s: {reason}"
-        picture = _image(plots.strip(view, _around(view, frame), frame), f"stick figures at {name}")
-        parts.append(f"<h3>{escape(name)}</h3>\n{picture}")
-    return _section("Worst seconds", "\n".join(parts)) if parts else ""
+        parts += [element("h3", name), _strip(view, frame, name)]
+    return build_section("Worst seconds", *parts) if parts else Html()
 
 
 def worst_frames(view: View) -> list[tuple[int, str]]:
@@ -167,39 +152,29 @@ def _around(view: View, frame: int) -> list[int]:
     return np.unique(np.clip(frames, 0, view.count - 1)).tolist()
 
 
-def _figures(report: Mapping) -> str:
-    head = "<tr><th>figure<th class=n>value<th class=n>recordings<th>target<th></tr>"
-    lines = [
-        f"<tr><td>{escape(row.name)}<td class=n>{escape(row.value)}<td class=n>{escape(row.own)}"
-        f"<td>{escape(row.target)}<td class={row.status or 'quiet'}>{row.status}</tr>"
-        for row in judged(report)
-        if not row.name.startswith("keys ")
-    ]
-    table = f"<div class=scroll><table>{head}\n" + "\n".join(lines) + "\n</table></div>"
-    return _section("All figures", table + _key_table(report))
+def _figures(report: Mapping) -> Html:
+    head = ("figure", build_title("value"), build_title("recordings"), "target", "")
+    rows = [
+        build_row(
+            row.name, element("td", row.value, class_="n"), element("td", row.own, class_="n"), row.target,
+            element("td", row.status, class_=row.status or "quiet"),
+        ) for row in judged(report) if not row.name.startswith("keys ")
+    ]  # fmt: skip
+    return build_section("All figures", build_table(head, rows), _key_table(report))
 
 
-def _key_table(report: Mapping) -> str:
+def _key_table(report: Mapping) -> Html:
     """One line per key moment, one column per figure; the targets stand in the head."""
     if not report["keys"]:
-        return ""
+        return Html()
     rows = {row.name: row for row in judged(report)}
     numbers = range(1, len(report["keys"]) + 1)
     known = {leaf: [rows[name] for k in numbers if (name := f"keys {k}.{leaf}") in rows] for leaf in report["keys"][0]}
     columns = {leaf: found[0].target for leaf, found in known.items() if found}
-    head = "".join(f"<th>{escape(leaf)}<br><span class=quiet>{escape(aim)}</span>" for leaf, aim in columns.items())
     lines = []
     for number in numbers:
         cells = [rows.get(f"keys {number}.{leaf}") for leaf in columns]
-        told = [f"<td class={cell.status or 'plain'}>{escape(cell.value)}" if cell else "<td>–" for cell in cells]
-        lines.append(f"<tr><td>{number}{''.join(told)}</tr>")
-    table = f"<table class=keys><tr><th>{head}</tr>\n" + "\n".join(lines) + "\n</table>"
-    return f"<h3>Key moments</h3><div class=scroll>{table}</div>"
-
-
-def _section(title: str, body: str) -> str:
-    return f"<h2>{escape(title)}</h2>\n{body}"
-
-
-def _image(png: bytes, text: str) -> str:
-    return f'<img alt="{escape(text)}" src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}">'
+        told = [element("td", cell.value, class_=cell.status or "plain") if cell else "–" for cell in cells]
+        lines.append(build_row(str(number), *told))
+    head = ("", *(build_title(leaf, aim, class_="") for leaf, aim in columns.items()))
+    return fragment(element("h3", "Key moments"), build_table(head, lines, class_="keys"))

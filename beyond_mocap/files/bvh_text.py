@@ -7,6 +7,7 @@ body would come out wrong.
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from dataclasses import dataclass
@@ -16,7 +17,6 @@ import numpy as np
 
 from ..errors import InputError
 from .content import content
-from .decimal_text import read_table
 
 POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
@@ -266,7 +266,7 @@ def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
     if not text or text.isspace():
         raise InputError(f"{path}:{line}", "no rows of motion", f"rows of {columns} numbers", _DAMAGED)
     try:
-        values = read_table(text)
+        values = np.loadtxt(io.BytesIO(text), comments=None, ndmin=2) + 0.0  # a zero has no minus
         if values.shape[1] == columns and -1e300 < values.min() and values.max() < 1e300:
             return values
     except ValueError:

@@ -23,13 +23,13 @@ _DETAILS = {
     "KICK_OFF": "kick-off", "PENALTY": "penalty", "SLIDING_TACKLE": "sliding", "CROSS": "cross",
     "HIGH_PASS": "high", "LONG_BALL": "long", "LAUNCH": "long", "CHIPPED_PASS": "chipped",
 }  # fmt: skip
-_ONLY_RIGHT = {"impect"}  # providers of whom kloppy says "right foot" for either
 _GOOD = {"COMPLETE", "GOAL", "WON", "SUCCESS"}
 _BAD = {"INCOMPLETE", "OUT", "OFFSIDE", "OFF_TARGET", "POST", "BLOCKED", "SAVED", "LOST"}
 
 
-def kind_of(event, provider: str) -> tuple[str, str, str, tuple[str, ...], bool | None]:
-    """Kind, part, side, details and success of one of kloppy's events."""
+def kind_of(event, tells_foot: bool) -> tuple[str, str, str, tuple[str, ...], bool | None]:
+    """Kind, part, side, details and success of one of kloppy's events. tells_foot: whether its provider tells left
+    feet from right ones."""
     names = [_name(one) for one in getattr(event, "qualifiers", None) or ()]
     result = getattr(getattr(event, "result", None), "name", "")
     success = True if result in _GOOD else False if result in _BAD else None
@@ -47,7 +47,7 @@ def kind_of(event, provider: str) -> tuple[str, str, str, tuple[str, ...], bool 
     if event.event_type.name == "GOALKEEPER":
         kind = next((_BY_KEEPER[name] for name in names if name in _BY_KEEPER), kind)
         part = part or "hand"
-    if provider in _ONLY_RIGHT or part != "foot":
+    if not tells_foot or part != "foot":
         side = ""
     return kind, part, side, tuple(dict.fromkeys(details)), success
 

@@ -80,12 +80,13 @@ def _position(player) -> str:
     return "" if said in ("unknown", "none") or "." in said else said
 
 
-def pitch_of(dataset, pitch: tuple[float, float] | None) -> tuple[float, float, bool]:
-    """Length, width in metres, and whether they are a guess because the feed has none and nobody told."""
+def pitch_of(dataset, pitch: tuple[float, float] | None, in_feed: bool) -> tuple[float, float, bool]:
+    """Length, width in metres, and whether they are a default because neither the feed nor `pitch` has them.
+    in_feed: whether the provider has them."""
     size = dataset.metadata.pitch_dimensions
     length, width = size.pitch_length, size.pitch_width
     kloppys_guess = size.unit.name == "NORMED" and (length, width) == USUAL_PITCH
-    if length and width and not kloppys_guess and dataset.metadata.provider.name not in ("SPORTVU", "STATSPERFORM"):
+    if length and width and not kloppys_guess and in_feed:
         return float(length), float(width), False
     return (*(pitch or USUAL_PITCH), pitch is None)
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,13 +10,12 @@ from itertools import islice
 from pathlib import Path
 
 from ..errors import InputError
-from .providers import Feed
+from .feed import Feed
 
 MOST_PLAYERS = 60
 """Two squads of 26 and the referees have fewer; more is two matches in one file."""
 
 _STRANGERS = 0.3  # share of the players whom the metadata does not know, from which it is another match's
-_OWN_ROSTER = {"secondspectrum"}  # whose names come in a further file that nothing else depends on
 _COMPARED = 200  # rows of two teams' files that must tell of one ball
 _LATE = 5.0  # seconds by which a half may begin late or end early untold
 _OTHER = "take the files of one match"
@@ -26,38 +23,23 @@ _OTHER = "take the files of one match"
 
 def check_same_match(feed: Feed) -> None:
     """InputError where the files name two matches: by its number, or by two teams' files with two balls."""
-    if feed.provider == "sportec":
-        _same_id(feed, rb'MatchId="([^"]{1,60})"', rb'MatchId="([^"]{1,60})"')
-    elif feed.provider == "pff":
-        _same_id(feed, rb'"gameRefId"\s*:\s*"?(\d+)', None)
-    elif feed.provider == "metrica" and not feed.meta:
+    if feed.by_teams:
         balls = [_balls(path) for path in feed.tracking]
         differing = sum(one != other for one, other in zip(*balls))
         if differing > 0.1 * min(map(len, balls)):
             found = f"another ball in {differing} of {min(map(len, balls))} rows than in {feed.tracking[1].name}"
             raise InputError(feed.path, found, "two teams of one match", _OTHER)
+    elif feed.provider.number_in_tracking and feed.provider.number_in_metadata:
+        _check_same_number(feed)
 
 
-def _same_id(feed: Feed, in_tracking: bytes, in_meta: bytes | None) -> None:
+def _check_same_number(feed: Feed) -> None:
     with open(feed.path, "rb") as file:
-        tracked = re.search(in_tracking, file.read(65536))
-    said = feed.meta[0].read_bytes()[:262144]
-    if in_meta:
-        told = re.search(in_meta, said)
-        number = told and told[1].decode("utf-8", "replace")
-    else:
-        number = _number_of(said)
-    if tracked and number and tracked[1].decode("utf-8", "replace") != number:
-        found = f"match {tracked[1].decode('utf-8', 'replace')}, but {feed.meta[0].name} is of match {number}"
+        tracked = feed.provider.number_in_tracking(file.read(65536))
+    number = feed.provider.number_in_metadata(feed.meta[0].read_bytes()[:262144])
+    if tracked and number and tracked != number:
+        found = f"match {tracked}, but {feed.meta[0].name} is of match {number}"
         raise InputError(feed.path, found, "tracking and metadata of one match", _OTHER)
-
-
-def _number_of(said: bytes) -> str | None:
-    """The match's number in PFF's metadata."""
-    with contextlib.suppress(ValueError, TypeError, KeyError, IndexError):
-        value = json.loads(said)
-        return str((value[0] if isinstance(value, list) else value)["id"])
-    return None
 
 
 def _balls(path: Path) -> list[tuple[str, ...]]:
@@ -68,8 +50,8 @@ def _balls(path: Path) -> list[tuple[str, ...]]:
 
 
 def check_rows(feed: Feed) -> list[str]:
-    """A line where the two teams' files of Metrica's CSV have not as many rows: frames are those that both have."""
-    if feed.provider != "metrica" or feed.meta:
+    """A line where two teams' files have not as many rows: frames are those that both have."""
+    if not feed.by_teams:
         return []
     rows = [sum(bool(line.strip()) for line in path.read_bytes().splitlines()) for path in feed.tracking]
     if rows[0] == rows[1]:
@@ -91,7 +73,7 @@ def check_players(players, dataset, feed: Feed) -> list[str]:
     if not strangers:
         return []
     names = ", ".join(f"{player.team.ground} {player.jersey_no}" for player in strangers[:6])
-    known = feed.meta and feed.provider not in _OWN_ROSTER
+    known = feed.meta and not feed.provider.has_own_roster
     if known and len(strangers) > _STRANGERS * len(players) and len(away) >= len(strangers) // 2:
         found = f"{len(strangers)} of {len(players)} tracked players ({names}) are not in {feed.meta[0].name}"
         raise InputError(feed.path, found, "tracking and metadata of one match", _OTHER)

@@ -1,119 +1,84 @@
-"""Whose form a tracking file has, which files belong to it, and kloppy's reader for it."""
+"""The providers of tracking, one record each, and the files of a match that belong together.
+
+All that is special to a provider stands in its record, and in the functions that only this record names.
+"""
 
 from __future__ import annotations
 
-import importlib
-import logging
+import contextlib
+import json
 import os
 import re
-import warnings
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from ..errors import InputError
-
-PROVIDERS = (
-    "tracab", "metrica", "skillcorner", "sportec", "secondspectrum", "statsperform", "pff", "signality", "hawkeye",
-)  # fmt: skip
+from .feed import Feed, Files, TrackingProvider, find_provider, load_through_kloppy, read_head
+from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
 _META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.json", "{}.xml", "{}.json")
-_TEAMS = (("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home"))
-_BY_LINES = {".dat", ".csv", ".txt", ".jsonl"}  # endings of files that are read line by line
-
-_FORMS = (
-    ("tracab", re.compile(rb"\s*\d+:-?\d+,-?\d+,-?\d+,-?\d+,-?\d+,")),
-    ("tracab", re.compile(rb'\s*\{[^{]{0,200}"FrameData"')),
-    ("metrica", re.compile(rb"\s*,,,(Home|Away|[^,\r\n]*),", re.IGNORECASE)),
-    ("metrica", re.compile(rb"\s*\d+:(-?\d*\.\d+|NaN),(-?\d*\.\d+|NaN)", re.IGNORECASE)),
-    ("statsperform", re.compile(rb"\s*\d{10,};\d")),
-    ("signality", re.compile(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"')),
-    ("hawkeye", re.compile(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"')),
-    ("pff", re.compile(rb'(?s)\s*\{.{0,400}"gameRefId"')),
-    ("secondspectrum", re.compile(rb'(?s)\s*\{.{0,4000}"homePlayers"')),
-    ("skillcorner", re.compile(rb'(?s)\s*[\[{].{0,4000}("trackable_object"|"image_corners_projection"|"player_data")')),
-    ("sportec", re.compile(rb"(?s)\s*<.{0,4000}<Positions\b")),
-)
 
 
-@dataclass(frozen=True)
-class Feed:
-    """The files of one match. tracking: in the order of time; for Metrica's CSV the home and the away team's. meta:
-    the metadata first, None where the provider needs none, then what else belongs to it."""
-
-    provider: str
-    tracking: tuple[Path, ...]
-    meta: tuple[Path, ...] = ()
-
-    @property
-    def path(self) -> Path:
-        """The first tracking file."""
-        return self.tracking[0]
-
-    @property
-    def by_lines(self) -> bool:
-        """Whether a tracking file that ends too early still has whole lines."""
-        return self.path.suffix.lower() in _BY_LINES
-
-
-def feed_of(path: str | os.PathLike, meta: str | os.PathLike | None, provider: str | None) -> tuple[Feed, list[str]]:
+def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider: str | None) -> tuple[Feed, list[str]]:
     """The files that belong together, and what was guessed of them; arguments and errors as for `read_match`."""
-    path = _existing(path)
-    provider, notes = (provider.lower(), []) if provider else _guessed_provider(path)
-    if provider not in PROVIDERS:
-        raise InputError("provider", f"{provider!r}", f"one of {', '.join(PROVIDERS)}")
-    if provider == "hawkeye":
-        return _hawkeye_feed(path, meta, notes), notes
-    meta = _existing(meta) if meta else _meta_beside(path, provider, notes)
-    tracking, more = (path,), ()
-    if provider == "metrica" and path.suffix.lower() == ".csv":
-        tracking, meta = ((meta, path) if "away" in path.name.lower() else (path, meta)), None
-    elif provider == "signality":
-        tracking, more = _phases(path, notes), (_beside(meta, "venue", path, notes),)
-    elif provider == "pff":
-        more = (_beside(meta, "roster", path, notes),)
-    elif provider == "secondspectrum" and meta.suffix.lower() == ".xml":
-        names = meta.with_suffix(".json")
-        more = (names,) if names.is_file() else ()
-        notes += [f"{names.name} taken for the names of the players"] * bool(more)
-    return Feed(provider, tracking, (*((meta,) if meta else ()), *more)), notes
+    path, notes = _check_file(path), []
+    if provider and provider.lower() not in PROVIDERS:
+        raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}")
+    record = PROVIDERS[provider.lower()] if provider else _guess_provider(path, notes)
+    second = _check_file(meta) if meta else _find_metadata(path, record, notes) if record.needs_metadata else None
+    return Feed(record, *record.find_files(path, second, notes)), notes
 
 
-def _existing(path: str | os.PathLike) -> Path:
+def load_tracking(feed: Feed, pitch: tuple[float, float]):
+    """kloppy's dataset in the provider's own coordinates; pitch: length and width, m, for a feed without them.
+    InputError where kloppy is not installed or cannot read the files."""
+    record, files, half = feed.provider, list(map(str, feed.tracking)), len(feed.tracking) // 2
+    meta, more, *_ = [*map(str, feed.meta), None, None]
+    known = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
+             "length": pitch[0], "width": pitch[1]}  # fmt: skip
+    arguments = {key: known[name] for key, name in record.arguments.items()}
+    if feed.by_teams:
+        arguments = {"home_data": files[0], "away_data": files[1]}
+    arguments["coordinates"] = record.coordinates or record.name
+    others = f" and its metadata {', '.join(one.name for one in feed.meta) or feed.tracking[-1].name}"
+    loader = record.team_loader if feed.by_teams else record.loader
+    return load_through_kloppy(feed.path, record.name, loader, arguments, f"{record.name} tracking", others)
+
+
+def _check_file(path: str | os.PathLike) -> Path:
     if not Path(path).is_file():
         found = "is a folder" if Path(path).is_dir() else "no such file"
         raise InputError(path, found, "a tracking file", "check the path")
     return Path(path)
 
 
-def _guessed_provider(path: Path) -> tuple[str, list[str]]:
-    with open(path, "rb") as file:
-        head = file.read(8192).removeprefix(b"\xef\xbb\xbf")
-    for provider, form in _FORMS:
-        if form.match(head):
-            return provider, [f"{path.name} read as {provider}"]
-    if not head.strip():
+def _guess_provider(path: Path, notes: list[str]) -> TrackingProvider:
+    record = find_provider(path, PROVIDERS)
+    if record is not None:
+        notes.append(f"{path.name} read as {record.name}")
+        return record
+    if not read_head(path).strip():
         raise InputError(path, "an empty file", "positions", "export it again")
     expected = f"a CSV file with time_s,x_m,y_m, or one of {', '.join(PROVIDERS)}"
     raise InputError(path, "a form that is not known", expected, "name the columns so, or the provider")
 
 
-def _meta_beside(path: Path, provider: str, notes: list[str]) -> Path:
+def _find_metadata(path: Path, record: TrackingProvider, notes: list[str]) -> Path:
     """The metadata file that the tracking file's name leads to."""
-    names = [form.format(path.stem) for form in _META_NAMES]
-    if provider == "metrica":
-        names = [path.name.replace(a, b) for a, b in _TEAMS if a in path.name] + names
+    names = [path.name.replace(a, b) for a, b in record.renamed if a in path.name]
+    names += [form.format(path.stem) for form in _META_NAMES]
     for name in names:
         beside = path.with_name(name)
         if beside.is_file() and beside != path:
             notes.append(f"{name} taken as its {'second' if beside.suffix == path.suffix else 'metadata'} file")
             return beside
     raise InputError(
-        path, f"no metadata file beside it for {provider}", names[0],
+        path, f"no metadata file beside it for {record.name}", names[0],
         "put it there, or name it (--meta, in Blender Metadata)",
     )
 
 
-def _beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
+def _find_beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
     """The one other file that a provider needs, with `word` in its own or its folder's name; of several the one that
     shares the numbers in the metadata's or the tracking file's name."""
     folders = {meta.parent, path.parent, *(one for one in meta.parent.parent.glob("*") if word in one.name.lower())}
@@ -133,15 +98,50 @@ def _beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
     return chosen[0]
 
 
-def _phases(path: Path, notes: list[str]) -> tuple[Path, ...]:
-    """The files of all halves, where this one's name has p1 or p2 in it."""
+def _find_number(pattern: bytes, content: bytes) -> str | None:
+    found = re.search(pattern, content)
+    return found and found[1].decode("utf-8", "replace")
+
+
+_find_sportec_number = partial(_find_number, rb'MatchId="([^"]{1,60})"')
+
+
+def _find_metrica(path: Path, meta: Path, notes: list[str]) -> Files:
+    """CSV, a file for each team, or EPTS, text with XML."""
+    if path.suffix.lower() != ".csv":
+        return (path,), (meta,)
+    return ((meta, path) if "away" in path.name.lower() else (path, meta)), ()
+
+
+def _find_secondspectrum(path: Path, meta: Path, notes: list[str]) -> Files:
+    """A JSON beside the XML brings names."""
+    names = meta.with_suffix(".json")
+    if meta.suffix.lower() != ".xml" or not names.is_file():
+        return (path,), (meta,)
+    notes.append(f"{names.name} taken for the names of the players")
+    return (path,), (meta, names)
+
+
+def _find_pff(path: Path, meta: Path, notes: list[str]) -> Files:
+    return (path,), (meta, _find_beside(meta, "roster", path, notes))
+
+
+def _find_pff_number(metadata: bytes) -> str | None:
+    with contextlib.suppress(ValueError, TypeError, KeyError, IndexError):
+        value = json.loads(metadata)
+        return str((value[0] if isinstance(value, list) else value)["id"])
+    return None
+
+
+def _find_signality(path: Path, meta: Path, notes: list[str]) -> Files:
+    """A file for each half, where the name has p1 or p2 in it, and the venue."""
     names = [re.sub(r"(?i)(?<![a-z0-9])(p)[1-5](?![0-9])", rf"\g<1>{number}", path.name) for number in range(1, 6)]
     found = tuple(dict.fromkeys(path.with_name(name) for name in names if path.with_name(name).is_file()))
     notes += [f"{', '.join(one.name for one in found)} taken as one match"] * (len(found) > 1)
-    return found or (path,)
+    return found or (path,), (meta, _find_beside(meta, "venue", path, notes))
 
 
-def _hawkeye_feed(path: Path, meta: str | os.PathLike | None, notes: list[str]) -> Feed:
+def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
     """All files of a folder, one a minute: the players', then as many of the ball."""
     def minute(file: Path) -> list[int]:
         return [int(number) for number in re.findall(r"\d+", file.name)]
@@ -152,58 +152,66 @@ def _hawkeye_feed(path: Path, meta: str | os.PathLike | None, notes: list[str]) 
         found = f"{len(players)} files of players and {len(balls)} of the ball"
         raise InputError(path.parent, found, "one .samples.ball for every .samples.centroids", "complete the folder")
     notes.append(f"{len(players)} files of players and of the ball in {path.parent.name or path.parent} taken")
-    return Feed("hawkeye", (*players, *balls), (_existing(meta),) if meta else ())
+    return (*players, *balls), (meta,) if meta else ()
 
 
-def load(feed: Feed, pitch: tuple[float, float]):
-    """kloppy's dataset in the provider's own coordinates; `pitch` in metres for a feed that must be told. InputError
-    where kloppy is not installed or cannot read the files."""
-    try:
-        reader = importlib.import_module(f"kloppy.{feed.provider}")
-    except ImportError as error:
-        raise InputError(
-            feed.path, f"kloppy cannot be imported ({error})", "kloppy 3.19 or newer",
-            "pip install 'beyond-mocap[tracking]'",
-        ) from None
-    logging.getLogger("kloppy").addHandler(logging.NullHandler())  # what it would print is in our own lines
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return _read_with(reader, feed, pitch)
-    except Exception as error:  # kloppy raises whatever its parsers meet in a wrong file
-        found = f"not readable as {feed.provider} ({type(error).__name__}: {str(error)[:120]})"
-        names = ", ".join(one.name for one in feed.meta) or feed.tracking[-1].name
-        expected = f"a {feed.provider} file and its metadata {names}"
-        raise InputError(feed.path, found, expected, "check both, and the provider") from None
-
-
-def _read_with(reader, feed: Feed, pitch: tuple[float, float]):
-    """One provider's loader; their argument names differ. Metrica has CSV (a file per team) and EPTS (text with
-    XML)."""
-    raw, provider = str(feed.path), feed.provider
-    meta, *more = [*map(str, feed.meta), None]
-    if provider == "metrica" and meta is None:
-        home, away = map(str, feed.tracking)
-        return reader.load_tracking_csv(home_data=home, away_data=away, coordinates="metrica")
-    if provider == "metrica":
-        return reader.load_tracking_epts(meta_data=meta, raw_data=raw, coordinates="metrica")
-    if provider == "statsperform":
-        return reader.load_tracking(
-            ma1_data=meta, ma25_data=raw, pitch_length=pitch[0], pitch_width=pitch[1], coordinates="sportvu"
-        )
-    if provider == "pff":
-        return reader.load_tracking(meta_data=meta, roster_meta_data=more[0], raw_data=raw, coordinates="pff")
-    if provider == "signality":
-        feeds = list(map(str, feed.tracking))
-        return reader.load(meta_data=meta, raw_data_feeds=feeds, venue_information=more[0], coordinates="signality")
-    if provider == "hawkeye":
-        half = len(feed.tracking) // 2
-        players, balls = list(map(str, feed.tracking[:half])), list(map(str, feed.tracking[half:]))
-        return reader.load(
-            ball_feeds=balls, player_centroid_feeds=players, meta_data=meta, pitch_length=pitch[0],
-            pitch_width=pitch[1], coordinates="hawkeye",
-        )
-    if provider == "secondspectrum":
-        return reader.load(meta_data=meta, raw_data=raw, additional_meta_data=more[0], coordinates=provider)
-    read = reader.load_tracking if provider == "sportec" else reader.load
-    return read(meta_data=meta, raw_data=raw, coordinates=provider)
+# in the order of the choices that saved scenes number: a new one goes to the end
+PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
+    TrackingProvider(
+        name="tracab", title="TRACAB", files="`.dat` or `.json`, metadata `.xml` or `.json`; referees too",
+        patterns=(rb"\s*\d+:-?\d+,-?\d+,-?\d+,-?\d+,-?\d+,", rb'\s*\{[^{]{0,200}"FrameData"'),
+        read_referees=read_tracab_referees,
+    ),
+    TrackingProvider(
+        name="metrica", title="Metrica", files="CSV, a file per team; or EPTS text with its XML",
+        patterns=(rb"(?i)\s*,,,(Home|Away|[^,\r\n]*),", rb"(?i)\s*\d+:(-?\d*\.\d+|NaN),(-?\d*\.\d+|NaN)"),
+        renamed=(("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home")),
+        find_files=_find_metrica, loader="load_tracking_epts", team_loader="load_tracking_csv",
+    ),
+    TrackingProvider(
+        name="skillcorner", title="SkillCorner", files="`.json` or `.jsonl` with the match's JSON",
+        patterns=(rb'(?s)\s*[\[{].{0,4000}("trackable_object"|"image_corners_projection"|"player_data")',),
+    ),
+    TrackingProvider(
+        name="sportec", title="Sportec (DFL)",
+        files="positions XML with the match information XML; referees, colours of shirts",
+        patterns=(rb"(?s)\s*<.{0,4000}<Positions\b",), loader="load_tracking",
+        number_in_tracking=_find_sportec_number, number_in_metadata=_find_sportec_number,
+        read_referees=read_sportec_referees,
+    ),
+    TrackingProvider(
+        name="secondspectrum", title="Second Spectrum",
+        files="`.jsonl` with its XML (a JSON of the same name brings names), or with its JSON",
+        patterns=(rb'(?s)\s*\{(?!.{0,400}"gameRefId").{0,4000}"homePlayers"',), find_files=_find_secondspectrum,
+        arguments={"meta_data": "meta", "raw_data": "raw", "additional_meta_data": "more"}, has_own_roster=True,
+    ),
+    TrackingProvider(
+        name="statsperform", title="Stats Perform", files="MA25 text with MA1", patterns=(rb"\s*\d{10,};\d",),
+        loader="load_tracking", coordinates="sportvu", has_pitch_size=False,
+        arguments={"ma1_data": "meta", "ma25_data": "raw", "pitch_length": "length", "pitch_width": "width"},
+    ),
+    TrackingProvider(
+        name="pff", title="PFF",
+        files="`.jsonl`, metadata, and the roster (in the same folder, or in one with `roster` in its name); colours "
+              "of shirts",
+        patterns=(rb'(?s)\s*\{.{0,400}"gameRefId"',), find_files=_find_pff, loader="load_tracking",
+        arguments={"meta_data": "meta", "raw_data": "raw", "roster_meta_data": "more"},
+        number_in_tracking=partial(_find_number, rb'"gameRefId"\s*:\s*"?(\d+)'), number_in_metadata=_find_pff_number,
+    ),
+    TrackingProvider(
+        name="signality", title="Signality",
+        files="`..p1...json` (the other half's is found by its name), metadata, and the file with `venue` in its "
+              "name; referees",
+        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"',), find_files=_find_signality,
+        arguments={"meta_data": "meta", "raw_data_feeds": "all", "venue_information": "more"},
+        read_referees=read_signality_referees,
+    ),
+    TrackingProvider(
+        name="hawkeye", title="HawkEye",
+        files="any file of a folder: all its `.samples.centroids` and `.samples.ball` are taken; metadata if there is "
+              "any",
+        patterns=(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"',), find_files=_find_hawkeye, needs_metadata=False,
+        arguments={"player_centroid_feeds": "first", "ball_feeds": "second", "meta_data": "meta",
+                   "pitch_length": "length", "pitch_width": "width"},
+    ),
+)}  # fmt: skip

@@ -1,32 +1,29 @@
-"""Referees in tracking files; kloppy leaves them out, so they are read here, of the providers that have them."""
+"""Referees in tracking files; kloppy leaves them out, so they are read here, for the providers that have them."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 
 import numpy as np
 
+from .feed import Feed, Samples
 from .match_data import REFEREE
-from .providers import Feed
 
-_HAVE_THEM = {"tracab", "sportec", "signality"}
 _TRACAB_CODE = 3
 _TRACAB = re.compile(rb"[;:]3,(-?\d+),(-?\d+),(-?\d+\.?\d*),(-?\d+\.?\d*),")
-_SAMPLE = tuple[int, str, float, float]  # frame, who, x and y in the provider's coordinates
 
 
 def referee_samples(feed: Feed, frames: np.ndarray) -> tuple[list[str], np.ndarray, list[str]]:
     """Ids of the R referees in a feed, where they are (R, N, 2) in the provider's coordinates, NaN where they are not
     known, and lines: samples that cannot be read end them. frames: (N,) the numbers of kloppy's frames."""
-    if feed.provider not in _HAVE_THEM:
+    if feed.provider.read_referees is None:
         return [], np.empty((0, len(frames), 2)), []
     row = {int(frame): index for index, frame in enumerate(frames)}
     found: dict[str, np.ndarray] = {}
     lines, frame = [], "the first"
     try:
-        for frame, who, x, y in _samples(feed):
+        for frame, who, x, y in feed.provider.read_referees(feed):
             if frame in row:
                 found.setdefault(who, np.full((len(frames), 2), np.nan))[row[frame]] = x, y
     except (ValueError, TypeError, LookupError, AttributeError, SyntaxError) as error:  # SyntaxError: of XML
@@ -40,18 +37,12 @@ def described_referee(id_: str) -> tuple[str, str, str, str, str]:
     return id_, REFEREE, id_.replace("_", " "), "-1", ""
 
 
-def _samples(feed: Feed) -> Iterator[_SAMPLE]:
-    if feed.provider == "tracab" and feed.path.suffix.lower() != ".json":
-        yield from _tracab_lines(feed)
-    elif feed.provider == "tracab":
-        yield from _tracab_json(feed)
-    elif feed.provider == "sportec":
-        yield from _sportec(feed)
-    else:
-        yield from _signality(feed)
+def read_tracab_referees(feed: Feed) -> Samples:
+    """Those of TRACAB's two forms, lines and JSON."""
+    return _tracab_json(feed) if feed.path.suffix.lower() == ".json" else _tracab_lines(feed)
 
 
-def _tracab_lines(feed: Feed) -> Iterator[_SAMPLE]:
+def _tracab_lines(feed: Feed) -> Samples:
     with open(feed.path, "rb") as file:
         for line in file:
             if b";3," in line or b":3," in line:
@@ -60,14 +51,15 @@ def _tracab_lines(feed: Feed) -> Iterator[_SAMPLE]:
                     yield int(frame), f"referee_{int(who[1])}", float(who[2]), float(who[3])
 
 
-def _tracab_json(feed: Feed) -> Iterator[_SAMPLE]:
+def _tracab_json(feed: Feed) -> Samples:
     for frame in json.loads(feed.path.read_bytes()).get("FrameData", ()):
         for who in frame["PlayerPositions"]:
             if who["Team"] == _TRACAB_CODE:
                 yield int(frame["FrameCount"]), f"referee_{who['JerseyNumber']}", float(who["X"]), float(who["Y"])
 
 
-def _sportec(feed: Feed) -> Iterator[_SAMPLE]:
+def read_sportec_referees(feed: Feed) -> Samples:
+    """Those of Sportec's positions."""
     from xml.etree.ElementTree import iterparse
 
     who = ""
@@ -82,7 +74,8 @@ def _sportec(feed: Feed) -> Iterator[_SAMPLE]:
             element.clear()
 
 
-def _signality(feed: Feed) -> Iterator[_SAMPLE]:
+def read_signality_referees(feed: Feed) -> Samples:
+    """Those of Signality's halves, whose frames are counted through."""
     before = 0
     for path in feed.tracking:
         frames = json.loads(path.read_bytes())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from .providers import Feed
+from .feed import Feed
 
 _COLOUR = re.compile(r"#?([0-9a-fA-F]{6})")
 _JSON_COLOUR = r'"{side}_?[tT]eam_?[kK]it"\s*:\s*\{{[^{{}}]*?"(?:primaryColor|jersey_color)"\s*:\s*"([^"]+)"'

@@ -17,10 +17,11 @@ from ..errors import InputError
 from ..motion.skeleton import frozen_array
 from ..motion.track import Track
 from . import match_arrays
+from .feed import Feed
 from .match_checks import check_periods, check_players, check_rows, check_same_match, whole_lines
 from .match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
 from .match_mending import mended_ball, mended_players, mended_sides, side_lines
-from .providers import Feed, feed_of, load
+from .providers import find_feed, load_tracking
 from .referees import described_referee, referee_samples
 from .tables import number, read_rows
 from .team_colours import team_colours
@@ -87,7 +88,7 @@ def read_match(
     right in its report. InputError where files are missing, not of that form or not of one match, and where kloppy is
     not installed.
     """
-    feed, notes = feed_of(path, meta, provider)
+    feed, notes = find_feed(path, meta, provider)
     cache = _cache_folder(cache_dir) / f"{_key(feed, pitch)}.npz"
     arrays = _cached(cache)
     if arrays is None:
@@ -101,13 +102,13 @@ def _read(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray
     check_same_match(feed)
     size = pitch or match_arrays.USUAL_PITCH
     try:
-        return _arrays(load(feed, size), feed, pitch)
+        return _arrays(load_tracking(feed, size), feed, pitch)
     except InputError:
         if not feed.by_lines or all(path.read_bytes()[-1:] == b"\n" for path in feed.tracking):
             raise
         with whole_lines(feed) as shorter:
             try:
-                dataset = load(shorter, size)
+                dataset = load_tracking(shorter, size)
             except InputError:
                 dataset = None
         if dataset is None:
@@ -123,9 +124,8 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     players = match_arrays.tracked_players(records)
     lines += check_players(players, dataset, feed)
     times, periods = match_arrays.clock(records)
-    length, width, guessed = match_arrays.pitch_of(dataset, pitch)
-    upward = feed.path.suffix.lower() == ".csv"
-    metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward)
+    length, width, guessed = match_arrays.pitch_of(dataset, pitch, feed.provider.has_pitch_size)
+    metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward=feed.by_teams)
     ball = match_arrays.ball_samples(records)
     ball = np.concatenate([metric(ball[:, :2]), ball[:, 2:] * match_arrays.height_unit(dataset)], axis=1)
     referees, places, of_referees = referee_samples(feed, np.array([frame.frame_id for frame in records]))
@@ -171,7 +171,7 @@ def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match
         length=length,
         width=width,
         fps=fps,
-        provider=feed.provider,
+        provider=feed.provider.name,
         periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()),
         notes=tuple(notes),
         teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
@@ -189,7 +189,7 @@ def _cache_folder(folder: str | os.PathLike | None) -> Path:
 
 def _key(feed: Feed, pitch: tuple[float, float] | None) -> str:
     """Names the arrays of these contents, whatever the files are called."""
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider} {pitch}".encode())
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch}".encode())
     for file in (*feed.tracking, *feed.meta):
         with open(file, "rb") as stream:
             digest.update(hashlib.file_digest(stream, "sha256").digest())

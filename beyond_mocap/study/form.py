@@ -9,9 +9,9 @@ import csv
 import io
 import json
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 
+from ..evaluation.html_page import Html, build_page, build_section, element, fragment
 from .order import Study
 from .questions import BACKGROUND, COMPARE, INTRODUCTION, RATE, SAME, SCALE
 
@@ -19,8 +19,7 @@ MOVIES = (".mp4", ".webm", ".m4v", ".mov", ".gif")
 """What browsers show."""
 ANSWER_COLUMNS = ("study", "rater", "question", "answer")
 _STYLE = """
-body { font: 17px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 900px; margin: 1.5em auto;
-  padding: 0 1em }
+body { font-size: 17px; line-height: 1.5; max-width: 900px } p { margin: .8em 0 }
 video, img { width: 100%; max-height: 65vh; background: #000; display: block; border-radius: 4px }
 .pair { display: grid; grid-template-columns: 1fr 1fr; gap: .6em } .pair p { text-align: center }
 fieldset { border: 1px solid #ccc; border-radius: 6px; margin: 1em 0; padding: .6em 1em } legend { font-weight: 600 }
@@ -28,7 +27,7 @@ label { display: inline-block; padding: .5em .8em; margin: .2em; border: 1px sol
   cursor: pointer }
 label:has(input:checked) { background: #e3edf8; border-color: #2563a8 }
 label:focus-within { outline: 2px solid #2563a8 }
-button { font: inherit; padding: .5em 1.4em; margin: .4em .6em .4em 0 } .quiet { color: #666 }
+button { font: inherit; padding: .5em 1.4em; margin: .4em .6em .4em 0 }
 [hidden] { display: none } progress { width: 100% }
 """
 _SCRIPT = """
@@ -90,13 +89,12 @@ def form_page(study: Study, rater: str, sources: Mapping[str, str]) -> str:
     pages.append(_end())
     told = {"study": study.id, "rater": rater, "columns": ANSWER_COLUMNS, "questions": questions_of(study, rater)}
     data = json.dumps(told, ensure_ascii=True).replace("<", "\\u003c")
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>How natural does it look?</title>'
-        f'<meta name="viewport" content="width=device-width"><style>{_STYLE}</style></head>\n<body>\n'
-        f"<progress max={len(pages) - 1} value=0></progress>\n" + "\n".join(pages)
-        + '\n<p><button id="back" type="button">Back</button><button id="next" type="button">Next</button></p>\n'
-        f"<noscript><p>This form needs JavaScript; {escape(rater)}.csv can be filled in instead.</p></noscript>\n"
-        f'<script type="application/json" id="study">{data}</script>\n<script>{_SCRIPT}</script>\n</body></html>\n'
+    return build_page(
+        "How natural does it look?", element("progress", max=len(pages) - 1, value=0), *pages,
+        element("p", _button("back", "Back"), _button("next", "Next")),
+        element("noscript", element("p", f"This form needs JavaScript; {rater}.csv can be filled in instead.")),
+        Html(f'<script type="application/json" id="study">{data}</script>'), element("script", Html(_SCRIPT)),
+        style=_STYLE,
     )  # fmt: skip
 
 
@@ -119,47 +117,49 @@ def clip_source(folder: Path, name: str) -> Path | None:
     return next((path for suffix in MOVIES if (path := folder / f"{name}{suffix}").is_file()), None)
 
 
-def _introduction(study: Study) -> str:
-    told = "".join(f"<p>{escape(line)}</p>" for line in INTRODUCTION)
+def _introduction(study: Study) -> Html:
     many = len(next(iter(study.orders.values()), ()))
-    return f"<section><h1>How natural does it look?</h1>{told}<p>There are {many} pages with clips.</p></section>"
+    told = [element("p", line) for line in (*INTRODUCTION, f"There are {many} pages with clips.")]
+    return element("section", element("h1", "How natural does it look?"), *told)
 
 
-def _background() -> str:
+def _background() -> Html:
     parts = [_choices(question.key, question.text, question.choices, question.needed) for question in BACKGROUND]
-    return f"<section hidden><h2>About you</h2>{''.join(parts)}</section>"
+    return element("section", build_section("About you", *parts), hidden=True)
 
 
-def _clip_page(study: Study, shown: tuple[str, ...], sources: Mapping[str, str], title: str) -> str:
+def _clip_page(study: Study, shown: tuple[str, ...], sources: Mapping[str, str], title: str) -> Html:
     name = "/".join(shown)
-    training = "" if study.counts(shown) else " <span class=quiet>(to get used to it)</span>"
+    training = () if study.counts(shown) else (" ", element("span", "(to get used to it)", class_="quiet"))
     sides = ("Left", "Right") if len(shown) == 2 else ("",)
-    clips = "".join(
-        f"<div>{_clip(sources[one])}<p class=quiet>{side}</p></div>" for one, side in zip(shown, sides)
-    )
+    clips = [element("div", _clip(sources[one]), element("p", side, class_="quiet")) for one, side in zip(shown, sides)]
     if study.pairs:
         choices = tuple(zip((shown[0], SAME, shown[1]), ("Left", "No difference", "Right")))
     else:
         choices = tuple((str(mark), text) for mark, text in enumerate(SCALE, 1))
     asked = _choices(name, COMPARE if study.pairs else RATE, choices, needed=True)
-    look = "pair" if len(shown) == 2 else "one"
-    return f"<section hidden><h2>{escape(title)}{training}</h2><div class={look}>{clips}</div>{asked}</section>"
+    shown_clips = element("div", *clips, class_="pair" if len(shown) == 2 else "one")
+    return element("section", build_section(fragment(title, *training), shown_clips, asked), hidden=True)
 
 
-def _clip(source: str) -> str:
+def _clip(source: str) -> Html:
     if source.lower().endswith(".gif") or source.startswith("data:image/"):
-        return f'<img alt="the clip" src="{escape(source)}">'
-    return f'<video src="{escape(source)}" controls loop muted playsinline preload="auto"></video>'
+        return element("img", alt="the clip", src=source)
+    return element("video", src=source, controls=True, loop=True, muted=True, playsinline=True, preload="auto")
 
 
-def _choices(key: str, text: str, choices: tuple[tuple[str, str], ...], needed: bool) -> str:
+def _choices(key: str, text: str, choices: tuple[tuple[str, str], ...], needed: bool) -> Html:
     """A question with one choice."""
-    inputs = "".join(f'<label><input type="radio" name="{escape(key)}" value="{escape(value)}"> {escape(said)}</label>'
-                     for value, said in choices)  # fmt: skip
-    return f"<fieldset{' data-needed' if needed else ''}><legend>{escape(text)}</legend>{inputs}</fieldset>"
+    inputs = [element("label", element("input", type="radio", name=key, value=value), f" {said}")
+              for value, said in choices]  # fmt: skip
+    return element("fieldset", element("legend", text), *inputs, data_needed=needed)
 
 
-def _end() -> str:
-    return ("<section hidden><h2>Thank you</h2><p>Save your answers and send the file to whoever gave you this form. "
-            'Nothing has been sent.</p><p><button id="csv" type="button">Save as a table (CSV)</button>'
-            '<button id="json" type="button">Save as JSON</button></p></section>')  # fmt: skip
+def _button(id_: str, text: str) -> Html:
+    return element("button", text, id=id_, type="button")
+
+
+def _end() -> Html:
+    thanks = "Save your answers and send the file to whoever gave you this form. Nothing has been sent."
+    buttons = element("p", _button("csv", "Save as a table (CSV)"), _button("json", "Save as JSON"))
+    return element("section", build_section("Thank you", element("p", thanks), buttons), hidden=True)

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections import Counter
-from html import escape
 
 from ..evaluation import plots
+from ..evaluation.html_page import (
+    Html, build_image, build_number_cell, build_page, build_row, build_section, build_table, build_title, element,
+    fragment,
+)
 from ..evaluation.report import rounded
 from . import bars
 from .analysis import ALPHA, Analysis, Finding, Shares
 from .questions import BACKGROUND, SCALE
 
-_STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 1120px; margin: 1.5em auto;
-  padding: 0 1em }
-h1 { font-size: 1.5em; margin-bottom: 0 } h2 { font-size: 1.15em; margin: 1.6em 0 .4em } p { margin: .3em 0 }
-.quiet { color: #666; font-weight: normal } img { max-width: 100%; height: auto; display: block }
-table { border-collapse: collapse; font-size: 14px } tr { border-bottom: 1px solid #eee } .scroll { overflow-x: auto }
-th, td { padding: .18em .9em .18em 0; text-align: left; vertical-align: top }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums } .met { color: #23703a; font-weight: 600 }
-"""
 _COLUMNS = (
     ("mean", "difference", 2), ("low", "from", 2), ("high", "to", 2), ("t", "t", 2), ("p", "p", 4),
     ("holm_p", "p, Holm", 4), ("wilcoxon_p", "p, Wilcoxon", 4), ("pooled_p", "p, pooled", 4), ("d", "d", 2),
@@ -50,19 +43,21 @@ def study_page(found: Analysis) -> str:
     """The page as text. InputError where matplotlib is not installed."""
     plots.require_matplotlib()
     unit = "choices: 1 always the first, -1 always the second" if found.study.pairs else "points of the scale"
-    parts = [f"<h1>How natural it looks: study {escape(found.study.id)}</h1>",
-             "".join(f"<p>{escape(note)}</p>" for note in found.notes), "<h2>Is it better?</h2>",
-             "".join(_sentence(one, found.study.pairs) for one in found.findings), _findings(found),
-             _image(bars.differences(found.findings, f"each rater's mean difference, {unit}"), "raters' differences")]
-    if found.by_system:
-        parts += ["<h2>By system</h2>", _image(bars.diverging([("", found.by_system)]), "ratings by system"),
-                  _table(found.by_system), "<h2>By scenario</h2>",
-                  _image(bars.diverging(found.by_scenario), "ratings by scenario")]  # fmt: skip
-    parts += ["<h2>Who answered</h2>", _background(found)]
-    title = f"Study {escape(found.study.id)}"
-    head = (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-            f'<meta name="viewport" content="width=device-width"><style>{_STYLE}</style></head>\n<body>\n')  # fmt: skip
-    return head + "\n".join(parts) + "\n</body></html>\n"
+    drawn = bars.differences(found.findings, f"each rater's mean difference, {unit}")
+    return build_page(
+        f"Study {found.study.id}", element("h1", f"How natural it looks: study {found.study.id}"),
+        *(element("p", note) for note in found.notes),
+        build_section("Is it better?", *(_sentence(one, found.study.pairs) for one in found.findings),
+                      _findings(found), build_image(drawn, "raters' differences")),
+        *(_systems(found) if found.by_system else ()), build_section("Who answered", *_background(found)),
+    )  # fmt: skip
+
+
+def _systems(found: Analysis) -> tuple[Html, Html]:
+    all_of_them, apart = bars.diverging([("", found.by_system)]), bars.diverging(found.by_scenario)
+    table = _table(found.by_system)
+    return (build_section("By system", build_image(all_of_them, "ratings by system"), table),
+            build_section("By scenario", build_image(apart, "ratings by scenario")))  # fmt: skip
 
 
 def p_text(p: float) -> str:
@@ -72,58 +67,52 @@ def p_text(p: float) -> str:
     return "p < 0.0001" if p < 1e-4 else f"p = {p:.4f}"
 
 
-def _sentence(one: Finding, pairs: bool) -> str:
-    new, old = escape(one.new), escape(one.old)
+def _sentence(one: Finding, pairs: bool) -> Html:
+    said = f"{one.new} looks more natural than {one.old}"
     if not math.isfinite(one.p):
-        return f"<p>Whether {new} looks more natural than {old} cannot be tested: too few raters, or all alike.</p>"
+        return element("p", f"Whether {said} cannot be tested: too few raters, or all alike.")
     unit = "" if pairs else " points"
     told = (f"{one.mean:+.2f}{unit} (95 %: {one.low:+.2f} to {one.high:+.2f}), t({one.degrees}) = {one.t:.2f}, "
             f"one-sided {p_text(one.holm_p)}")  # fmt: skip
     if one.better:
-        return f"<p><span class=met>{new} looks more natural than {old}</span>: {told}.</p>"
-    return f"<p>That {new} looks more natural than {old} is not shown: {told}.</p>"
+        return element("p", element("b", said, class_="met"), f": {told}.")
+    return element("p", f"That {said} is not shown: {told}.")
 
 
-def _findings(found: Analysis) -> str:
-    head = "".join(f"<th class=n>{title}" for _, title, _ in _COLUMNS)
+def _findings(found: Analysis) -> Html:
     rows = [
-        f"<tr><td>{escape(one.new)} over {escape(one.old)}<td class=n>{len(one.differences)}"
-        + "".join(_cell(getattr(one, key), digits) for key, _, digits in _COLUMNS)
-        for one in found.findings
-    ]
+        build_row(f"{one.new} over {one.old}", build_number_cell(len(one.differences)),
+                  *(_cell(getattr(one, key), digits) for key, _, digits in _COLUMNS)) for one in found.findings
+    ]  # fmt: skip
     told = (f"Difference: mean over raters, with its 95 % interval. p: one-sided paired t-test by rater; Holm: for all "
             f"hypotheses together, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each had "
             "a rater of its own (Faustino §5.1.2). d: Cohen's, of raters' differences. delta: Cliff's.")  # fmt: skip
-    table = f"<table><tr><th>hypothesis<th class=n>raters{head}{''.join(rows)}</table>"
-    return f"<div class=scroll>{table}</div><p class=quiet>{told}</p>"
+    head = ("hypothesis", build_title("raters"), *(build_title(title) for _, title, _ in _COLUMNS))
+    return fragment(build_table(head, rows), element("p", told, class_="quiet"))
 
 
-def _table(rows: tuple[Shares, ...]) -> str:
-    head = "".join(f"<th class=n>{escape(text)}" for text in SCALE)
-    lines = [f"<tr><td>{escape(row.name)}" + "".join(f"<td class=n>{int(count)}" for count in row.counts)
-             + _cell(row.mean, 2) + _cell(row.sd, 2) for row in rows]  # fmt: skip
-    return f"<div class=scroll><table><tr><th>system{head}<th class=n>mean<th class=n>sd{''.join(lines)}</table></div>"
+def _table(rows: tuple[Shares, ...]) -> Html:
+    head = ("system", *map(build_title, (*SCALE, "mean", "sd")))
+    return build_table(head, [
+        build_row(row.name, *map(build_number_cell, row.counts), *(build_number_cell(x, 2) for x in (row.mean, row.sd)))
+        for row in rows
+    ])  # fmt: skip
 
 
-def _background(found: Analysis) -> str:
+def _background(found: Analysis) -> list[Html]:
     parts = []
     for question in BACKGROUND:
         said = Counter(answers.get(question.key, "") for answers in found.answers.background.values())
         rows = [(text, said[key]) for key, text in question.choices] + [("no answer", said[""])]
-        cells = "".join(f"<tr><td>{escape(text)}<td class=n>{count}" for text, count in rows if count)
-        parts.append(f"<p>{escape(question.text)}</p><table>{cells}</table>")
-    return "".join(parts)
+        cells = [build_row(text, build_number_cell(count)) for text, count in rows if count]
+        parts += [element("p", question.text), build_table((), cells)]
+    return parts
 
 
 def _shares(row: Shares) -> dict:
     return {"name": row.name, "counts": row.counts.tolist(), "mean": row.mean, "sd": row.sd}
 
 
-def _cell(value: float, digits: int) -> str:
-    if not math.isfinite(value):
-        return "<td class=n>–"
-    return "<td class=n>&lt; 0.0001" if digits == 4 and value < 1e-4 else f"<td class=n>{value:.{digits}f}"
-
-
-def _image(png: bytes, text: str) -> str:
-    return f'<img alt="{escape(text)}" src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}">'
+def _cell(value: float, digits: int) -> Html:
+    """A number; of four digits, which are those of a p, not below what they can show."""
+    return element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value, digits)

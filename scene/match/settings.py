@@ -16,8 +16,9 @@ from .kits import USUAL, linear, repaint, written
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
-GIVEN = [(AUTO, "Guess", "By what the file looks like"), *((name, name.capitalize(), name) for name in PROVIDERS)]
-TOLD = [GIVEN[0], *((name, name.capitalize(), name) for name in EVENT_PROVIDERS)]
+GUESS = (AUTO, "Guess", "By what the file looks like")
+GIVEN = [GUESS, *((one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values())]
+TOLD = [GUESS, *((one.name, one.title, one.files.replace("`", "")) for one in EVENT_PROVIDERS.values())]
 KINDS = (
     ("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"),
 )

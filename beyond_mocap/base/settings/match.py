@@ -38,8 +38,6 @@ TABLES = {
         Setting(name="first_frame", default=1, tooltip="Scene frame on which the stretch begins"),
     ),
     "touches": (
-        Setting(name="provider", kind=str, option="--provider", metavar="NAME", help="whose form FILE has; default: "
-            "guessed from its content"),
         Setting(name="start", kind=float, unit="seconds", option="--from", help="solve from this time on"),
         Setting(name="end", kind=float, unit="seconds", option="--to", help="solve up to this time"),
     ),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 
+from ..html_page import Html, build_number_cell, build_row, build_table, build_title, element
 from ..report import flat
 from ..targets import target_of
 from .results import PlayerResult, number
@@ -50,31 +50,33 @@ def own_warnings(player: PlayerResult, everybody: tuple[str, ...]) -> tuple[str,
 
 
 def team_table(
-    players: Sequence[PlayerResult], strips: Mapping[str, str], anchors: Mapping[str, str], everybody: tuple[str, ...]
-) -> str:
-    """The table as HTML: a row for each player, then their mean and the worst of them. strips: HTML of each player's
-    strip by his id; anchors: of his own part of the page; everybody: warnings that are not counted."""
-    head = "".join(f"<th class=n>{column.title}<br><span class=quiet>{column.unit}</span>" for column in COLUMNS)
-    lines = [f"<tr><th>player{head}<th class=n>warnings<th>second by second"]
-    for player in players:
-        who = f'<tr><td class=name><a href="#{anchors[player.id]}">{escape(player.called)}</a>'
-        if not player.report:
-            lines.append(f"{who}<td colspan={len(COLUMNS) + 1} class=missed>{_why(player)}<td>{strips[player.id]}")
-            continue
-        found = flat({key: value for key, value in player.report.items() if key != "per_second"})
-        cells = "".join(_cell(column, _value(player, column.figure, found), player, found) for column in COLUMNS)
-        count = len(own_warnings(player, everybody))
-        note = "" if player.made else f"<br><span class=missed>{_why(player)}</span>"
-        lines.append(f"{who}{note}{cells}<td class=n>{count}<td>{strips[player.id]}")
-    lines += _summary(players, everybody)
-    return f"<div class=scroll><table>{chr(10).join(lines)}</table></div>"
+    players: Sequence[PlayerResult], strips: Mapping[str, Html], anchors: Mapping[str, str], everybody: tuple[str, ...]
+) -> Html:
+    """The table: a row for each player, then their mean and the worst of them. strips: each player's strip by his id;
+    anchors: of his own part of the page; everybody: warnings that are not counted."""
+    titles = [build_title(column.title, column.unit) for column in COLUMNS]
+    head = ("player", *titles, build_title("warnings"), "second by second")
+    rows = [_row(player, element("td", strips[player.id]), anchors[player.id], everybody) for player in players]
+    return build_table(head, [*rows, *_summary(players, everybody)])
+
+
+def _row(player: PlayerResult, strip: Html, anchor: str, everybody: tuple[str, ...]) -> Html:
+    link = element("a", player.called, href=f"#{anchor}")
+    if not player.report:
+        why = element("td", _why(player), colspan=len(COLUMNS) + 1, class_="missed")
+        return build_row(element("td", link, class_="name"), why, strip)
+    found = flat({key: value for key, value in player.report.items() if key != "per_second"})
+    cells = [_cell(column, _value(player, column.figure, found), player, found) for column in COLUMNS]
+    note = () if player.made else (element("br"), element("span", _why(player), class_="missed"))
+    count = build_number_cell(len(own_warnings(player, everybody)))
+    return build_row(element("td", link, *note, class_="name"), *cells, count, strip)
 
 
 def _why(player: PlayerResult) -> str:
-    return escape(f"{player.status}: {player.reason}" if player.reason else player.status)
+    return f"{player.status}: {player.reason}" if player.reason else player.status
 
 
-def _summary(players: Sequence[PlayerResult], everybody: tuple[str, ...]) -> list[str]:
+def _summary(players: Sequence[PlayerResult], everybody: tuple[str, ...]) -> list[Html]:
     """The mean and the largest over all players with a report; nothing for a single one."""
     made = [player for player in players if player.report]
     if len(made) < 2:
@@ -85,7 +87,7 @@ def _summary(players: Sequence[PlayerResult], everybody: tuple[str, ...]) -> lis
         known = [[value for value in values if math.isfinite(value)] for values in columns]
         cells = [_plain(column, measure(values) if values else math.nan) for column, values in zip(COLUMNS, known)]
         counts = [len(own_warnings(player, everybody)) for player in made]
-        lines.append(f"<tr class=sum><td>{title}{''.join(cells)}<td class=n>{measure(counts):.0f}<td>")
+        lines.append(build_row(title, *cells, build_number_cell(measure(counts)), "", class_="sum"))
     return lines
 
 
@@ -98,15 +100,13 @@ def _value(player: PlayerResult, figure: str, found: Mapping[str, object]) -> fl
     return told
 
 
-def _cell(column: Column, value: float, player: PlayerResult, found: Mapping[str, object]) -> str:
+def _cell(column: Column, value: float, player: PlayerResult, found: Mapping[str, object]) -> Html:
     target = target_of(column.figure, number(player.report.get("fps")) or 30.0)
     met = target.met(value, found) if target is not None and math.isfinite(value) else None
     if column.figure == "overlap_m.max" and math.isfinite(value):
         met = value <= _OVERLAP
-    return _plain(column, value, {True: " met", False: " missed", None: ""}[met])
+    return _plain(column, value, {True: "met", False: "missed", None: ""}[met])
 
 
-def _plain(column: Column, value: float, status: str = "") -> str:
-    if not math.isfinite(value):
-        return "<td class=n>–"
-    return f'<td class="n{status}">{column.scale * value:.{column.digits}f}'
+def _plain(column: Column, value: float, status: str = "") -> Html:
+    return build_number_cell(value, column.digits, column.scale, status)

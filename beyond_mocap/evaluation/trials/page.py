@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path
 
 import numpy as np
 
+from ..html_page import (
+    Html, build_image, build_number_cell, build_page, build_row, build_section, build_table, build_title, element,
+    fragment,
+)
 from . import pictures
 from .impacts import aligned_impacts, kept
 from .paired import LEAST, Paired, paired
 from .results import TrialResult, read_results
-
-_STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 1120px; margin: 1.5em auto;
-  padding: 0 1em }
-h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin: 1.6em 0 .4em } p { margin: .3em 0 } .quiet { color: #666 }
-img { max-width: 100%; height: auto; display: block } table { border-collapse: collapse; font-size: 14px }
-tr { border-bottom: 1px solid #eee } th, td { padding: .18em .9em .18em 0; text-align: left; vertical-align: top }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums } .scroll { overflow-x: auto }
-.bad { color: #b3261e }
-"""
 
 
 def trials_report(folder: Path) -> str:
@@ -32,25 +24,22 @@ def trials_report(folder: Path) -> str:
     """
     results = read_results(Path(folder))
     made = [result for result in results if not result.error]
-    parts = [f"<h1>{escape(Path(folder).resolve().name)}: {len(results)} trials</h1>"]
+    title = Path(folder).resolve().name
+    parts = [element("h1", f"{title}: {len(results)} trials")]
     if made:
         parts.append(_section("Markers and time", _fit_text(made), pictures.residuals_and_time(results),
                               pictures.residuals_by_trial(results)))
-    parts += _throws(made)
-    parts.append(_section("All trials", _table(results)))
-    title = escape(Path(folder).resolve().name)
-    head = f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style>'
-    return head + "\n".join(parts) + "</html>\n"
+    return build_page(title, *parts, *_throws(made), build_section("All trials", _table(results)))
 
 
-def _fit_text(made: Sequence[TrialResult]) -> str:
+def _fit_text(made: Sequence[TrialResult]) -> Html:
     residual, single = (_mean([getattr(r, name) for r in made]) for name in ("residual", "single"))
     rate = _mean([r.rate for r in made])
-    return (f"<p>Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on the "
-            "whole. Bars end one standard deviation up and down.</p>")
+    return element("p", f"Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on "
+                   "the whole. Bars end one standard deviation up and down.")  # fmt: skip
 
 
-def _throws(made: Sequence[TrialResult]) -> list[str]:
+def _throws(made: Sequence[TrialResult]) -> list[Html]:
     """What there is to say of throws; nothing where none was found."""
     thrown = [result for result in made if result.throw is not None]
     if not thrown:
@@ -59,8 +48,8 @@ def _throws(made: Sequence[TrialResult]) -> list[str]:
     points = aligned_impacts(thrown)
     near = kept(points)
     if near.any():
-        said = f"<p>{int(near.sum())} of {len(thrown)} throws; those beyond three standard deviations are left out.</p>"
-        parts.append(_section("Where throws land", said, pictures.impact_map(points[near]),
+        said = f"{int(near.sum())} of {len(thrown)} throws; those beyond three standard deviations are left out."
+        parts.append(_section("Where throws land", element("p", said), pictures.impact_map(points[near]),
                               pictures.impact_scatter(thrown, points)))
     pairs = [(r.throw.radar, r.throw.speed) for r in thrown if r.throw.radar]
     if pairs:
@@ -70,7 +59,7 @@ def _throws(made: Sequence[TrialResult]) -> list[str]:
     return parts
 
 
-def _paired_text(found: Paired) -> str:
+def _paired_text(found: Paired) -> Html:
     many = "throws" if found.count != 1 else "throw"
     lines = [f"{found.count} {many} with a measured speed: estimated - measured {found.mean:+.2f} m/s"
              + (f" (standard deviation {found.sd:.2f})" if np.isfinite(found.sd) else "")
@@ -81,34 +70,26 @@ def _paired_text(found: Paired) -> str:
         lines.append(f"No difference (Wilcoxon, paired, two-sided): p = {found.wilcoxon:.4f}.")
     else:
         lines.append(f"Too few or too equal for the paired test, which needs {LEAST} throws.")
-    return "".join(f"<p>{line}</p>" for line in lines)
+    return fragment(*(element("p", line) for line in lines))
 
 
-def _table(results: Sequence[TrialResult]) -> str:
-    head = ("<tr><th>trial<th>subject<th class=n>frames<th class=n>residual, mm<th class=n>frames/s<th>hand"
-            "<th class=n>speed, m/s<th class=n>radar<th>")
-    return f"<div class=scroll><table>{head}\n" + "\n".join(_row(result) for result in results) + "</table></div>"
+def _table(results: Sequence[TrialResult]) -> Html:
+    titles = ("trial", "subject", build_title("frames"), build_title("residual, mm"), build_title("frames/s"), "hand",
+              build_title("speed, m/s"), build_title("radar"), "")  # fmt: skip
+    return build_table(titles, map(_row, results))
 
 
-def _row(result: TrialResult) -> str:
-    throw = result.throw
-    cells = [
-        f"<td>{escape(result.name)}<td>{escape(result.subject)}", _cell(result.frames or np.nan, 0),
-        _cell(result.residual, 1), _cell(result.rate, 0), f"<td>{escape(throw.side) if throw else ''}",
-        _cell(throw.speed if throw else np.nan, 1), _cell(throw.radar if throw and throw.radar else np.nan, 1),
-        f"<td class=bad>{escape(result.error)}" if result.error else "<td>",
-    ]  # fmt: skip
-    return "<tr>" + "".join(cells) + "</tr>"
+def _row(result: TrialResult) -> Html:
+    side, speed, radar = (result.throw.side, result.throw.speed, result.throw.radar) if result.throw else ("", None, 0)
+    return build_row(
+        result.name, result.subject, build_number_cell(result.frames or None), build_number_cell(result.residual, 1),
+        build_number_cell(result.rate), side, build_number_cell(speed, 1), build_number_cell(radar or None, 1),
+        element("td", result.error, class_="missed"),
+    )  # fmt: skip
 
 
-def _cell(value: float, digits: int) -> str:
-    return f"<td class=n>{value:.{digits}f}" if np.isfinite(value) else "<td class=n>–"
-
-
-def _section(title: str, body: str, *images: bytes) -> str:
-    drawn = [f'<img alt="{escape(title)}" src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}">'
-             for png in images]
-    return f"<h2>{escape(title)}</h2>\n{body}\n" + "\n".join(drawn)
+def _section(title: str, body: Html, *images: bytes) -> Html:
+    return build_section(title, body, *(build_image(png, title) for png in images))
 
 
 def _mean(values: Sequence[float]) -> float:

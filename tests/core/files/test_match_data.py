@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
+from beyond_mocap.files.feed import Feed
 from beyond_mocap.files.match_data import Match, MatchPlayer, presence_lines
 from beyond_mocap.files.match_mending import mended_ball, mended_players, mended_sides, side_lines
 from beyond_mocap.files.team_colours import team_colours
-from beyond_mocap.files.providers import Feed
+from beyond_mocap.files.providers import PROVIDERS
 from beyond_mocap.files.referees import referee_samples
 from beyond_mocap.files.tracking import read_match
 
@@ -233,7 +234,7 @@ def test_a_team_s_file_that_ends_before_the_other_s_is_told(tmp_path):
 ])
 def test_colours_of_shirts_are_found(tmp_path, said, expected):
     (tmp_path / "m").write_text(said)
-    found = team_colours(Feed("x", (tmp_path / "m",), (tmp_path / "m",)))
+    found = team_colours(Feed(PROVIDERS["pff"], (tmp_path / "m",), (tmp_path / "m",)))
     assert (found["home"], found["away"]) == expected
 
 
@@ -244,7 +245,7 @@ def test_a_damaged_sample_ends_the_referees_and_is_told(tmp_path):
     file = tracab(tmp_path)
     frame = ('{{"FrameCount":{0},"PlayerPositions":[{{"Team":3,"JerseyNumber":0,"X":{1},"Y":5}}]}}').format
     (tmp_path / "g.json").write_text('{"FrameData":[' + ",".join(map(frame, (1, 2, 3), (1, 2, '"?"'))) + "]}")
-    feed = Feed("tracab", (tmp_path / "g.json",), (file.with_name("g_meta.xml"),))
+    feed = Feed(PROVIDERS["tracab"], (tmp_path / "g.json",), (file.with_name("g_meta.xml"),))
     names, places, lines = referee_samples(feed, np.arange(1, 5))
     assert names == ["referee_0"] and np.isfinite(places[0, :, 0]).tolist() == [True, True, False, False]
     assert "up to frame 2 only" in lines[0]

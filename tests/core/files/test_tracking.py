@@ -2,14 +2,20 @@
 
 import pathlib
 import sys
+import types
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from provider_tables import PAGE, with_tables
+
+from beyond_mocap.__main__ import main
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import tracking
+from beyond_mocap.files.feed import TrackingProvider
+from beyond_mocap.files.providers import PROVIDERS
 from beyond_mocap.files.tracking import read_match, read_track_csv
 
 DATA = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "tracking"
@@ -156,7 +162,7 @@ def test_tracab_becomes_metres_and_is_kept(tmp_path, monkeypatch):
     np.testing.assert_allclose(match.ball[:, 2], 1.5)
     assert match.times[0] == 0.0 and np.allclose(np.diff(match.times), 0.04)
 
-    monkeypatch.setattr(tracking, "load", None)  # the second time nothing is parsed
+    monkeypatch.setattr(tracking, "load_tracking", None)  # the second time nothing is parsed
     again = read_match(file, cache_dir=tmp_path / "cache")
     assert again.players == match.players and again.periods == match.periods
     for name in ("times", "positions", "ball"):
@@ -269,6 +275,39 @@ def test_every_provider_is_known_by_its_form(tmp_path, raw, meta, provider, play
     assert np.nanmax(np.abs(match.positions[..., 0])) < 60 and np.nanmax(np.abs(match.positions[..., 1])) < 40
     assert np.all(np.diff(match.times) > 0) and match.times[0] == 0.0
     assert np.nanmin(match.positions) < -1.0 < 1.0 < np.nanmax(match.positions)
+
+
+def test_a_provider_is_one_record(tmp_path, monkeypatch, capsys):
+    """A made-up form, TRACAB's below a line of its own, is guessed, read, named and documented by its record alone."""
+    kloppy = pytest.importorskip("kloppy.tracab")
+    file, players = made_tracab(tmp_path)
+    (tmp_path / "game.acme").write_text("ACME 1\n" + file.read_text())
+
+    def load(meta, lines, coordinates):
+        (tmp_path / "lines.dat").write_text(pathlib.Path(lines).read_text().partition("\n")[2])
+        return kloppy.load(meta_data=meta, raw_data=str(tmp_path / "lines.dat"), coordinates="tracab")
+
+    acme = TrackingProvider(
+        name="acme", title="Acme Sports", files="`.acme` with TRACAB's metadata", patterns=(rb"ACME \d",),
+        loader="load_lines", arguments={"meta": "meta", "lines": "raw"},
+        read_referees=lambda feed: iter([(1, "referee_1", 0.0, 500.0)]),
+    )
+    monkeypatch.setitem(sys.modules, "kloppy.acme", types.SimpleNamespace(load_lines=load))
+    monkeypatch.setitem(PROVIDERS, "acme", acme)
+    match = read_match(tmp_path / "game.acme", cache_dir=tmp_path / "cache")
+    assert match.provider == "acme" and "game.acme read as acme" in match.notes
+    np.testing.assert_allclose(match.positions[:2], players[::-1], atol=1e-9)
+    assert (match.players[2].team, match.positions[2, 0].tolist()) == ("referee", [0.0, 5.0])
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    touches = ["touches", str(tmp_path / "game.acme"), "--provider", "acme", "--out", str(tmp_path / "t.csv")]
+    assert main(touches) == 0 and main([*touches, "--provider", "acne"]) == 2
+    assert "hawkeye, acme" in capsys.readouterr().err
+    assert main(["match", "--help"]) == 0 and "hawkeye, acme" in " ".join(capsys.readouterr().out.split())
+    assert "| Acme Sports | `.acme` with TRACAB's metadata |\n" in with_tables(PAGE.read_text("utf-8"))
+
+
+def test_the_tables_of_providers_come_from_their_records():
+    assert with_tables(PAGE.read_text("utf-8")) == PAGE.read_text("utf-8"), "make tables writes them"
 
 
 @needs_data
