@@ -130,12 +130,6 @@ class Joined:
     turned: float
     warnings: tuple[str, ...] = ()
 
-    @property
-    def release_frame(self) -> float:
-        """Fractional frame of the motion at which the ball leaves."""
-        return (self.release - self.start) * self.motion.fps
-
-
 def laid_into(
     own: Motion, start: float, throw: Motion, release: float, at: float, goes_on: bool = False, fade: float = FADE
 ) -> Joined:

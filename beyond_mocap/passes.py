@@ -26,7 +26,6 @@ from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
 from .errors import Cancelled, InputError, NotInLibrary
 from .library.library import Library
 from .motion.humanoid import stature
-from .motion.motion import Motion
 from .motion.quaternion import multiply
 from .own_size import in_own_size
 from .take import BallPath, Take

@@ -29,7 +29,7 @@ from .polish.foot_ride import LONGEST, Ground, Steps, follow
 from .polish.loops import Loop, find_loops
 from .polish.path_end import Ending, ending
 from .polish.path_fit import KINDS, fit, fit_polynomial, fit_spline
-from .polish.path_frame import FRAMES, MovingFrame, Residuals, check_frame, moving_frame, placed, relative
+from .polish.path_frame import MovingFrame, Residuals, check_frame, moving_frame, placed, relative
 from .polish.path_tight import curvature, share, steep, tight
 from .polish.path_tight import told as tight_told
 from .polish.path_time import (

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from .annotation import ClipAnnotation
-from .ball.physics import BASEBALL, FOOTBALL, Ball
+from .ball.physics import BASEBALL, FOOTBALL
 from .ball.wall import meets_wall
 from .errors import BeyondMocapError, Cancelled, InputError
 from .files import bvh

@@ -26,7 +26,7 @@ from ..motion.humanoid import heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
-from .contact import PARTS, Tool, striking_surface
+from .contact import Tool, striking_surface
 
 _SIDED = ("foot", "hand", "tool")
 _SMOOTHING = 0.1

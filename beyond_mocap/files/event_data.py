@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 NOT_PLAYED = frozenset({"out", "foul", "other"})
@@ -50,7 +49,3 @@ class MatchEvents:
     provider: str
     where: str = "events"
     notes: tuple[str, ...] = ()
-
-    def of_period(self, period: int) -> Sequence[MatchEvent]:
-        """Those of one period."""
-        return [event for event in self.events if event.period == period]

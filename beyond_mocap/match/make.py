@@ -26,13 +26,13 @@ from ..library.library import Library, build
 from ..solve_ball import solve_ball
 from ..take import BallPath
 from . import stages
-from .folder import MatchFolder, check_folder, file_names, opened, read_state
+from .folder import check_folder, file_names, opened, read_state
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
 from .parts import check_texts, parts_of, strange_texts, unused_lines
 from .pool import Workplace, check_place, ended
 from .roles import absent_lines, pushed_apart, roles_of, span_of
-from .state import MatchState, begun, now, row_of
+from .state import begun, now, row_of
 from .thumbnails import thumbnails
 from .words import MatchWords, words_of
 from .workplace_library import LibrarySource, hold

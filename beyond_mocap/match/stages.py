@@ -30,7 +30,7 @@ from .pool import Failed, Workplace, run
 from .searched import Piece
 from .splice import spliced
 from .state import MatchState
-from .units import Unit, units_of
+from .units import units_of
 from .work import Finish, finish_player, part_crowd, search_unit
 from .workplace_library import LibrarySource
 

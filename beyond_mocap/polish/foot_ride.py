@@ -34,7 +34,7 @@ from .foot_plant import (
     turned_flat,
 )
 from .reach import CLEAR_BEND, bent_limb
-from .underfoot import Footing, Surface, footing
+from .underfoot import Surface, footing
 
 MOST_SHIFT = 0.45
 """Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the

@@ -19,7 +19,7 @@ from .. import action, background, bake, linked
 from ..measure import frames_per_second
 from ..passes import make
 from ..passes.settings import PLAYED
-from . import follow, receiver
+from . import follow
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library

@@ -16,7 +16,7 @@ from ...beyond_mocap.motion import quaternion
 from .. import ball as balls
 from .. import bake, channels
 from ..aimed.shots import CLOSEST, trajectory
-from ..measure import frames_per_second, units_per_metre
+from ..measure import units_per_metre
 from ..passes import possession
 from ..passes.settings import KEPT
 from ..passes.shown import remove

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...beyond_mocap.errors import InputError
 from .. import action, armature, channels, linked, preferences, session
-from ..measure import frames_per_second, units_per_metre
+from ..measure import frames_per_second
 from ..passes import possession
 from ..settings import absolute
 from . import earlier, rigged, targets

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...beyond_mocap.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from .. import armature, bone_maps, channels, rig_bake
+from .. import bone_maps, channels, rig_bake
 from ..ride.carrier import carrier_of
 from ..ride.rigs import is_plain
 from .settings import MARK

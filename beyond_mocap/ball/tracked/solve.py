@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import Cancelled, InputError
-from ...motion.runs import runs
 from ...motion.skeleton import frozen_array
 from ...motion.track import BALL_RADIUS
 from . import cuts as cutting
@@ -85,11 +84,6 @@ class SolvedBall:
     def pieces(self) -> tuple[BallPiece, ...]:
         """The pieces of the path."""
         return self.ball.pieces
-
-    def touches_of(self, player: str) -> tuple[SolvedTouch, ...]:
-        """One player's, in order."""
-        return tuple(touch for touch in self.touches if touch.player == player)
-
 
 def solve(
     times: np.ndarray,

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from beyond_mocap.library.library import build
-from beyond_mocap.motion.gait import gait
 from beyond_mocap.plan import Plan
 from beyond_mocap.synthesis.dragged import left_out
 from beyond_mocap.synthesis.path_search import PathSearch
