@@ -47,7 +47,7 @@ test: venv venv-oldest training
 	done; exit $$status
 
 test-core: venv
-	.venv/bin/python $(PYTEST) -n 2 tests/core tests/packaging
+	.venv/bin/python $(PYTEST) -n 2 --dist loadfile tests/core tests/packaging
 
 test-training: training
 	.venv-training/bin/python $(PYTEST) tests/training
