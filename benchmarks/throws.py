@@ -161,8 +161,10 @@ def throw_rows(model: ThrowModel, name: str) -> list[str]:
 
 def speed_tables() -> list[str]:
     """What the networks alone cost, of several sizes, and a throw of three seconds with the shipped weights."""
-    lines = markdown.head(("networks", "control points", "hidden layers", "units", "parameters, million", "MB as float16",
-                  f"s for {FRAMES} frames (target 0.12)"))  # fmt: skip
+    lines = markdown.head((
+        "networks", "control points", "hidden layers", "units", "parameters, million", "MB as float16",
+        f"s for {FRAMES} frames (target 0.12)",
+    ))  # fmt: skip
     lines += [networks_row(*size) for size in SIZES]
     lines += ["", *markdown.head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
     return lines + throw_rows(shipped_model("throw"), "throw.npz")
