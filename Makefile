@@ -8,12 +8,13 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training test test-core test-blender test-oldest test-training demo bench weights tables extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training quick test test-core test-blender test-oldest test-training demo bench weights tables extension extension-all window-test window-bench \
   pictures clean
 
 help:
 	@echo 'make venv           .venv with Blender as a Python module and all that the tests need'
 	@echo 'make training       .venv-training with what trains the networks of throws and kicks (jax, no Blender)'
+	@echo 'make quick ROOM=... the tests of one room (ROOM=path_editing), in about a minute'
 	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
@@ -47,8 +48,22 @@ test: venv venv-oldest training
 	  $(MAKE) -s $$1 || status=1; wait $$second || status=1; cat build/$$2.txt; \
 	done; exit $$status
 
+# One room's folders, tests/core/ROOM and tests/blender/ROOM, and files, test_ROOM*.py; the second has settings of its own.
+ROOM_OF = $(wildcard tests/$(1)/$(ROOM) tests/$(1)/*/$(ROOM) tests/$(1)/test_$(ROOM).py tests/$(1)/test_$(ROOM)_*.py)
+ROOMS = $(sort $(filter-out __pycache__,$(notdir $(patsubst %/,%,$(wildcard tests/core/*/ tests/blender/*/))) \
+  $(patsubst test_%.py,%,$(notdir $(wildcard tests/core/test_*.py tests/blender/test_*.py)))))
+quick: export OPENBLAS_NUM_THREADS = 1
+quick: export OMP_NUM_THREADS = 1
+quick: venv
+	@if [ -z "$(ROOM)" ] || [ -z "$(strip $(call ROOM_OF,core)$(call ROOM_OF,blender))" ]; then \
+	  echo "make quick: no room '$(ROOM)'; ROOM is one of: $(ROOMS)"; exit 2; \
+	fi; status=0; \
+	for found in "$(strip $(call ROOM_OF,core))" "$(strip $(call ROOM_OF,blender))"; do \
+	  [ -z "$$found" ] || .venv/bin/python $(PYTEST) -q $$found || status=1; \
+	done; exit $$status
+
 test-core: venv
-	.venv/bin/python $(PYTEST) -n 2 tests/core tests/packaging
+	.venv/bin/python $(PYTEST) -n 2 --dist loadfile tests/core tests/packaging
 
 test-training: training
 	.venv-training/bin/python $(PYTEST) tests/training

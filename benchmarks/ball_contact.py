@@ -20,7 +20,7 @@ from beyond_mocap.synthesize import synthesize
 
 from benchmarks import effort
 from benchmarks.markdown import head, row
-from benchmarks.places import DATA, LIBRARIES, ROOT, library_folder, scenario
+from benchmarks.places import LIBRARIES, ROOT, library_folder, scenario
 
 SCENES = ("three", "six", "volley_net", "racquet", "dropped")
 SAMPLES = ROOT / "sample_blend"

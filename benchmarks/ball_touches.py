@@ -11,15 +11,15 @@ import numpy as np
 from beyond_mocap.ball.tracked.planted import planted_match
 from beyond_mocap.ball.tracked.planted_feed import Feed, sampled
 from beyond_mocap.ball.tracked.solve import SolvedBall
-from beyond_mocap.evaluation.touches import Reading, ReadTouch, Score, read_touches, scored, scored_by_events
-from beyond_mocap.files.tracking import Match, MatchPlayer
+from beyond_mocap.files.tracking import Match, MatchPlayer, read_match
 from beyond_mocap.solve_ball import solve_ball
 
 from benchmarks import effort
 from benchmarks.markdown import head, row
 from benchmarks.places import DATA, ROOT
-from benchmarks.touch_reading import match_of
+from benchmarks.touch_score import Reading, ReadTouch, Score, read_touches, scored, scored_by_events
 
+MATCHES = {"nl2019": "nl2019_half1.dat", "dutch": "dutch_6min.dat"}
 BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
 # Read when the solver stood, which nobody tried on them before.
 LATER = ROOT / "benchmarks" / "touches_by_hand_later.csv"
@@ -28,6 +28,11 @@ MARGIN = 20.0  # s that are solved before and after what was read
 PLAYED = ("pass", "miss", "clearance")  # events that are a touch for certain
 _NO_TOUCH = ("out", "foul", "card", "offside")
 EVENT_SPREAD = 1.8  # s: three deviations of how far events that were not tied to a touch lie from it
+
+
+def match_of(name: str) -> Match:
+    """One of the recorded matches."""
+    return read_match(DATA / "tracking" / "match" / MATCHES[name])
 
 
 @dataclass(frozen=True)

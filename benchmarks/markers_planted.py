@@ -178,7 +178,7 @@ def _fault_row(name: str, marker_set: str, share: float) -> str:
     cleaned = clean(known.trial, own.clusters(known.trial.labels))
     took = time.process_time() - begun
     trial = cleaned.trial
-    names = known.markers_of_trial
+    names = known.trial.labels[: known.clean.shape[1]]
     after = trial.positions[:, [trial.labels.index(label) for label in names]]
     before = known.trial.positions[:, : len(names)]
     apart = np.linalg.norm(after - known.clean, axis=-1)

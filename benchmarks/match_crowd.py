@@ -1,15 +1,11 @@
 """Everybody of a made match together: who is in whom, what keeping them apart costs, and who is in step with whom.
 
-    python -m benchmarks.match_crowd FOLDER LIBRARY [--from S --to S]
-
-FOLDER is what the verb `match` has made, LIBRARY what it was made from. Overlaps, skate and jerk are told without and
-with the corrections that the folder has; the share in step is that of the time of all players.
+Overlaps, skate and jerk stand without and with the corrections; the share in step is that of the time of all players.
 """
 
 from __future__ import annotations
 
-import argparse
-import time
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +17,17 @@ from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
 from beyond_mocap.match.crowd import kept_apart, overlap_depths
 from beyond_mocap.match.expand import expanded
-from beyond_mocap.match.folder import read_state
+from beyond_mocap.match.make import make_match
+from beyond_mocap.match.order import MatchOrder
 from beyond_mocap.match.variety import share_in_step
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.polish.crowd.correction import ARMS, ROOT, Correction, applied
 from beyond_mocap.take import Take
+
+from benchmarks.effort import seconds
+from benchmarks.places import CMU_UNIT, DATA
+
+SECONDS = (60.0, 80.0)
 
 
 def step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:
@@ -34,15 +36,15 @@ def step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:
     count = max(first + len(take.motion) for first, take in zip(firsts, takes)) - start
     rates = {clip.path: clip.motion.fps for clip in library.extended.clips}
     names: dict[tuple[str, bool], int] = {}
-    shown, seconds = np.full((len(takes), count), -1), np.zeros((len(takes), count))
+    shown, ages = np.full((len(takes), count), -1), np.zeros((len(takes), count))
     places = np.zeros((len(takes), count, 2))
     for row, (take, first) in enumerate(zip(takes, firsts)):
         here = slice(first - start, first - start + len(take.motion))
         what = [(take.clips[clip], bool(mirrored)) for clip, mirrored in zip(take.clip, take.mirrored)]
         shown[row, here] = [names.setdefault(each, len(names)) for each in what]
-        seconds[row, here] = take.clip_frame / np.array([rates.get(path, fps) for path, _ in what])
+        ages[row, here] = take.clip_frame / np.array([rates.get(path, fps) for path, _ in what])
         places[row, here] = take.motion.root_positions[:, :2]
-    return share_in_step(shown, seconds, places)
+    return share_in_step(shown, ages, places)
 
 
 def figures(motions: list[Motion], contacts: list[np.ndarray], firsts: list[int]) -> str:
@@ -72,30 +74,33 @@ def what_is_changed(corrections: list[Correction], takes: list[Take], firsts: li
     )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("library")
-    parser.add_argument("--from", dest="start", type=float)
-    parser.add_argument("--to", dest="end", type=float)
-    asked = parser.parse_args()
-    state, library = read_state(asked.folder), build(asked.library)
-    start = state["from_s"] if asked.start is None else asked.start
-    end = state["to_s"] if asked.end is None else asked.end
-    edits = [read_player(path) for path in sorted(asked.folder.glob("*.take.npz"))]
-    pairs = [(take, edit) for edit in edits for take in expanded(library, edit, start, end)]
+def section() -> list[str]:
+    """Lines for results.md: SECONDS of a recorded half, made and measured."""
+    with tempfile.TemporaryDirectory() as place:
+        folder, cache, recordings = Path(place) / "match", Path(place) / "cache", DATA / "mocap" / "cmu10"
+        order = MatchOrder(
+            DATA / "tracking" / "match" / "nl2019_half1.dat", recordings, folder, cache=cache, unit=CMU_UNIT,
+            start=SECONDS[0], end=SECONDS[1], figures=False,
+        )  # fmt: skip
+        took, result = seconds(lambda: make_match(order), 1)
+        library = build(recordings, unit=CMU_UNIT, cache_dir=cache)
+        made = f"- {len(result.done)} players made in {took:.1f} s of processor time, {len(result.failed)} failed"
+        return [made, *(f"- {line}" for line in crowd_lines(folder, library))]
+
+
+def crowd_lines(folder: Path, library: Library) -> list[str]:
+    """What a made folder shows of everybody together, without and with its corrections."""
+    edits = [read_player(path) for path in sorted(folder.glob("*.take.npz"))]
+    pairs = [(take, edit) for edit in edits for take in expanded(library, edit, *SECONDS)]
     takes, fps = [take for take, _ in pairs], pairs[0][0].motion.fps
     firsts, contacts = [round(take.start_time * fps) for take in takes], [take.contacts for take in takes]
     motions = [take.motion for take in takes]
     kept = [edit.correction or Correction.none(fps) for _, edit in pairs]
-    print(f"{len(takes)} takes, {start:g} to {end:g} s; in step {100 * step_share(library, takes, firsts):.2f}%")
-    print(f"without corrections: {figures(motions, contacts, firsts)}")
-    print(f"with the folder's:   {figures([applied(*each) for each in zip(motions, kept, firsts)], contacts, firsts)}")
-    print(what_is_changed(kept, takes, firsts))
-    begun = time.process_time()
-    kept_apart(motions, contacts, firsts, fps)
-    print(f"kept apart anew in {time.process_time() - begun:.1f} s of processor time")
-
-
-if __name__ == "__main__":
-    main()
+    corrected = [applied(*each) for each in zip(motions, kept, firsts)]
+    took, _ = seconds(lambda: kept_apart(motions, contacts, firsts, fps), 1)
+    return [
+        f"{len(takes)} takes; in step {100 * step_share(library, takes, firsts):.2f}%",
+        f"without corrections: {figures(motions, contacts, firsts)}",
+        f"with them: {figures(corrected, contacts, firsts)}",
+        what_is_changed(kept, takes, firsts), f"kept apart anew in {took:.1f} s of processor time",
+    ]

@@ -1,34 +1,27 @@
 """What a player of a match costs: processor seconds of search, construction and polishing per 20 s of motion, and what
 reading and cleaning a whole half costs.
-
-`python -m benchmarks.match_speed [CACHE]` prints the tables; OPENBLAS_NUM_THREADS=1 for one core. The library and the
-match are kept in the folder CACHE, else worked out anew."""
+"""
 
 from __future__ import annotations
 
 import sys
 import tempfile
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from beyond_mocap.files.tracking import Match, read_match
+from beyond_mocap.library.library import Library
+from beyond_mocap.library.build import build
+from beyond_mocap.motion.track import clean, sample
+from beyond_mocap.plan import Plan
+from beyond_mocap.synthesis.balance import balanced
+from beyond_mocap.synthesis.path_search import PathSearch
+from beyond_mocap.synthesis.wanted import wanted
+from beyond_mocap.synthesize import synthesize, with_made_gaits
 
-from beyond_mocap.files.tracking import Match, read_match  # noqa: E402
-from beyond_mocap.library.library import Library  # noqa: E402
-from beyond_mocap.library.build import build  # noqa: E402
-from beyond_mocap.motion.track import clean, sample  # noqa: E402
-from beyond_mocap.plan import Plan  # noqa: E402
-from beyond_mocap.synthesis.balance import balanced  # noqa: E402
-from beyond_mocap.synthesis.path_search import PathSearch  # noqa: E402
-from beyond_mocap.resolve_plan import resolve_plan  # noqa: E402
-from beyond_mocap.synthesis.search_library import search_library  # noqa: E402
-from beyond_mocap.synthesis.wanted import build_order  # noqa: E402
-from beyond_mocap.synthesize import synthesize  # noqa: E402
-
-from benchmarks.effort import seconds  # noqa: E402
-from benchmarks.markdown import head, row  # noqa: E402
-from benchmarks.places import CMU_UNIT, DATA  # noqa: E402
+from benchmarks.effort import seconds
+from benchmarks.markdown import head, row
+from benchmarks.places import CMU_UNIT, DATA
 
 WINDOW = 60.0
 STARTS = (60.0, 600.0, 1200.0, 1800.0, 2400.0)
@@ -46,9 +39,8 @@ def window_row(library: Library, match: Match, player: str, start: float) -> str
     """One player over one window: the search alone, and everything, per 20 s."""
     track, _ = clean(match.track(player, start, start + WINDOW))
     plan = Plan(track=track, nearest=True)
-    resolved = resolve_plan(plan, library)
-    known = search_library(library, resolved)
-    order, weights = build_order(known, resolved), balanced(plan.alpha)
+    known = with_made_gaits(library, plan, lambda fraction, text: None)
+    order, weights = wanted(known, plan), balanced(plan.alpha)
     searched, _ = seconds(lambda: PathSearch(known, order, weights).run())
     whole, take = seconds(lambda: synthesize(library, plan))
     share = 20.0 / (track.times[-1] - track.times[0])
@@ -73,16 +65,12 @@ def peak_memory() -> str:
     return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024 / kilo:.0f} MiB at most in this process"
 
 
-def section(cache: Path) -> list[str]:
+def section() -> list[str]:
     """Lines for results.md."""
-    library = build(DATA / "mocap" / "cmu10", unit=CMU_UNIT, cache_dir=cache)
-    match = read_match(DATA / "tracking" / "match" / "nl2019_half1.dat", cache_dir=cache)
-    lines = head(("player", "from, s", "mean m/s", "seams", "search, s per 20 s", "all, s per 20 s (target 0.35)"))
-    lines += [window_row(library, match, *window) for window in windows(match)]
-    lines += ["", *head(("player", "min", "clean, s", "sample, s")), half_row(match), "", peak_memory()]
+    with tempfile.TemporaryDirectory() as cache:
+        library = build(DATA / "mocap" / "cmu10", unit=CMU_UNIT, cache_dir=cache)
+        match = read_match(DATA / "tracking" / "match" / "nl2019_half1.dat", cache_dir=cache)
+        lines = head(("player", "from, s", "mean m/s", "seams", "search, s per 20 s", "all, s per 20 s (target 0.35)"))
+        lines += [window_row(library, match, *window) for window in windows(match)]
+        lines += ["", *head(("player", "min", "clean, s", "sample, s")), half_row(match), "", peak_memory()]
     return lines
-
-
-if __name__ == "__main__":
-    with tempfile.TemporaryDirectory() as made:
-        print("\n".join(section(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(made))))

@@ -1,17 +1,14 @@
-"""Recordings of many kinds on many paths: `python -m benchmarks.path_editing`, and the rows of `make bench`.
+"""Recordings of many kinds on many paths.
 
 Each recording's first ten seconds ride every path of `path_shapes`. A figure stands beside the recording's own, and
-beside the same ride without planting where that says something. `--worst N` names the worst rides of each kind.
+beside the same ride without planting where that says something.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -23,7 +20,6 @@ from beyond_mocap.polish.path_line import through
 from beyond_mocap.ride import RideSettings, prepare, ride
 
 from benchmarks import markdown, path_shapes
-from benchmarks.effort import on_one_core
 from benchmarks.places import CMU_UNIT, DATA
 
 SECONDS, BUDGET_FRAMES, BUDGET_MS = 10.0, 600, 35.0
@@ -234,27 +230,3 @@ def section(
         "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",
         *cycled(kinds),
     ]  # fmt: skip
-
-
-def main() -> int:
-    """Rides them and prints."""
-    options = argparse.ArgumentParser(prog="python -m benchmarks.path_editing", description=__doc__)
-    options.add_argument("--kind", nargs="+", choices=tuple(CLIPS), default=list(CLIPS))
-    options.add_argument("--path", nargs="+", choices=tuple(path_shapes.ALL), default=list(path_shapes.ALL))
-    options.add_argument("--worst", type=int, default=5)
-    options.add_argument("--each", action="store_true", help="a line for every ride, and nothing else")
-    chosen = options.parse_args()
-    if not Path(DATA / "mocap").is_dir():
-        print(f"bench: {DATA} is missing; this benchmark needs its recordings and was skipped")
-        return 0
-    on_one_core()
-    if chosen.each:
-        rows = [replace(row, clip=f"{row.clip} on {row.path}") for row in rides(chosen.kind, chosen.path)]
-        print("\n".join(table(rows, "clip")))
-    else:
-        print("\n".join(section(chosen.kind, chosen.path, chosen.worst)))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,5 +1,5 @@
-"""The section on throws and kicks: the shipped weights on people that they never saw, targets anywhere, seconds, and
-what the experiments found (`python -m benchmarks.throw_experiments`)."""
+"""The section on throws and kicks: the shipped weights on people that they never saw, targets anywhere, and
+seconds."""
 
 from __future__ import annotations
 
@@ -9,11 +9,19 @@ import numpy as np
 
 from beyond_mocap.errors import BeyondMocapError
 from beyond_mocap.evaluate_throws import FULL, RAW, evaluate_throws
+from beyond_mocap.motion.adult import adult_skeleton
+from beyond_mocap.motion.throws import throw
 from beyond_mocap.planted_examples import planted
-from beyond_mocap.synthesis.phase_network.example import example_of
+from beyond_mocap.synthesis.phase_network import phase_function
+from beyond_mocap.synthesis.phase_network.chains import chains_of
+from beyond_mocap.synthesis.phase_network.example import describe, example_of
+from beyond_mocap.synthesis.phase_network.features import widths
+from beyond_mocap.synthesis.phase_network.generate import Options, generate
+from beyond_mocap.synthesis.phase_network.model import ModelSettings, ThrowModel
+from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
 from beyond_mocap.throw import Order, shipped_model, throw_at
 
-from benchmarks import effort, markdown, throw_speed
+from benchmarks import effort, markdown
 
 UNSEEN, EACH = (901, 902, 903), 3
 """Seeds of made people whom no shipped weights saw, and movements of each."""
@@ -22,6 +30,10 @@ TARGETS = {
     "kick": ((11.0, 0.0, 0.5), (11.0, 3.4, 2.2), (11.0, -3.4, 0.4), (16.0, 2.0, 1.2), (20.0, -3.0, 1.8)),
 }
 """m, the thrower or the ball at the origin; (x, y) is turned by any angle."""
+FRAMES = 90
+SIZES = (("hierarchy", 4, 3, 96), ("hierarchy", 4, 3, 128), ("hierarchy", 4, 3, 256), ("hierarchy", 1, 8, 256),
+         ("single", 4, 4, 512))  # fmt: skip
+_RUNS = 5
 
 
 def section() -> list[str]:
@@ -35,8 +47,8 @@ def section() -> list[str]:
             lines += [f"None: {error}", ""]
             continue
         lines += [f"{model.trained_on}.", "", *unseen_table(model, action), "", *target_table(model, action), ""]
-    lines += ["### What the networks cost", "", *throw_speed.section(), ""]
-    return [*lines, "The experiments (Fredriksson §8.3) are in docs/throw-experiments.md.", ""]
+    lines += ["### What the networks cost", "", *speed_tables(), ""]
+    return lines
 
 
 @lru_cache(maxsize=None)
@@ -102,3 +114,57 @@ def _centimetres(values: dict) -> str:
 
 def _number(value: float, form: str) -> str:
     return format(value, form) if np.isfinite(value) else "-"
+
+
+def networks_row(kind: str, points: int, layers: int, units: int) -> str:
+    """The networks of one size, evaluated frame after frame on a full body."""
+    settings = ModelSettings(kind, points, layers, units)
+    random = np.random.default_rng(1)
+    made = [_network(random, *size, settings) for size in widths(chains_of(adult_skeleton(1.8)), settings).values()]
+    inputs = [random.normal(size=network.inputs).astype(np.float32) for network in made]
+    thetas = [phase_function.weights_at(frame / FRAMES, points) for frame in range(FRAMES)]
+
+    def all_frames():
+        for theta in thetas:
+            for network, x in zip(made, inputs):
+                network.frame(x, theta)
+
+    spent, _ = effort.seconds(all_frames, _RUNS)
+    count = sum(network.parameters for network in made)
+    return markdown.row(
+        [kind, str(points), str(layers), str(units), f"{count / 1e6:.2f}", f"{2 * count / 1e6:.1f}", f"{spent:.3f}"]
+    )
+
+
+def _network(random, inputs: int, outputs: int, settings: ModelSettings) -> PhaseNetwork:
+    sizes = [inputs, *[settings.units] * settings.layers, outputs]
+    shapes = [(settings.points, out, width) for width, out in zip(sizes, sizes[1:])]
+    weights = tuple((random.normal(size=shape) / np.sqrt(shape[2])).astype(np.float32) for shape in shapes)
+    biases = tuple(np.zeros(shape[:2], np.float32) for shape in shapes)
+    return PhaseNetwork(weights, biases, np.zeros(inputs), np.ones(inputs), np.zeros(outputs), np.ones(outputs))
+
+
+def throw_rows(model: ThrowModel, name: str) -> list[str]:
+    """A throw of three seconds on the model's skeleton: what the networks say, and with everything after the fact."""
+    made = throw((18.0, 1.0, 1.0), 20.0, "right", skeleton=model.skeleton, fps=120.0)
+    begin = max(made.release - 1.75, 0.0)
+    example = example_of("timed", "", made.motion, "right_hand", made.release, (18.0, 1.0, 1.0), None,
+                         model.settings.fps, (begin, begin + 3.0))  # fmt: skip
+    description, rows = describe(example), []
+    for what, options in (("nothing corrected", Options(pose_iterations=0, ik=False, blend=False, limits=False)),
+                          ("start pose, inverse kinematics, limits", Options())):  # fmt: skip
+        generate(model, description, options=options)
+        spent, done = effort.seconds(lambda options=options: generate(model, description, options=options), _RUNS)
+        rows.append(markdown.row([name, str(len(description)), what, str(done.iterations), f"{spent:.3f}"]))
+    return rows
+
+
+def speed_tables() -> list[str]:
+    """What the networks alone cost, of several sizes, and a throw of three seconds with the shipped weights."""
+    lines = markdown.head((
+        "networks", "control points", "hidden layers", "units", "parameters, million", "MB as float16",
+        f"s for {FRAMES} frames (target 0.12)",
+    ))  # fmt: skip
+    lines += [networks_row(*size) for size in SIZES]
+    lines += ["", *markdown.head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
+    return lines + throw_rows(shipped_model("throw"), "throw.npz")

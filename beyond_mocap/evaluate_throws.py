@@ -17,9 +17,8 @@ from .motion.hand import usual_centre
 from .errors import Cancelled, InputError
 from .evaluation.jerk import jerk
 from .evaluation.throws.compare import kept
-from .evaluation.throws.deviation import deviations
+from .evaluation.throws.deviation import deviations, lost_ones
 from .evaluation.throws.impact import WALL, impact, let_go
-from .evaluation.throws.subjects import lost_ones
 from .files.tables import plain
 from .motion import quaternion
 from .motion.humanoid import identify

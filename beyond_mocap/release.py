@@ -8,7 +8,6 @@ that the file's name may give: that stands beside the result, for comparison.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -152,33 +151,6 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     found = found or _by_hand(hand, motion, lies, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
     return _result(found, hand, motion, lies, seen, even.name, notes)
-
-
-def shared_hand_ball(
-    throws: Sequence[tuple[MarkerTrial, Motion]], settings: ReleaseSettings = ReleaseSettings()
-) -> HandBall:
-    """Where the ball lies in the hand over several throws of one hand of one body, as Fredriksson §6.1 has it.
-
-    One throw tells hardly more than that the centre is a radius away from its marker; several, with the marker
-    elsewhere on the ball, tell the centre, and the radius too where `settings.radius` is None. Give the centre to
-    `release` in its settings. InputError: no throws, other hands among them, no marker on a ball.
-    """
-    ball = THROWN[settings.ball]
-    points, sides, hand = [], set(), None
-    for trial, motion in throws:
-        even = evenly(trial)
-        label = _ball_label(even, settings.ball_marker)
-        if label is None:
-            raise InputError(trial.name, "no marker on a ball", "one", "name it as the ball's marker")
-        motion, marker = _frame_for_frame(trial, motion), even.positions[:, even.index(label)]
-        wanted = (settings.hand,) if settings.hand else ("left", "right")
-        hand = _throwing([sharpened(hand_of(motion, side), even, (label,)) for side in wanted], marker)
-        sides.add(hand.side)
-        points.append(hand.taken_back(marker)[_held_frames(hand, marker)])
-    if len(sides) != 1:
-        raise InputError("release", f"throws of {len(sides)} hands", "throws of one hand", "say which hand")
-    usual = usual_centre(hand.finger, hand.reach, _palm(hand))
-    return ball_in_hand(np.concatenate(points), settings.radius or ball.radius, usual, settings.radius is None)
 
 
 def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
@@ -399,4 +371,3 @@ def _stride(motion: Motion) -> np.ndarray:
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
     return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]
-

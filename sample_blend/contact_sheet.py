@@ -19,7 +19,6 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files import bvh  # noqa: E402
 from beyond_mocap.motion.body import MATERIALS, BodyMesh, deformed, low_poly_body  # noqa: E402
 from beyond_mocap.motion.humanoid import heading  # noqa: E402
@@ -116,17 +115,6 @@ def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None
         add_mesh("body", shifted, body.faces, materials, body.material, smooth=True)
 
 
-def add_ribbon(points: np.ndarray, colour, width: float = 0.07, height: float = 0.012) -> None:
-    """A path (N, 2) in metres as a flat ribbon on the grass."""
-    way = np.gradient(np.asarray(points, dtype=float), axis=0)
-    way = unit_vectors(way)
-    side = 0.5 * width * np.stack([-way[:, 1], way[:, 0]], axis=-1)
-    left, right = points + side, points - side
-    rows = np.concatenate([np.c_[left, np.full(len(left), height)], np.c_[right, np.full(len(right), height)]])
-    count = len(points)
-    add_mesh("path", rows, [(i, count + i, count + i + 1, i + 1) for i in range(count - 1)], [paint("path", colour)])
-
-
 def add_ball(centres: np.ndarray) -> None:
     """The ball at `centres` (N, 3) metres."""
     material = paint("ball", (0.9, 0.9, 0.88))
@@ -170,34 +158,6 @@ def save(picture: np.ndarray, path: Path) -> None:
     image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
     image.filepath_raw, image.file_format = str(path), "PNG"
     image.save()
-
-
-def contact_sheet(
-    actors, path_xy, ball, times, out_png, *, fps=None, columns: int = 3, tile=(480, 320), samples: int = 24
-) -> None:
-    """Tiles of a passage: the actors (list of Actor) on the pitch at `times` (N,) seconds, their tracks as ribbons.
-
-    path_xy: a list of (M, 2) arrays in metres, one per actor, or None. ball: function of seconds -> (3,) metres, or
-    None. The camera follows the actors from the side and above; each tile is one render, put together into `out_png`.
-    """
-    out = Path(out_png)
-    tiles = []
-    for index, moment in enumerate(times):
-        scene = new_scene(*tile, samples)
-        centres = []
-        for actor in actors:
-            frame = moment * actor.motion.fps
-            add_bodies(actor, np.array([frame]))
-            centres.append(at_frames(actor.motion, np.array([frame]))[0][0])
-        for points, actor in zip(path_xy or (), actors):
-            add_ribbon(np.asarray(points), (actor.colours or COLOURS).get("shirt", (1, 1, 1)))
-        if ball is not None:
-            add_ball(ball(moment))
-            centres.append(np.asarray(ball(moment)))
-        _follow(scene, np.array(centres))
-        tiles.append(render(scene, out.with_suffix(f".{index}.tile.png")))
-        out.with_suffix(f".{index}.tile.png").unlink()
-    save(_grid(tiles, columns), out)
 
 
 def _follow(scene, centres: np.ndarray) -> None:

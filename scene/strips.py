@@ -65,16 +65,6 @@ def moments(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> list[PlacedMom
     return [] if dot is None else lanes.moments(dot, where(player))
 
 
-def active_moment(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> PlacedMoment | None:
-    """The picked key moment."""
-    return next((moment for moment in moments(player, scene) if moment.selected), None)
-
-
-def set_active_moment(player: BeyondMocapPlayer, moment: PlacedMoment | None) -> None:
-    """Pick a key moment, or none."""
-    lay_strips.pick(player.dot, *((moment.strip, moment.index) if moment else ("", -1)))
-
-
 def span_at(player: BeyondMocapPlayer, scene: bpy.types.Scene, seconds: float) -> PlacedSpan | None:
     """The span that holds at a time: one that is asked for, else an automatic one, else None."""
     dot = dot_of(player, scene)

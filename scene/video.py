@@ -8,14 +8,12 @@ sequencer would be rendered in the scene's place, and one made by a script plays
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import bpy
 from bpy.props import FloatProperty, PointerProperty
 
 from ..beyond_mocap.errors import InputError
-from .clock import of_scene
 from .core.live import Watcher, soon
 from .measure import frames_per_second
 
@@ -102,12 +100,6 @@ def release(scene: bpy.types.Scene) -> None:
     scene.beyond_mocap.video.clip = None
     if scene.active_clip == clip:
         scene.active_clip = None
-
-
-def frame_shown(scene: bpy.types.Scene, frame: float) -> int:
-    """Which frame of the video, from 1, belongs to a scene frame; outside 1 to the clip's length there is none."""
-    video = scene.beyond_mocap.video
-    return 1 + math.floor((of_scene(scene).seconds(frame) - video.begins) * video.rate + _EARLY)
 
 
 def watch(scene: bpy.types.Scene, _depsgraph=None) -> None:

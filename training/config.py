@@ -70,10 +70,6 @@ class TrainingConfig:
             if not low <= getattr(self, name) <= high:
                 raise InputError(f"training: {name}", f"{getattr(self, name)}", f"{low} to {high}", f"see {PAGE}")
 
-    def with_settings(self, **changes) -> "TrainingConfig":
-        """The same with other settings of the model."""
-        return replace(self, settings=replace(self.settings, **changes))
-
     def flat(self) -> dict:
         """All names of the JSON with their values."""
         own = {name: value for name, value in asdict(self).items() if name != "settings"}

@@ -299,7 +299,8 @@ def _step(slope: np.ndarray, short: np.ndarray) -> np.ndarray:
     """(B, 3) m/s that slopes (B, 3, 3) ask for to make up for `short` (B, 3), damped a little."""
     turned = np.swapaxes(slope, 1, 2)
     square = turned @ slope + 1e-9 * np.eye(3)
-    can = np.isfinite(square).all(axis=(1, 2)) & (np.linalg.det(square) != 0.0)  # else launches that lead nowhere
+    with np.errstate(invalid="ignore"):  # launches that lead nowhere have infinite slopes
+        can = np.isfinite(square).all(axis=(1, 2)) & (np.linalg.det(square) != 0.0)
     return np.linalg.solve(np.where(can[:, None, None], square, np.eye(3)), turned @ short[:, :, None])[:, :, 0]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..annotation.event_words import EVENT_KINDS
@@ -52,7 +51,3 @@ class MatchEvents:
     provider: str
     where: str = "events"
     notes: tuple[str, ...] = ()
-
-    def of_period(self, period: int) -> Sequence[MatchEvent]:
-        """Those of one period."""
-        return [event for event in self.events if event.period == period]

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..motion.striking import BODY_PARTS
 from .event_data import MatchEvent, MatchEvents
 from .event_kinds import kind_of
 from .event_players import Who, same_players

@@ -11,7 +11,6 @@ from ..markers.landmarks import LANDMARKS
 from ..markers.marker_set import MarkerSet
 from ..markers.template import JOINTS
 from .content import utf8
-from .whole import atomic_write
 
 SHIPPED = Path(__file__).resolve().parents[1] / "markers" / "sets"
 LARGEST = 1_000_000
@@ -40,11 +39,6 @@ def chosen_set(named: str) -> MarkerSet:
 def read_marker_set(path: str | os.PathLike) -> MarkerSet:
     """The set that a file holds. InputError, with the line, for whatever is wrong."""
     return parse_marker_set(utf8(path, "a marker set", LARGEST), str(path))
-
-
-def write_marker_set(marker_set: MarkerSet, path: str | os.PathLike) -> None:
-    """Write a set as `read_marker_set` reads it. InputError where it cannot be written, or as `marker_set_text`."""
-    atomic_write(path, marker_set_text(marker_set))
 
 
 def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:

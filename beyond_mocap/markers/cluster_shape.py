@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .frames import RigidFit, placed, rigid_fit, taken_back
+from .frames import placed, rigid_fit, taken_back
 from .robust import median, medians, quantile
 
 _ROUNDS = 3
@@ -53,12 +53,6 @@ def mean_shape(positions: np.ndarray) -> Shape:
     return Shape(places, 1.4826 * medians(away), median(fit.rms[fit.sound]))
 
 
-def deformation(shape: Shape, positions: np.ndarray) -> tuple[RigidFit, np.ndarray]:
-    """(fits of a shape to each frame of its cluster (T, N, 3) m, distance (T, N) m of each marker from its place)."""
-    fit = rigid_fit(shape.places, positions, 1.0 / (shape.sigma**2 + 0.002**2))
-    return fit, np.linalg.norm(placed(fit, shape.places) - positions, axis=-1)
-
-
 def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(median distance, how much it varies, as a standard deviation) of each pair of markers (T, M, 3): (M, M) m each.
 
@@ -78,23 +72,6 @@ def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     spread = np.fmin(spread, spread.T)
     np.fill_diagonal(spread, 0.0)
     return middle, spread
-
-
-def rigid_clusters(positions: np.ndarray, tolerance: float = 0.015) -> list[list[int]]:
-    """Which markers of a trial (T, M, 3) m move together: lists of three or more indices, none in two lists.
-
-    Where no marker set is known: two clusters become one while no distance inside varies by more than `tolerance` m
-    (complete linkage). A trial in which nobody moves gives one cluster of everything.
-    """
-    from scipy.cluster.hierarchy import fcluster, linkage
-    from scipy.spatial.distance import squareform
-
-    spread = np.minimum(distance_spread(positions)[1], 10.0)
-    if len(spread) < 3:
-        return []
-    names = fcluster(linkage(squareform(spread, checks=False), "complete"), tolerance, "distance")
-    found = [np.flatnonzero(names == name).tolist() for name in dict.fromkeys(names.tolist())]
-    return [cluster for cluster in found if len(cluster) >= 3]
 
 
 def _spread_frames(seen_count):

@@ -51,11 +51,6 @@ class Planted:
         return self.centres[:, self.motion.skeleton.index(joint)]
 
     @property
-    def markers_of_trial(self) -> tuple[str, ...]:
-        """The trial's labels but for what goes on unlabeled: the columns of `clean`."""
-        return self.trial.labels[: self.clean.shape[1]]
-
-    @property
     def segments(self) -> dict[str, str]:
         """Which joint carries each marker."""
         names = self.motion.skeleton.names

@@ -120,14 +120,3 @@ class Faults:
 def mirrored(trial: MarkerTrial) -> MarkerTrial:
     """The trial as a left-handed system would write it: left and right of the room exchanged, labels kept."""
     return trial.with_positions(trial.positions * [1.0, -1.0, 1.0])
-
-
-def sides_exchanged(trial: MarkerTrial) -> MarkerTrial:
-    """The trial with every left label on the right marker and the other way round."""
-    other = {"L": "R", "R": "L"}
-    names = {}
-    for label in trial.labels:
-        twin = other.get(label[0], label[0]) + label[1:]
-        if twin != label and twin in trial.labels:
-            names[label] = twin
-    return trial.renamed(names)

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import Cancelled, InputError
+from ..motion import quaternion
 from ..motion.motion import Motion
 from . import weights as marker_weights
-from .chain import Chain, Poses, chain, place
+from .chain import Chain, Poses, chain, place, poses
 from .descent import HeldPoint, Task, descend
-from .frames import placed as carried
-from .frames import rigid_fit
+from .frames import placed as carried, rigid_fit
 from .residuals import seen_markers
 from .smooth import smooth
 from .start import first_poses
-from .untold import between, missing
 
 _CHUNK = 512
 _COARSE_SECONDS = 1.0 / 60.0
@@ -32,6 +31,64 @@ _FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # a jump in one frame; how long wh
 _EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
 _LEANING = 0.02  # m per radian: how strongly a joint that misses markers leans on how it stands before and after
 _LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
+
+
+# Joints whose markers are hidden for a while follow what is solved before and after, not the rest pose.
+
+
+_NEAR = 2  # a joint is told by its own markers and by those of so many joints below it
+
+
+def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
+    """Of which joints markers are hidden that the recording shows elsewhere: (T, J) bool. there: (T, M) bool."""
+    usual = there.any(axis=0)
+    out = np.zeros((len(there), len(chain.skeleton)), dtype=bool)
+    for marker, joint in enumerate(chain.joint):
+        hidden = usual[marker] & ~there[:, marker]
+        for _ in range(_NEAR + 1):
+            if joint <= 0:
+                break
+            out[:, joint] |= hidden
+            joint = chain.skeleton.parents[joint]
+    return out
+
+
+def between(
+    chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray, frames: np.ndarray
+) -> tuple[Poses, np.ndarray]:
+    """The poses of `frames` (N,) that lie between solved ones, each joint between those that tell it, and of which
+    joints any do: (J,) bool.
+
+    solved: poses of all T frames, of which `known` (K,) count. told: (K, J) bool. Before the first and after the last
+    telling frame a joint stays as it is there.
+    """
+    root = _slid(solved.root[:, known].T, known, frames)
+    local = np.empty((len(frames), len(chain.skeleton), 4))
+    some = told.any(axis=0)
+    for joint in range(len(chain.skeleton)):
+        use = known[told[:, joint]] if some[joint] else known
+        local[:, joint] = _turned(solved.local[joint][:, use].T, use, frames)
+    return poses(chain, root, local), some
+
+
+def _around(known: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which known frames lie before and after each frame (indices), and how far between."""
+    after = np.clip(np.searchsorted(known, frames), min(1, len(known) - 1), len(known) - 1)
+    before = np.maximum(after - 1, 0)
+    span = np.maximum(known[after] - known[before], 1)
+    return before, after, np.clip((frames - known[before]) / span, 0.0, 1.0)
+
+
+def _slid(places: np.ndarray, known: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Places (K, 3) between those of the known frames: (N, 3)."""
+    before, after, part = _around(known, frames)
+    return places[before] + part[:, None] * (places[after] - places[before])
+
+
+def _turned(turns: np.ndarray, known: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Rotations (K, 4) between those of the known frames: (N, 4)."""
+    before, after, part = _around(known, frames)
+    return quaternion.slerp(turns[before], turns[after], part)
 
 
 @dataclass(frozen=True)

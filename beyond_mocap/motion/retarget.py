@@ -37,29 +37,12 @@ _TRUNK_ROUNDS = 3  # of turning the trunk and seeing what is left
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-def retarget(
-    motion: Motion,
-    skeleton: Skeleton,
-    bone_map: dict[str, str] | str | Path | None = None,
-    *,
-    example: Motion | None = None,
-    standing: np.ndarray | None = None,
-) -> Motion:
-    """`motion` on `skeleton`, at its own rate.
-
-    bone_map: source joint -> target joint, or the path of a JSON file that holds such an object (`bone_map.load`);
-    pairs in it go before those found by names and structure. example: a recording on `skeleton`, which tells how its
-    rig twists its bones and holds its trunk; without it the rest pose does. standing (T, 2) bool: left and right foot
-    of `motion` on the ground, which tells how its soles lie; without it low feet count as standing.
+class Retargeter:
+    """Carries recordings of one rig to another, at their own rate: both are studied once.
 
     Root positions are metres, world, Z up; heights are kept over the same floor. The skeleton itself given as target
-    gives the motion back. Raises InputError where either skeleton has no legs or the map names an unknown joint.
+    gives the motion back.
     """
-    return Retargeter(motion, skeleton, bone_map, example=example, standing=standing).carry(motion)
-
-
-class Retargeter:
-    """Carries recordings of one rig to another: both are studied once."""
 
     def __init__(
         self,
@@ -72,10 +55,14 @@ class Retargeter:
         example_standing: np.ndarray | None = None,
         keeps_travel: bool = False,
     ):
-        """sample: frames of the recordings (their order does not matter); the others as in `retarget`.
+        """sample: frames of the recordings (their order does not matter).
 
-        standing, example_standing (T, 2) bool: feet on the ground in `sample` and in `example`. keeps_travel:
-        footprints and the way over the ground stay where they are, whatever the legs' length.
+        bone_map: source joint -> target joint, or the path of a JSON file that holds such an object (`bone_map.load`);
+        pairs in it go before those found by names and structure. example: a recording on `skeleton`, which tells how
+        its rig twists its bones and holds its trunk; without it the rest pose does. standing, example_standing (T, 2)
+        bool: left and right foot on the ground in `sample` and in `example`, which tells how soles lie; without it low
+        feet count as standing. keeps_travel: footprints and the way over the ground stay where they are, whatever the
+        legs' length. Raises InputError where either skeleton has no legs or the map names an unknown joint.
         """
         self.keeps_travel = keeps_travel
         self.pairs = pair(sample, skeleton, bone_map, example)

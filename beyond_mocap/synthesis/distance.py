@@ -6,14 +6,101 @@ from __future__ import annotations
 import numpy as np
 
 from ..library.library import Library
-from ..polish.time_warp import catch_up, warp
 from .blocks import FINEST, BlockSearch, Candidates
-from .edit_list import EditList, PlacedKey
-from .joints import edit_list
+from .edit_list import EditList, PlacedKey, find_seams
 from .locomotion import Section, travelled_distance
 from .wanted import pool_frame
 
 CATCH_UP_FRAMES = 60
+
+
+# Where one block ends and the next begins: the boundary moved by a few frames to where the two clips agree best.
+#
+# Faustino §3.2.5 shifts the exit and the entry frame separately by gradient descent; the motion then changes its length,
+# key moments miss their frame and travelled distance drifts (his own §5.2.1 names this as the main source of his distance
+# errors). We shift both by the same number of frames: one clip plays a little longer and the other begins as much later,
+# so every other frame stays where it was, and with so few possibilities all of them are tried.
+
+
+REACH = 3
+
+
+# Playing a stretch so that it travels what it should, when it should (Faustino §3.3.2).
+
+
+STEEPNESS = 4.59512
+
+
+def catch_up(error: float, frames: int, window: int) -> np.ndarray:
+    """(frames,) metres of `error` regained by each frame of a locomotion stretch, spread over its first `window` frames
+    by the logistic of eq. 27, 28.
+
+    Eq. 27 runs from 1 % to 99 % of the error; it is stretched here to run from 0 to all of it, so that the next section
+    does not inherit a rest.
+    """
+    window = max(1, min(window, frames))
+    at = np.minimum(np.arange(frames), window)
+    logistic = 1.0 / (1.0 + np.exp(-STEEPNESS / (window / 2.0) * (at - window / 2.0)))
+    low = 1.0 / (1.0 + np.exp(STEEPNESS))
+    return error * (logistic - low) / (1.0 - 2.0 * low)
+
+
+def warp(source: np.ndarray, target: np.ndarray, idle: float = 1e-3) -> np.ndarray:
+    """Fractional source frames (F,) to show so that each output frame has travelled its share of the way.
+
+    source: (M,) metres travelled at each source frame, target: (F,) at each output frame, both from 0 and not
+    decreasing. Both are taken as shares of their totals, so that the whole stretch is played. `idle` metres are added
+    per frame on both sides: where nobody moves, time itself passes.
+    """
+    m, f = len(source), len(target)
+    if m < 2 or f < 2:
+        return np.zeros(f)
+    own = np.maximum.accumulate(source - source[0]) + idle * np.arange(m)
+    asked = np.maximum.accumulate(target - target[0]) + idle * np.arange(f) * ((m - 1) / (f - 1))
+    share = asked * (own[-1] / asked[-1])
+    return np.interp(share, own, np.arange(m))
+
+
+def edit_list(library: Library, clip: np.ndarray, frame: np.ndarray, keys: tuple[PlacedKey, ...], fixed) -> EditList:
+    """An edit list from per-frame clips (T,) and library frames (T,), its seams moved to the best of +-3 frames.
+
+    fixed: output frames (key moments) across which no seam may move.
+    """
+    clip, frame = clip.copy(), frame.astype(float).copy()
+    seams = find_seams(clip, frame)
+    fixed = sorted(fixed)
+    for number, seam in enumerate(seams):
+        low = max([0, *seams[number - 1 : number].tolist(), *[f + 1 for f in fixed if f < seam]])
+        high = min([len(clip), *seams[number + 1 : number + 2].tolist(), *[f for f in fixed if f >= seam]])
+        _move(library, clip, frame, int(seam), low, high)
+    return EditList(clip, frame, find_seams(clip, frame), keys)
+
+
+def _move(library: Library, clip, frame, seam: int, low: int, high: int) -> None:
+    """Moves one seam within low < seam < high, in place."""
+    shifts = [s for s in range(-REACH, REACH + 1) if low < seam + s < high]
+    before, after = (clip[seam - 1], frame[seam - 1]), (clip[seam], frame[seam])
+    costs = [_gap(library, before, after, s) for s in shifts]
+    if not costs or np.min(costs) == np.inf:
+        return
+    shift = shifts[int(np.lexsort((np.abs(shifts), np.round(costs, 9)))[0])]
+    for s in range(0, shift):
+        clip[seam + s], frame[seam + s] = before[0], before[1] + 1 + s
+    for s in range(shift, 0):
+        clip[seam + s], frame[seam + s] = after[0], after[1] + s
+
+
+def _gap(library: Library, before, after, shift: int) -> float:
+    """Distance between the frame that would follow before the seam and the one after it: C of §3.2.5; inf outside a
+    clip."""
+    frames = library.frames
+    places = []
+    for (clip, frame), step in ((before, shift + 1), (after, shift)):
+        at = int(round(frame)) + step
+        if not frames.first[clip] <= at < frames.first[clip] + frames.count[clip]:
+            return np.inf
+        places.append(at)
+    return float(np.linalg.norm(frames.features[places[0]] - frames.features[places[1]]))
 
 
 def placed_keys(search: BlockSearch) -> tuple[PlacedKey, ...]:

@@ -40,12 +40,6 @@ def shown_players(settings) -> list:
     return [player] if player is not None and player.take else []
 
 
-def prepare_now(scene: bpy.types.Scene) -> None:
-    """Prepare everything that is missing at once; for scripts."""
-    orders = _missing(scene)
-    _prepared.update(_work(orders, None, lambda: False, None))
-
-
 def sync(scene: bpy.types.Scene) -> None:
     """Forget what no player shows, and begin to prepare what is missing."""
     settings = getattr(scene, "beyond_mocap", None)

@@ -41,7 +41,7 @@ def scene_of(scene: bpy.types.Scene) -> PassScene:
 
 def fill(context: bpy.types.Context, wanted: PassScene) -> None:
     """Let the settings say what a passing scene asks for; places become Empties, those of before go."""
-    scene, settings = context.scene, context.scene.beyond_mocap_passes
+    settings = context.scene.beyond_mocap_passes
     live, settings.live = settings.live, False
     shown.check(*settings.players)
     for row in settings.passes:

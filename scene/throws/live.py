@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import bpy
 
-from ...beyond_mocap.errors import BeyondMocapError
 from .. import background
 from ..core.live import Watcher, attempt
 from . import made, order, shown

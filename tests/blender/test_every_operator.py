@@ -18,6 +18,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 import pytest
+import remembered
 import rigs
 import worlds
 from conftest import EXTENSION
@@ -495,7 +496,16 @@ def session(extension):
 
 
 @pytest.fixture(scope="module")
-def stages(extension, session, tmp_path_factory):
+def work_once(extension):
+    """The same order is worked out once."""
+    core = importlib.import_module(f"{extension.__name__}.beyond_mocap.library.library")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        remembered.remember(monkeypatch, core.Library)
+        yield
+
+
+@pytest.fixture(scope="module")
+def stages(extension, session, work_once, tmp_path_factory):
     """The folders, and a file for each stage."""
     top = tmp_path_factory.mktemp("worlds")
     places = worlds.make_places(top)

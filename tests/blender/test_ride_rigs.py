@@ -169,7 +169,7 @@ def strips(recorded, part, _):
 def half_an_action_over_strips(recorded, part, _):
     rig = recorded()
     data = rig.animation_data
-    action, slot = data.action, data.action_slot
+    action = data.action
     ride_rigs.onto_strip(rig)
     other = action.copy()
     rest = ride_rigs.bone_path(

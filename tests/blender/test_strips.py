@@ -197,8 +197,7 @@ def test_import_tracking_makes_dot_ball_and_strips(room, player):
     assert plans.plan_of(scene.beyond_mocap, player)[0].timeline == asked
     assert plans.words_from(player) == "strips of player1"
     moment, = strips.moments(player, scene)
-    strips.set_active_moment(player, moment)
-    assert strips.active_moment(player, scene).time == 6.02
+    assert moment.time == 6.02
     strips.remove(player, moment)
     strips.remove(player, strips.span_at(player, scene, 3.0))
     assert strips.read(player, scene).spans == () and strips.read(player, scene).keys == ()

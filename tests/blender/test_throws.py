@@ -7,6 +7,7 @@ import pathlib
 import bpy
 import numpy as np
 import pytest
+import remembered
 import ride_rigs
 import rigs
 import worlds
@@ -16,6 +17,15 @@ from undo import assert_one_step, press, state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"
 TARGET = (18.0, 1.0, 1.2)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def work_once(extension):
+    """The same order is worked out once."""
+    core = importlib.import_module(f"{extension.__name__}.beyond_mocap.library.library")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        remembered.remember(monkeypatch, core.Library)
+        yield
 
 
 @pytest.fixture(autouse=True)

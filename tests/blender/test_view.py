@@ -49,9 +49,14 @@ def shown(tmp_path, library_folder, room):
     return bpy.context.scene.beyond_mocap
 
 
+def prepare_now(store):
+    """All that is missing, at once instead of by timer and thread."""
+    store._prepared.update(store._work(store._missing(bpy.context.scene), None, lambda: False, None))
+
+
 @pytest.fixture
 def prepared(shown, room):
-    room("overlays.store").prepare_now(bpy.context.scene)
+    prepare_now(room("overlays.store"))
     return room("overlays.store").prepared(shown.players[0].take)
 
 
@@ -115,7 +120,7 @@ def test_why_is_told_for_the_piece_at_the_playhead(prepared, shown, room):
 def test_takes_of_the_other_methods_are_told_too(shown, room, method):
     shown.method = method
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
-    room("overlays.store").prepare_now(bpy.context.scene)
+    prepare_now(room("overlays.store"))
     found = room("overlays.store").prepared(bpy.context.scene.beyond_mocap.players[0].take)
     assert found.pieces and all(len(piece.lines) >= 3 for piece in found.pieces)
     assert "track" in found.meshes and "footprints" in found.meshes

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from beyond_mocap.__main__ import main
-from beyond_mocap.motion.hand import hand_of
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.files.trc_write import write_trc
@@ -16,7 +15,7 @@ from beyond_mocap.markers.planted import planted
 from beyond_mocap.markers.planted_ball import PlantedBall
 from beyond_mocap.motion.motion import concatenate, resample
 from beyond_mocap.motion.throws import throw
-from beyond_mocap.release import ReleaseSettings, release, shared_hand_ball
+from beyond_mocap.release import ReleaseSettings, release
 
 MARKERS = Path(__file__).resolve().parents[3] / "shared" / "data" / "markers"
 
@@ -71,22 +70,6 @@ def test_a_moved_motion_serves(known):
     assert abs(found.impact[2] - straight.impact[2] - 0.03) < 1e-6
     rise = np.median(found.path.positions[held] - straight.path.positions[held], axis=0)
     assert np.allclose(rise, [0.0, 0.0, 0.03], atol=0.01)
-
-
-def test_several_throws_tell_where_the_ball_lies(known):
-    """The marker elsewhere on the ball in each: turned about its planted centre in the hand."""
-    hand = hand_of(known.motion, "right")
-    ball, radius, rng, throws = known.trial.index("BALL"), 0.0366, np.random.default_rng(5), []
-    for _ in range(6):
-        around = rng.normal(size=3)
-        positions = known.trial.positions.copy()
-        positions[:, ball] = hand.carried(known.ball.grip + radius * around / np.linalg.norm(around))
-        throws.append((known.trial.with_positions(positions), known.motion))
-    found = shared_hand_ball(throws)
-    assert found.fitted and abs(found.radius - radius) < 0.002
-    assert np.linalg.norm(found.centre - known.ball.grip) < 0.02  # the wrist's markers stay behind where it bends
-    with pytest.raises(InputError, match="no marker on a ball"):
-        shared_hand_ball([(known.trial.renamed({"BALL": "X1"}), known.motion)])
 
 
 def test_a_ball_that_is_larger_than_said_is_told():

@@ -198,7 +198,8 @@ def name_at(text):
 def picked():
     """The words of the picked key moment."""
     scene = bpy.context.scene
-    moment = room("scene.strips").active_moment(scene.beyond_mocap.players[0], scene)
+    moments = room("scene.strips").moments(scene.beyond_mocap.players[0], scene)
+    moment = next((moment for moment in moments if moment.selected), None)
     return " ".join(moment.words) if moment else ""
 
 

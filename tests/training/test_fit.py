@@ -14,7 +14,7 @@ import pytest
 
 from beyond_mocap.errors import Cancelled, InputError
 from training import checkpoint
-from training.batches import batches, stretches
+from training.fit import batches, stretches
 from training.config import config_of
 from training.fit import fit, rate_at
 

@@ -86,11 +86,6 @@ class SolvedBall:
         """The pieces of the path."""
         return self.ball.pieces
 
-    def touches_of(self, player: str) -> tuple[SolvedTouch, ...]:
-        """One player's, in order."""
-        return tuple(touch for touch in self.touches if touch.player == player)
-
-
 def solve(
     times: np.ndarray,
     ball: np.ndarray,

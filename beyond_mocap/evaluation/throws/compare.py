@@ -17,16 +17,6 @@ NORMALITY = 0.05
 """Level of the test for normality; he names none."""
 
 
-def sidak(level: float = 0.05, tests: int = 2) -> float:
-    """The level of each of several tests that together err as rarely as one at `level` (his footnote 2: 0.0253 for
-    two metrics, which he rounds to 0.025)."""
-    return 1.0 - (1.0 - level) ** (1.0 / tests)
-
-
-LEVEL = round(sidak(), 3)
-"""Of each test."""
-
-
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """differences (N,): new - old by subject; negative ones are for the new way. mean; spread: standard deviation
@@ -43,19 +33,6 @@ class Comparison:
     t_p: float
     wilcoxon_p: float
     least_p: float
-
-    @property
-    def rejected(self) -> bool:
-        """Whether "no better" is rejected at 0.025."""
-        return bool(self.p < LEVEL)
-
-
-def compared(new: np.ndarray, old: np.ndarray) -> Comparison:
-    """The comparison of two ways' figures (N,), those of the same subject at the same place; pairs with NaN are left
-    out."""
-    off = np.asarray(new, float) - np.asarray(old, float)
-    return judged(off[np.isfinite(off)])
-
 
 def judged(differences: np.ndarray) -> Comparison:
     """The tests of differences (N,), new - old."""
@@ -82,19 +59,3 @@ def kept(values: np.ndarray) -> np.ndarray:
         return known
     mean, spread = values[known].mean(), values[known].std()
     return known & (np.abs(np.where(known, values, mean) - mean) <= CULLED * spread + 1e-12)
-
-
-def detectable(subjects: int, spread: float = 1.0, level: float = LEVEL, power: float = 0.9) -> tuple[float, float]:
-    """The smallest mean difference that a one-sided test of so many pairs sees with this power, in the unit of
-    `spread`, their standard deviation: by the normal distribution, and by Student's, which the test uses.
-
-    §4.5 has 1.62 cm for four subjects and 1 cm: the first. The second is what it is for a t-test.
-    """
-    from scipy.optimize import brentq
-    from scipy.stats import nct, norm, t
-
-    root = np.sqrt(subjects)
-    normal = (norm.ppf(1.0 - level) + norm.ppf(power)) / root
-    edge = t.ppf(1.0 - level, subjects - 1)
-    student = brentq(lambda size: nct.sf(edge, subjects - 1, size * root) - power, 1e-6, 50.0)
-    return float(normal * spread), float(student * spread)

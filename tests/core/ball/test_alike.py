@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 
 from beyond_mocap.ball.alike import alike, bones
-from beyond_mocap.ball.links import BONES, BoneWeights, aligned, pose_distance
+from beyond_mocap.ball.links import BONES, BoneWeights, aligned
 from beyond_mocap.synthesis.path_costs import Alike, PathCosts, Weights
 from beyond_mocap.synthesis.wanted import build_order
 from beyond_mocap.plan import Plan
 from beyond_mocap.resolve_plan import resolve_plan
+
+
+def pose_distance(a, b):
+    """Eq. 1 between weighted poses (N, 12, 3) and (M, 12, 3): (N, M)."""
+    return np.linalg.norm(a[:, None] - b[None], axis=-1).sum(axis=-1)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.ball.hit_library import KINDS, HitLibrary, MatchWeights
 from beyond_mocap.ball.hits import analyse
-from beyond_mocap.ball.links import BoneWeights, Link, Transitions, aligned, links_of, pose_distance
+from beyond_mocap.ball.links import BoneWeights, aligned
 from beyond_mocap.errors import InputError
 from beyond_mocap.files import bvh
 from beyond_mocap.library.build import build
@@ -151,15 +151,6 @@ def test_kinds_go_by_speed(kicks):
     assert set(kicks.kinds) <= set(KINDS) and len(kicks.of_kind("pass", "left")) == 3
 
 
-def test_links_lie_beside_the_hits(library, kicks):
-    links = links_of(library, kicks)
-    assert len(links) >= 6
-    for link in links:
-        spans = [(one.hit.first, one.hit.last) for one in kicks.hits if one.clip == link.clip]
-        assert spans and all(link.last < first or link.first > last for first, last in spans)
-        assert 0 <= link.first < link.last < len(library.clips[link.clip].motion)
-
-
 def test_aligned_poses_do_not_know_where_the_body_is(library):
     motion, frames = library.clips[0].motion, np.array([10.0, 20.5, 31.0])
     here, there = aligned(motion, frames), aligned(place(motion, 1.9, (3.0, 4.0, 0.0)), frames)
@@ -168,49 +159,11 @@ def test_aligned_poses_do_not_know_where_the_body_is(library):
     np.testing.assert_allclose(here[0][:, 0, :2], 0.0, atol=1e-12)
 
 
-def test_a_stretch_is_left_for_itself_without_cost(library, kicks):
-    links = links_of(library, kicks)
-    found = Transitions.of(library, links, 0.2)
-    assert np.all(np.diag(found.cost) < 1e-3)
-    assert np.all(np.diag(found.leave) == np.diag(found.enter))
-
-
-def test_the_best_transition_is_the_best_of_all(library):
-    """Against every pair of frames by equation 1 itself, added up plainly."""
-    clips = [number for number, clip in enumerate(library.clips) if clip.path in ("walk.bvh", "inside.bvh")][:2]
-    links = [Link(clip, 10, 10 + int(library.clips[clip].motion.fps * 0.9)) for clip in clips]
-    weights = BoneWeights()
-    found = Transitions.of(library, links, 0.2, weights)
-    leave, enter, cost = found.best(0, 1)
-    scale = np.concatenate([weights.position, weights.velocity])[:, None]
-    poses = []
-    for link in links:
-        motion = library.clips[link.clip].motion
-        frames = np.arange(link.first, link.last + 1e-6, motion.fps / 60.0)
-        poses.append((frames, np.concatenate(aligned(motion, frames), axis=1) * scale))
-    plain = np.linalg.norm(poses[0][1][:, None] - poses[1][1][None], axis=-1).sum(axis=-1)
-    np.testing.assert_allclose(pose_distance(poses[0][1], poses[1][1]), plain, atol=1e-6)
-    length = 12
-    least = min(
-        np.mean([plain[a + k, b + k] for k in range(length + 1)])
-        for a in range(len(plain) - length) for b in range(plain.shape[1] - length)
-    )
-    assert least - 1e-9 <= cost <= 1.1 * least
-    assert links[0].first <= leave <= links[0].last and links[1].first <= enter <= links[1].last
-
-
-def test_weights_are_the_users(library, kicks):
-    links = links_of(library, kicks)
-    feet = Transitions.of(library, links, 0.3, BoneWeights((0, 0, 0, 0, 1, 1), (0,) * 6))
-    assert np.all(feet.cost <= Transitions.of(library, links, 0.3).cost + 1e-6)
+def test_weights_that_make_no_sense_are_refused():
     with pytest.raises(InputError, match="6 numbers"):
         BoneWeights((1.0, 2.0))
-    with pytest.raises(InputError, match="0 to 5"):
-        Transitions.of(library, links, -1.0)
 
 
-def test_a_library_without_hits_has_no_links(library):
-    assert links_of(library, HitLibrary("foot", ())) == ()
-    assert Transitions.of(library, ()).cost.shape == (0, 0)
+def test_a_library_without_hits_matches_nothing(library):
     order, distance = HitLibrary("foot", ()).match(HitLibrary.of(library).hits[0].hit)
     assert len(order) == len(distance) == 0

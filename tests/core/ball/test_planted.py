@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.ball.tracked.planted import planted_match
 from beyond_mocap.ball.tracked.planted_feed import sampled
 from beyond_mocap.ball.tracked.solve import solve
-from beyond_mocap.evaluation.touches import Reading, ReadTouch, scored
+from benchmarks.touch_score import Reading, ReadTouch, scored
 
 TIMES = np.arange(0.0, 60.0, 0.02)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
-from beyond_mocap.evaluation.touches import Reading, ReadTouch, read_touches, scored, scored_by_events
+from benchmarks.touch_score import Reading, ReadTouch, read_touches, scored, scored_by_events
 
 READ = Reading(
     ((10.0, 20.0), (40.0, 50.0)),

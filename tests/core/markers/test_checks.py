@@ -10,10 +10,17 @@ from beyond_mocap.files.marker_set_text import chosen_set
 from beyond_mocap.markers.assemble import model_from_frame
 from beyond_mocap.markers.checks import check, unused
 from beyond_mocap.markers.planted import planted
-from beyond_mocap.markers.planted_faults import mirrored, sides_exchanged
+from beyond_mocap.markers.planted_faults import mirrored
 from beyond_mocap.motion.gait import gait
 
 SET = chosen_set("plug_in_gait")
+
+
+def sides_exchanged(trial):
+    """The trial with every left label on the right marker and the other way round."""
+    other = {"L": "R", "R": "L"}
+    twins = {label: other.get(label[0], label[0]) + label[1:] for label in trial.labels}
+    return trial.renamed({label: twin for label, twin in twins.items() if twin != label and twin in trial.labels})
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,10 @@
-"""Shapes of clusters: the planted shape and its noise come back, whatever a few frames do; who moves together is
-found."""
+"""Shapes of clusters: the planted shape and its noise come back, whatever a few frames do; distances between markers
+tell bodies apart."""
 
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.cluster_shape import deformation, distance_spread, mean_shape, rigid_clusters
+from beyond_mocap.markers.cluster_shape import distance_spread, mean_shape
 from beyond_mocap.markers.robust import median, medians, quantile
 from beyond_mocap.motion import quaternion
 
@@ -29,8 +29,7 @@ def test_the_planted_shape_and_each_markers_noise_come_back():
     shape = mean_shape(seen)
     np.testing.assert_allclose(lengths(shape.places), lengths(CLUSTER), atol=0.001)
     assert shape.sigma[3] > 1.5 * shape.sigma[:3].max()
-    _, away = deformation(shape, seen)
-    assert 0.002 < np.sqrt(np.mean(away[:, 3] ** 2)) < 0.01
+    assert 0.002 < shape.sigma[3] < 0.01
 
 
 def test_swaps_ghosts_and_gaps_do_not_bend_it():
@@ -43,11 +42,9 @@ def test_swaps_ghosts_and_gaps_do_not_bend_it():
 
 def test_two_bodies_are_told_apart_by_their_distances():
     two = np.concatenate([moving(CLUSTER, seed=3), moving(CLUSTER[::-1], seed=4)], axis=1)[:, [0, 4, 1, 5, 2, 6, 3, 7]]
-    assert sorted(rigid_clusters(two)) == [[0, 2, 4, 6], [1, 3, 5, 7]]
     distance, spread = distance_spread(two)
     np.testing.assert_allclose(distance[0, 2], np.linalg.norm(CLUSTER[1] - CLUSTER[0]))
     assert spread[0, 2] < 1e-9 < 0.05 < spread[0, 1]
-    assert rigid_clusters(two[:, :2]) == []
 
 
 def test_quantiles_are_numpys_and_leave_out_nan():

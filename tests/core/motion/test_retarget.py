@@ -16,7 +16,7 @@ from beyond_mocap.motion.bone_map import load, pair, save
 from beyond_mocap.motion.gait import gait
 from beyond_mocap.motion.humanoid import heading, identify, leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.motion.retarget import Retargeter, retarget
+from beyond_mocap.motion.retarget import Retargeter
 from beyond_mocap.motion.skeleton import Skeleton
 
 MOCAP = Path(__file__).resolve().parents[4] / "shared/data/mocap"
@@ -24,6 +24,11 @@ RECORDED = {
     "cmu10": "10_01", "lmd/Player1": "P1_S01", "lafan1": "walk1_subject1", "runs15": "left05", "bandai": "run_normal",
     "sprinter": "0900", "keeper": "GK01_trial01", "getup": "faceup", "cmu_jumps": "118_01", "cmu_pitch": "124_01",
 }  # fmt: skip
+
+
+def retarget(motion, skeleton, bone_map=None, **how):
+    """The motion on another skeleton, studied by itself."""
+    return Retargeter(motion, skeleton, bone_map, **how).carry(motion)
 
 
 def other_axes(motion: Motion, seed: int) -> Motion:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from beyond_mocap.library.build import build
-from beyond_mocap.motion.gait import gait
 from beyond_mocap.plan import Plan
 from beyond_mocap.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.dragged import left_out

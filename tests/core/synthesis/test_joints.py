@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.synthesis.edit_list import find_seams
-from beyond_mocap.synthesis.joints import REACH, edit_list
+from beyond_mocap.synthesis.distance import REACH, edit_list
 
 SEEDS = range(40)
 
