@@ -34,6 +34,8 @@ def changed(_settings, _context) -> None:
 class BeyondMocapAim(bpy.types.PropertyGroup):
     """Who strikes a ball, towards what and how."""
 
+    attached_to = ("Object.beyond_mocap_aim",)
+
     on: BoolProperty(name="Aimed", description="Whether this ball is aimed at a target")
     live: BoolProperty(name="Live", default=True, update=changed, description="Aim again while the target is dragged")
     body: PointerProperty(

@@ -255,12 +255,16 @@ class BeyondMocapHold(bpy.types.PropertyGroup):
 class BeyondMocapBall(bpy.types.PropertyGroup):
     """What a ball keeps: who carries it when, and what it played before."""
 
+    attached_to = ("Object.beyond_mocap_ball",)
+
     holds: CollectionProperty(type=BeyondMocapHold, description="Who carries the ball, and when")
     before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before somebody carried it")
 
 
 class BeyondMocapHits(bpy.types.PropertyGroup):
     """What an armature keeps of its hit analysis."""
+
+    attached_to = ("Object.beyond_mocap_hits",)
 
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="The part whose strikes are looked for")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
@@ -275,6 +279,8 @@ class BeyondMocapHits(bpy.types.PropertyGroup):
 
 class BeyondMocapPasses(bpy.types.PropertyGroup):
     """A passing scene and its ball."""
+
+    attached_to = ("Scene.beyond_mocap_passes",)
 
     players: CollectionProperty(type=BeyondMocapPasser, description="Who keeps the ball going")
     active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
@@ -392,12 +398,6 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     )
     hold_first: IntProperty(name="From", default=1, description="Frame from which on the ball is carried")
     hold_last: IntProperty(name="To", default=30, description="Frame on which the ball is let go")
-
-
-CLASSES = (
-    BeyondMocapPasser, BeyondMocapPass, BeyondMocapWeights, BeyondMocapTouch, BeyondMocapHold, BeyondMocapBall,
-    BeyondMocapHits, BeyondMocapPasses,
-)
 
 
 def active_row(rows, number: int):

@@ -19,6 +19,8 @@ PROTOCOLS = (
 class BeyondMocapStream(bpy.types.PropertyGroup):
     """A stream of BVH frames from a program on this machine."""
 
+    attached_to = ("Scene.beyond_mocap_stream",)
+
     protocol: EnumProperty(name="Protocol", items=PROTOCOLS, default="udp", description="How frames come")
     port: IntProperty(
         name="Port", default=7001, min=1024, max=65535, description="Of this machine; nothing from outside gets in"
@@ -52,6 +54,8 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
 class BeyondMocapStreaming(bpy.types.PropertyGroup):
     """How the stream does; of the session, in no file."""
 
+    attached_to = ("WindowManager.beyond_mocap_streaming",)
+
     on: BoolProperty(description="Whether a stream is listened to")
     state: StringProperty(description="Waiting, receiving, stalled, ended, failed or stopped")
     line: StringProperty(description="The same in a sentence")
@@ -59,6 +63,3 @@ class BeyondMocapStreaming(bpy.types.PropertyGroup):
     hit: StringProperty(description="The last strike that was recognised")
     playing: BoolProperty(description="Whether the passing scene is played live")
     played: StringProperty(description="Lines about the rally that is played live")
-
-
-CLASSES = (BeyondMocapStream, BeyondMocapStreaming)

@@ -1,0 +1,1 @@
+"""What every room of the scene stands on: channels, clock, jobs, handlers, registration."""
