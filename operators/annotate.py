@@ -240,17 +240,21 @@ def _redraw(context) -> None:
                 area.tag_redraw()
 
 
-class BEYOND_MOCAP_OT_show_video(Verb, bpy.types.Operator):
+class VideoVerb(Verb):
+    """A verb about the reference video."""
+
+    @classmethod
+    def poll(cls, context):
+        """The reference video."""
+        cls.poll_message_set("Load a reference video first")
+        return context.scene.beyond_mocap.video.clip is not None
+
+
+class BEYOND_MOCAP_OT_show_video(VideoVerb, bpy.types.Operator):
     """Open a movie clip editor beside the 3D view, with the reference video in it"""
 
     bl_idname = "beyond_mocap.show_video"
     bl_label = "Show Beside the 3D View"
-
-    @classmethod
-    def poll(cls, context):
-        """There is a video, and a screen to show it on."""
-        cls.poll_message_set("Load a reference video first")
-        return context.scene.beyond_mocap.video.clip is not None
 
     def do(self, context):
         """Drive it anew, where that was lost, and show it."""
@@ -306,19 +310,13 @@ its own speed whatever the scene's frame rate"""
         self.report({"INFO"}, f"{clip.name}: {clip.frame_duration} frames at {rate:.6g} per second")
 
 
-class BEYOND_MOCAP_OT_move_video(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_move_video(VideoVerb, bpy.types.Operator):
     """Move the reference video against the track by frames of the video: earlier, it shows later pictures now"""
 
     bl_idname = "beyond_mocap.move_video"
     bl_label = "Move Reference Video"
 
     frames: IntProperty(name="Frames", default=1, description="Frames of the video by which it begins later")
-
-    @classmethod
-    def poll(cls, context):
-        """There is a video."""
-        cls.poll_message_set("Load a reference video first")
-        return context.scene.beyond_mocap.video.clip is not None
 
     def do(self, context):
         """Add to its begin."""

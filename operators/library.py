@@ -19,6 +19,16 @@ if TYPE_CHECKING:
     from ..beyond_mocap.library.library import Library
 
 
+class FolderVerb(BackgroundVerb):
+    """A verb about the library's folder."""
+
+    @classmethod
+    def poll(cls, context):
+        """A folder has to be chosen."""
+        cls.poll_message_set("Choose the library's folder first")
+        return bool(context.scene.beyond_mocap.library_folder)
+
+
 class ClipVerb(Verb):
     """A verb about one clip of the list: the one that it is told, else the one chosen there."""
 
@@ -64,7 +74,7 @@ class Built:
     files: dict
 
 
-class BEYOND_MOCAP_OT_build_library(BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_build_library(FolderVerb, bpy.types.Operator):
     """Read all clips of the library folder, their words and foot contacts, and sort them for the search.
 The result is kept in a cache, so that the next time takes a moment; when anything in the folder has changed, all of it
 is read again. FBX, glTF and USD clips are converted first, each once"""
@@ -79,12 +89,6 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
     rebuild: BoolProperty(
         name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"}
     )
-
-    @classmethod
-    def poll(cls, context):
-        """A folder has to be chosen."""
-        cls.poll_message_set("Choose the library's folder first")
-        return bool(context.scene.beyond_mocap.library_folder)
 
     def order(self, context):
         """Folder and unit."""
@@ -201,7 +205,7 @@ class ListOrder:
     built: "Library | None"
 
 
-class BEYOND_MOCAP_OT_list_clips(BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_list_clips(FolderVerb, bpy.types.Operator):
     """List the clips of the folder with their words, without reading their motion. For speeds and quality press Build
 Library"""
 
@@ -209,12 +213,6 @@ Library"""
     bl_label = "List Clips"
     bl_options = {"REGISTER"}
     kind = "list"
-
-    @classmethod
-    def poll(cls, context):
-        """A folder has to be chosen."""
-        cls.poll_message_set("Choose the library's folder first")
-        return bool(context.scene.beyond_mocap.library_folder)
 
     def order(self, context):
         """The folder."""

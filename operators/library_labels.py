@@ -12,8 +12,18 @@ from ..beyond_mocap.errors import BeyondMocapError, InputError
 from ..scene import areas, clip_annotation, clips, lanes, preferences, proposals, recordings, session
 from ..scene.settings import absolute
 from .annotate import SPACES
-from .library import ClipVerb
-from .verb import BackgroundVerb, Verb
+from .library import ClipVerb, FolderVerb
+from .verb import Verb
+
+
+class OpenClipVerb(Verb):
+    """A verb about the library clip that the active armature shows."""
+
+    @classmethod
+    def poll(cls, context):
+        """An armature that shows a clip."""
+        cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
+        return bool(clip_annotation.shown(context.object))
 
 
 class BEYOND_MOCAP_OT_annotate_clip(ClipVerb, bpy.types.Operator):
@@ -40,7 +50,7 @@ the NLA editor. Change them there, or have words proposed, then press Save Words
         self.report({"INFO"}, f"{rig.name}: {len(rows)} {'row' if len(rows) == 1 else 'rows'} of words")
 
 
-class BEYOND_MOCAP_OT_propose_words(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_propose_words(OpenClipVerb, bpy.types.Operator):
     """Propose words for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
 headers, turns, getting up; and all that was learned from annotated clips. Look through them; what neither knows is
 yours to add"""
@@ -61,12 +71,6 @@ yours to add"""
         name="One by One", default=False, options={"SKIP_SAVE"},
         description="Only list them: each becomes a strip or key moment when it is accepted",
     )
-
-    @classmethod
-    def poll(cls, context):
-        """An armature that shows a clip."""
-        cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
-        return bool(clip_annotation.shown(context.object))
 
     def do(self, context):
         """Look at the recording itself, then lay the strips."""
@@ -263,7 +267,7 @@ def _over_editor(context, event) -> bool:
     return any(area.type in SPACES for area in inside)
 
 
-class BEYOND_MOCAP_OT_save_words(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_save_words(OpenClipVerb, bpy.types.Operator):
     """Write the words of the active clip's strips to NAME.txt beside the clip, or into the annotations.csv that speaks
 of it. What is written there already is overwritten only when you say so"""
 
@@ -274,12 +278,6 @@ of it. What is written there already is overwritten only when you say so"""
     overwrite: BoolProperty(
         name="Overwrite", description="Replace what is written about this clip", options={"SKIP_SAVE"}
     )
-
-    @classmethod
-    def poll(cls, context):
-        """An armature that shows a clip."""
-        cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
-        return bool(clip_annotation.shown(context.object))
 
     def invoke(self, context, event):
         """Ask before words are overwritten."""
@@ -323,7 +321,7 @@ class Order:
     out: str
 
 
-class BEYOND_MOCAP_OT_learn_words(BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_learn_words(FolderVerb, bpy.types.Operator):
     """Learn from the library's clips that have words, ten are enough to begin with, so that Propose Words finds the
 same acts in others. What is learned is kept in a file, which serves any library"""
 
@@ -334,12 +332,6 @@ same acts in others. What is learned is kept in a file, which serves any library
     out: StringProperty(
         name="File", subtype="FILE_PATH", options={"SKIP_SAVE"}, description="Where it is kept; empty: in the cache"
     )
-
-    @classmethod
-    def poll(cls, context):
-        """A folder has to be chosen."""
-        cls.poll_message_set("Choose the library's folder first")
-        return bool(context.scene.beyond_mocap.library_folder)
 
     def order(self, context):
         """Folder, unit and where to."""

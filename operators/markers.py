@@ -15,7 +15,7 @@ from ..scene import linked
 from ..scene.markers import cloud, models, sets, solve, thrown
 from ..scene.markers.settings import cloud_meant, clouds, is_cloud
 from ..scene.settings import as_setting
-from .verb import BackgroundVerb, ImportVerb, Verb
+from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
 
 
 class OnMarkers:
@@ -103,18 +103,13 @@ set know their segments at once"""
         return thing
 
 
-class BEYOND_MOCAP_FH_markers(bpy.types.FileHandler):
+class BEYOND_MOCAP_FH_markers(DroppedIntoView, bpy.types.FileHandler):
     """Recordings of optical markers dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_markers"
     bl_label = "Optical markers"
     bl_import_operator = "beyond_mocap.import_markers"
     bl_file_extensions = ".c3d;.trc"
-
-    @classmethod
-    def poll_drop(cls, context):
-        """The 3D view, where the cloud will be."""
-        return context.area is not None and context.area.type == "VIEW_3D"
 
 
 _segments: list[tuple[str, str, str]] = []

@@ -13,7 +13,7 @@ from ..scene.match import cameras, child, load, order, ours, reading, show
 from ..scene.match.settings import active_of, typed
 from ..scene.measure import frames_per_second
 from ..scene.settings import as_setting
-from .verb import BackgroundVerb, ExportVerb, Verb
+from .verb import BackgroundVerb, DroppedIntoView, ExportVerb, Verb
 
 MAKING = 0.85
 """Of the bar, the share of making where a match is made and shown."""
@@ -86,18 +86,13 @@ The first minute is chosen"""
         self.report({"INFO"}, f"{len(read.players)} players, {match.length_s / 60.0:.1f} minutes, {read.provider}")
 
 
-class BEYOND_MOCAP_FH_match(bpy.types.FileHandler):
+class BEYOND_MOCAP_FH_match(DroppedIntoView, bpy.types.FileHandler):
     """A provider's tracking of a match dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_match"
     bl_label = "Match of all players"
     bl_import_operator = "beyond_mocap.read_match"
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are words; tracking as text is chosen by name
-
-    @classmethod
-    def poll_drop(cls, context):
-        """The 3D view, where the match will be."""
-        return context.area is not None and context.area.type == "VIEW_3D"
 
 
 def _size(path: Path) -> int:
@@ -203,7 +198,17 @@ the one that is shown"""
         return wanted, load.scenery(wanted, library, progress, cancelled), ()
 
 
-class BEYOND_MOCAP_OT_match_second(Verb, bpy.types.Operator):
+class ShownMatchVerb(Verb):
+    """A verb about the match that is shown."""
+
+    @classmethod
+    def poll(cls, context):
+        """The match that is shown."""
+        cls.poll_message_set("Press Make Match or Show Match first")
+        return bool(ours.bodies(context.scene))
+
+
+class BEYOND_MOCAP_OT_match_second(ShownMatchVerb, bpy.types.Operator):
     """Go to this second of the shown match, and select this player. The page over a match names both for its worst
 seconds"""
 
@@ -212,12 +217,6 @@ seconds"""
 
     seconds: FloatProperty(name="Second", options={"SKIP_SAVE"}, description="Of the match's clock")
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody")
-
-    @classmethod
-    def poll(cls, context):
-        """A match is shown."""
-        cls.poll_message_set("Press Make Match or Show Match first")
-        return bool(ours.bodies(context.scene))
 
     def invoke(self, context, _event):
         """Ask which second."""
@@ -263,7 +262,7 @@ WHICH = (
 )
 
 
-class BEYOND_MOCAP_OT_match_camera(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
     """Look through one of the match's cameras"""
 
     bl_idname = "beyond_mocap.match_camera"
@@ -271,12 +270,6 @@ class BEYOND_MOCAP_OT_match_camera(Verb, bpy.types.Operator):
 
     which: EnumProperty(name="Which", items=WHICH, default="STAND", description="The camera to look through")
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the chosen one")
-
-    @classmethod
-    def poll(cls, context):
-        """A match is shown."""
-        cls.poll_message_set("Press Make Match or Show Match first")
-        return bool(ours.bodies(context.scene))
 
     @classmethod
     def description(cls, _context, properties):

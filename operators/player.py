@@ -12,7 +12,7 @@ from ..beyond_mocap.files.providers import PROVIDERS
 from ..scene import bake, dots, pins, plans, preview, strip_events, strips, tracks, word_checks
 from ..scene.settings import active_player, as_setting
 from ..scene.subject import show
-from .verb import ImportVerb, Verb
+from .verb import DroppedIntoView, ImportVerb, Verb
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
 SECTION = 60.0  # seconds of a whole match that are taken at first
@@ -133,18 +133,13 @@ def free_name(wanted: str, taken: set[str]) -> str:
     return name
 
 
-class BEYOND_MOCAP_FH_tracking(bpy.types.FileHandler):
+class BEYOND_MOCAP_FH_tracking(DroppedIntoView, bpy.types.FileHandler):
     """Tracking files dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_tracking"
     bl_label = "Player tracking"
     bl_import_operator = "beyond_mocap.import_tracking"
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"
-
-    @classmethod
-    def poll_drop(cls, context):
-        """The 3D view, where the dots will be."""
-        return context.area is not None and context.area.type == "VIEW_3D"
 
 
 class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):

@@ -33,18 +33,22 @@ Nothing from other machines gets in, and nothing is sent"""
         follow.began()
 
 
-class BEYOND_MOCAP_OT_stream_stop(Verb, bpy.types.Operator):
+class ListeningVerb(Verb):
+    """A verb about the stream that is received."""
+
+    @classmethod
+    def poll(cls, context):
+        """The stream that is received."""
+        cls.poll_message_set("No stream is listened to: press Start Stream first")
+        return receiver.listener() is not None
+
+
+class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
     """Stop listening and close the port; the streamed body stays as it stands"""
 
     bl_idname = "beyond_mocap.stream_stop"
     bl_label = "Stop Stream"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        """Something to stop."""
-        cls.poll_message_set("No stream is listened to: press Start Stream first")
-        return receiver.listener() is not None
 
     def do(self, context):
         """Close."""
@@ -52,18 +56,22 @@ class BEYOND_MOCAP_OT_stream_stop(Verb, bpy.types.Operator):
         follow.tell()
 
 
-class BEYOND_MOCAP_OT_stream_end(Verb, bpy.types.Operator):
+class PlayingVerb(Verb):
+    """A verb about what is played live."""
+
+    @classmethod
+    def poll(cls, context):
+        """What is played live."""
+        cls.poll_message_set("Nothing is played live: press Play Live first")
+        return play.rally() is not None
+
+
+class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
     """Answer no more strikes; what was played stays as it is and can be played back"""
 
     bl_idname = "beyond_mocap.stream_end"
     bl_label = "Stop Playing"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        """Something that is played."""
-        cls.poll_message_set("Nothing is played live: press Play Live first")
-        return play.rally() is not None
 
     def do(self, context):
         """No more."""
@@ -72,7 +80,7 @@ class BEYOND_MOCAP_OT_stream_end(Verb, bpy.types.Operator):
         told.playing, told.played = False, ""
 
 
-class BEYOND_MOCAP_OT_stream_keep(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
     """Make a body that plays the last seconds of the stream, from the present frame on"""
 
     bl_idname = "beyond_mocap.stream_keep"
@@ -81,12 +89,6 @@ class BEYOND_MOCAP_OT_stream_keep(Verb, bpy.types.Operator):
     seconds: FloatProperty(
         name="Seconds", default=10.0, min=0.1, max=20.0, description="How much of what has just been seen is kept"
     )
-
-    @classmethod
-    def poll(cls, context):
-        """Something to keep."""
-        cls.poll_message_set("No stream is listened to: press Start Stream first")
-        return receiver.listener() is not None
 
     def do(self, context):
         """Read the ring, write an action."""
@@ -129,19 +131,13 @@ the scene plays on meanwhile"""
         play.show(scene, result)
 
 
-class BEYOND_MOCAP_OT_stream_target(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_stream_target(PlayingVerb, bpy.types.Operator):
     """Let the next pass of Play Live go to this player"""
 
     bl_idname = "beyond_mocap.stream_target"
     bl_label = "Pass To"
 
     number: IntProperty(name="Number", default=1, min=1, max=99, description="Of the player in the list, from 1")
-
-    @classmethod
-    def poll(cls, context):
-        """Something that is played."""
-        cls.poll_message_set("Nothing is played live: press Play Live first")
-        return play.rally() is not None
 
     def do(self, context):
         """Remember who."""

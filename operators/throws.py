@@ -53,42 +53,37 @@ changed as little as it takes. Without a target the 3D cursor is aimed at. Press
     act = "throw"
 
 
-class BEYOND_MOCAP_OT_leave_throw(Verb, bpy.types.Operator):
+class ThrownVerb(Verb):
+    """A verb about the throw or kick that is shown."""
+
+    @classmethod
+    def poll(cls, context):
+        """The meant armature shows one."""
+        cls.poll_message_set("Select an armature that throws or kicks")
+        body = thrower(context)
+        return body is not None and bool(body.beyond_mocap_throw.made)
+
+
+class BEYOND_MOCAP_OT_leave_throw(ThrownVerb, bpy.types.Operator):
     """Take the throw or kick away: armature and ball play what they did before"""
 
     bl_idname = "beyond_mocap.leave_throw"
     bl_label = "Leave Throw"
-
-    @classmethod
-    def poll(cls, context):
-        """A throw that is shown."""
-        return _thrown(cls, context)
 
     def do(self, context):
         """Bring back what was there."""
         shown.leave(context.scene, thrower(context))
 
 
-class BEYOND_MOCAP_OT_keep_throw(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_keep_throw(ThrownVerb, bpy.types.Operator):
     """Keep the throw or kick: it is the armature's own motion from now on, and the next one begins from it"""
 
     bl_idname = "beyond_mocap.keep_throw"
     bl_label = "Keep Throw"
 
-    @classmethod
-    def poll(cls, context):
-        """A throw that is shown."""
-        return _thrown(cls, context)
-
     def do(self, context):
         """Nothing of before is kept."""
         shown.keep(thrower(context))
-
-
-def _thrown(cls, context) -> bool:
-    cls.poll_message_set("Select an armature that throws or kicks")
-    body = thrower(context)
-    return body is not None and bool(body.beyond_mocap_throw.made)
 
 
 class BEYOND_MOCAP_OT_kick_at_target(AtTarget, bpy.types.Operator):

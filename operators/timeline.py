@@ -71,6 +71,16 @@ def selected_spans(target: bpy.types.Object) -> list[lanes.PlacedSpan]:
     return [span for span in lanes.spans(target) if span.selected]
 
 
+def draw_complaints(layout, context: bpy.types.Context, item) -> None:
+    """What is wrong with the words of the span or key moment that `item()` returns, a line each."""
+    try:
+        lines = word_checks.lines_for(context.scene, item())
+    except InputError as error:
+        lines = [str(error)]
+    for line in lines:
+        layout.label(text=line, icon="ERROR")
+
+
 def playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
     """The playhead, in seconds on the clock of the object's strips."""
     return clock(context, target).seconds(context.scene.frame_current_final)
@@ -289,12 +299,7 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
     def draw(self, context):
         """The words, and what is wrong with them."""
         self.layout.prop(self, "words")
-        try:
-            lines = word_checks.lines_for(context.scene, said(self.words, 0.0))
-        except InputError as error:
-            lines = [str(error)]
-        for line in lines:
-            self.layout.label(text=line, icon="ERROR")
+        draw_complaints(self.layout, context, lambda: said(self.words, 0.0))
 
     def do(self, context):
         """Set the marker, picked."""

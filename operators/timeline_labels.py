@@ -10,11 +10,11 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
 from ..beyond_mocap.errors import InputError
-from ..scene import clip_annotation, lanes, lay_strips, plans, recordings, strips, tracks, word_checks
+from ..scene import clip_annotation, lanes, lay_strips, plans, recordings, strips, tracks
 from ..scene.settings import active_player, as_setting
 from ..scene.strip_lines import said, words_of
 from ..scene.subject import clip, clock, name_of, subject, with_lanes
-from .timeline import TimelineVerb, WritingVerb, playhead, selected_spans
+from .timeline import TimelineVerb, WritingVerb, draw_complaints, playhead, selected_spans
 from .verb import ImportVerb, Verb
 
 
@@ -42,12 +42,7 @@ playhead on"""
     def draw(self, context):
         """The words, and what is wrong with them."""
         self.layout.prop(self, "words")
-        try:
-            lines = word_checks.lines_for(context.scene, said(self.words, 0.0, 1.0))
-        except InputError as error:
-            lines = [str(error)]
-        for line in lines:
-            self.layout.label(text=line, icon="ERROR")
+        draw_complaints(self.layout, context, lambda: said(self.words, 0.0, 1.0))
 
     def do(self, context):
         """Lay the strip."""
@@ -170,13 +165,7 @@ or that the library does not have, are told while you type"""
     def draw(self, context):
         """The words, and what is wrong with them."""
         self.layout.prop(self, "words", text="")
-        try:
-            placed = chosen(subject(context))
-            lines = word_checks.lines_for(context.scene, _said(self.words, placed))
-        except InputError as error:
-            lines = [str(error)]
-        for line in lines:
-            self.layout.label(text=line, icon="ERROR")
+        draw_complaints(self.layout, context, lambda: _said(self.words, chosen(subject(context))))
 
     def do(self, context):
         """Write them."""

@@ -1,4 +1,4 @@
-"""The "Beyond Mocap" tab in the 3D viewport's sidebar, with a module per feature; `bl_order` is the order on the screen."""
+"""The "Beyond Mocap" tab in the 3D viewport's sidebar: a module per feature, shown in the order of `bl_order`."""
 
 from ..scene.core import registration
 

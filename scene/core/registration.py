@@ -1,8 +1,8 @@
 """Registers whatever the modules of a package define: no list of classes has to be kept anywhere.
 
 A class is registered because it is a Blender class that a module defines; one that Blender's own data carries says so
-in `attached_to`. A module that has to do more has a function `register()`, `unregister()` or both. A package that has them
-in its `__init__` looks after its own modules.
+in `attached_to` ("Scene.beyond_mocap"). A module that has to do more has a function `register()`, `unregister()` or
+both. A package that has `register()` in its `__init__` looks after its own modules.
 """
 
 from __future__ import annotations
