@@ -1,19 +1,20 @@
-"""Annotate by Keys: words at the playhead by number keys while the match plays; a shell over the core's
-`annotating`."""
+"""Annotate by keys while the match plays (a shell over the core's `annotating`), and the reference video beside it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
 
 from ..beyond_mocap.annotation import annotating
 from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import areas, popup
+from ..scene import areas, popup, video
 from ..scene.annotating import do, held, name_of, now, type_keys
 from ..scene.core import window
+from ..scene.video import drive
 from .verb import Verb
 
 SPACES = {
@@ -184,6 +185,11 @@ def unwatch() -> None:
     _menu.clear()
 
 
+def unregister() -> None:
+    """The menu goes with the extension."""
+    unwatch()
+
+
 def _watch() -> None:
     """Let the menu be drawn in every editor in which one annotates."""
     unwatch()
@@ -226,3 +232,104 @@ def _largest(context) -> tuple[bpy.types.Area, bpy.types.Region]:
 
 def _holds(place, event) -> bool:
     return 0 <= event.mouse_x - place.x < place.width and 0 <= event.mouse_y - place.y < place.height
+
+
+class VideoVerb(Verb):
+    """A verb about the reference video."""
+
+    @classmethod
+    def poll(cls, context):
+        """The reference video."""
+        cls.poll_message_set("Load a reference video first")
+        return context.scene.beyond_mocap.video.clip is not None
+
+
+class BEYOND_MOCAP_OT_show_video(VideoVerb, bpy.types.Operator):
+    """Open a movie clip editor beside the 3D view, with the reference video in it"""
+
+    bl_idname = "beyond_mocap.show_video"
+    bl_label = "Show Beside the 3D View"
+
+    def do(self, context):
+        """Drive it anew, where that was lost, and show it."""
+        drive(context.scene)
+        beside(context, context.scene.beyond_mocap.video.clip)
+
+
+def beside(context: bpy.types.Context, clip: bpy.types.MovieClip) -> None:
+    """Show the clip in a clip editor: one that is open, else the left half of the largest 3D view, else nowhere."""
+    area = areas.editor(context, "CLIP_EDITOR", "VERTICAL", 0.45)
+    if area is None:
+        return
+    space = area.spaces.active
+    space.mode, space.view = "TRACKING", "CLIP"
+    space.clip = clip
+    for part in ("show_region_toolbar", "show_region_ui", "show_region_hud"):
+        if hasattr(space, part):
+            setattr(space, part, False)
+    space.lock_selection = False
+    area.tag_redraw()
+
+
+FILES = "*.mp4;*.mov;*.avi;*.mkv;*.webm;*.m4v;*.mpg;*.mpeg;*.mts;*.png;*.jpg;*.jpeg;*.tif;*.tiff;*.bmp;*.exr"
+
+
+class BEYOND_MOCAP_OT_load_video(Verb, ImportHelper, bpy.types.Operator):
+    """Load a movie, or the first picture of an image sequence, to watch beside the match while annotating. It plays at
+its own speed whatever the scene's frame rate"""
+
+    bl_idname = "beyond_mocap.load_video"
+    bl_label = "Load Reference Video"
+
+    filter_glob: StringProperty(default=FILES, options={"HIDDEN"})
+    rate: FloatProperty(
+        name="Frames per Second", default=0.0, min=0.0, max=1000.0, precision=3,
+        description="Of the video; 0 takes what a movie file says, and for an image sequence the scene's own rate",
+    )
+    show: BoolProperty(name="Show", default=True, description="Open an editor beside the 3D view for it")
+
+    def invoke(self, context, event):
+        """The file browser."""
+        return ImportHelper.invoke(self, context, event)
+
+    def do(self, context):
+        """Load it and drive it; then make room for it."""
+        if not self.filepath:
+            raise InputError("video", "no file given", "a movie, or the first picture of a sequence", "choose one")
+        clip, scene = video.load(bpy.path.abspath(self.filepath)), context.scene
+        video.show(scene, clip, self.rate or None)
+        if self.show:
+            beside(context, clip)
+        rate = scene.beyond_mocap.video.rate
+        self.report({"INFO"}, f"{clip.name}: {clip.frame_duration} frames at {rate:.6g} per second")
+
+
+class BEYOND_MOCAP_OT_move_video(VideoVerb, bpy.types.Operator):
+    """Move the reference video against the track by frames of the video: earlier, it shows later pictures now"""
+
+    bl_idname = "beyond_mocap.move_video"
+    bl_label = "Move Reference Video"
+
+    frames: IntProperty(name="Frames", default=1, description="Frames of the video by which it begins later")
+
+    def do(self, context):
+        """Add to its begin."""
+        video = context.scene.beyond_mocap.video
+        video.begins += self.frames / video.rate
+
+
+class BEYOND_MOCAP_OT_remove_video(Verb, bpy.types.Operator):
+    """Let go of the reference video; the movie clip itself stays in the file"""
+
+    bl_idname = "beyond_mocap.remove_video"
+    bl_label = "Remove Reference Video"
+
+    @classmethod
+    def poll(cls, context):
+        """There is one."""
+        cls.poll_message_set("There is no reference video")
+        return context.scene.beyond_mocap.video.clip is not None
+
+    def do(self, context):
+        """Release it."""
+        video.release(context.scene)

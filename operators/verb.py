@@ -64,6 +64,15 @@ class ImportVerb(Verb, ImportHelper):
         return [Path(bpy.path.abspath(self.filepath))] if self.filepath else []
 
 
+class DroppedIntoView:
+    """To be mixed into a file handler: its files are dropped into a 3D view."""
+
+    @classmethod
+    def poll_drop(cls, context):
+        """A 3D view is under the pointer."""
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
 class ExportVerb(Verb, ExportHelper):
     """A verb that writes a file in the form that its property `format` names."""
 

@@ -1,51 +1,17 @@
-"""Ball & Passes: where a body can strike, who passes to whom, who carries the ball, and the ball of a tracking file."""
+"""Ball & Passes: the panel and its parts about the ball: tracked, struck, carried, aimed."""
 
 from __future__ import annotations
 
 import bpy
 
+from ..scene.aimed.settings import aimed_ball
 from ..scene.passes import graph
 from ..scene.passes.settings import active_row, ball_of, subject, told_lines
-from .aim import aim
+from .passes import passing
 from .stream import live, stream
 from .tab import Step, paragraph, section, split, table
 
-PART_ICONS = {
-    "foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"
-}  # fmt: skip
-KIND_ICONS = {"toss": "IPO_SINE", "pass": "IPO_QUAD", "attack": "IPO_EXPO"}
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
-
-
-class BEYOND_MOCAP_UL_passers(bpy.types.UIList):
-    """The players of a passing scene."""
-
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One player."""
-        row = layout.row(align=True)
-        row.prop(item, "name", text="", emboss=False)
-        row.label(text="", icon=PART_ICONS[item.part])
-        shirt = row.row()
-        shirt.ui_units_x = 1.0
-        shirt.prop(item, "shirt", text="")
-        if item.place is None:
-            row.label(text="", icon="ERROR")
-
-
-class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
-    """The passes, one after the other."""
-
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One pass."""
-        row = layout.row(align=True)
-        row.label(text=f"{item.who} to {item.to}", icon=KIND_ICONS[item.kind])
-        bounces = row.row()
-        bounces.active, bounces.alignment = False, "RIGHT"
-        bounces.label(
-            text=f"{item.bounces} {'bounce' if item.bounces == 1 else 'bounces'}" if item.bounces else "direct"
-        )
-        if item.error != "none":
-            row.label(text="", icon="CANCEL")
 
 
 class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
@@ -77,123 +43,6 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
         section(layout, "ball_aim", "Aim Ball", lambda opened: aim(opened, context))
         section(layout, "ball_stream", "Live Stream", lambda opened: stream(opened, context))
         section(layout, "ball_live", "Play Live", lambda opened: live(self, opened, context))
-
-
-def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
-    """A list with what adds to it, takes away and moves."""
-    row = layout.row()
-    row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active, rows=3)
-    column = row.column(align=True)
-    for what, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
-        button = column.operator(f"beyond_mocap.{verb}", text="", icon=icon)
-        button.rows, button.what = rows, what
-
-
-def passing(panel, layout, context) -> None:
-    """Players, passes, ball, and what comes of them."""
-    settings = context.scene.beyond_mocap_passes
-    row = layout.row(align=True)
-    row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
-    row.operator("beyond_mocap.passes_from_json", text="", icon="IMPORT")
-    row.operator("beyond_mocap.passes_to_json", text="", icon="EXPORT")
-    lists(layout, "passers", settings, "players", "active_player", "passes_list")
-    if player := active_row(settings.players, settings.active_player):
-        of_player(layout, player)
-    lists(layout, "passes", settings, "passes", "active_pass", "passes_list")
-    if one := active_row(settings.passes, settings.active_pass):
-        of_pass(layout, settings, one)
-    row = layout.row(align=True)
-    row.scale_y = 1.3
-    row.operator("beyond_mocap.passes_make", icon="PLAY")
-    row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
-    row.operator("beyond_mocap.passes_clear", text="", icon="X")
-    panel.progress(context, "passes")
-    for line in settings.told.splitlines():
-        paragraph(layout, line, "INFO")
-    if settings.strikes:
-        section(layout, "ball_strikes", "Strikes", lambda opened: strikes(opened, settings))
-    section(layout, "ball_choices", "Choices", lambda opened: choices(opened, settings))
-    section(layout, "ball_ball", "Ball & Air", lambda opened: of_ball(opened, settings))
-
-
-def strikes(layout, settings) -> None:
-    """Figures, and a line for each strike that goes there."""
-    table(layout, settings.figures.splitlines())
-    column = layout.column(align=True)
-    for frame, text in told_lines(settings.strikes):
-        column.operator("beyond_mocap.go_to_strike", text=f"{frame}  {text}", icon="KEYTYPE_KEYFRAME_VEC").frame = frame
-
-
-def of_player(layout, player) -> None:
-    """Where the picked player stands, and what he strikes with."""
-    column = split(layout)
-    for name in ("place", "body", "part"):
-        column.prop(player, name)
-    if player.part in {"foot", "hand", "tool"} and not player.bone:
-        column.prop(player, "side")
-    if player.part == "tool":
-        for name in ("tool_length", "tool_reach", "tool_radius"):
-            column.prop(player, name)
-    column.prop(player, "bone")
-    column.prop(player, "height")
-
-
-def of_pass(layout, settings, one) -> None:
-    """How the picked pass goes."""
-    column = split(layout)
-    column.prop_search(one, "who", settings, "players")
-    column.prop_search(one, "to", settings, "players")
-    column.row().prop(one, "kind", expand=True)
-    for name in ("bounces", "seconds", "at", "part", "side", "error", "actor"):
-        column.prop(one, name)
-    if one.actor is not None:
-        for name in ("actor_cut", *(("actor_first", "actor_last") if one.actor_cut else ())):
-            column.prop(one, name)
-        return
-    if one.actor_known:
-        column.prop(one, "actor_known", icon="ERROR")
-        return
-    for name in ("clip", *(("first", "last") if one.clip else ())):
-        column.prop(one, name)
-
-
-def choices(layout, settings) -> None:
-    """What holds for all passes."""
-    column = split(layout)
-    for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
-        column.prop(settings, name)
-    if settings.serve_from == "PLAYER":
-        column.prop_search(settings, "serve", settings, "players")
-    if settings.serve_from == "PLACE":
-        column.prop(settings, "serve_at")
-    for name in ("transition", "turns", "watch", "missed", "dropped", "seed", "net"):
-        column.prop(settings, name)
-    if settings.net:
-        for name in ("net_from", "net_to", "net_height"):
-            column.prop(settings, name)
-    section(column, "ball_weights", "Weights", lambda opened: weights(opened, settings))
-
-
-def weights(layout, settings) -> None:
-    """Of eq. 1 and 2."""
-    column = split(layout)
-    for title, names in (
-        ("Two Strikes Compared", ("speed", "vectors", "times")),
-        ("Two Poses Compared", ("position", "velocity", "bones")),
-    ):
-        column.label(text=title)
-        for name in names:
-            column.prop(settings.weights, name)
-
-
-def of_ball(layout, settings) -> None:
-    """The ball's kind, or numbers of one's own."""
-    column = split(layout)
-    column.prop(settings, "ball")
-    column.prop(settings, "own")
-    if settings.own:
-        for name in ("radius", "restitution", "linear_drag", "drag", "gravity"):
-            column.prop(settings, name)
 
 
 def tracked(panel, layout, context) -> None:
@@ -270,3 +119,57 @@ def carried(layout, context) -> None:
         row = layout.row(align=True)
         row.label(text=f"{hold.first} to {hold.last}: {hold.body.name if hold.body else 'gone'}, {hold.bone}")
         row.operator("beyond_mocap.free_ball", text="", icon="X").number = number
+
+
+def aim(layout, context) -> None:
+    """The button; of the ball that is meant, who strikes it, towards what and how, and what comes of it."""
+    ball = aimed_ball(context)
+    layout.operator("beyond_mocap.aim_ball", icon="CON_TRACKTO", text="Aim Again" if ball is not None else "Aim Ball")
+    if ball is not None:
+        of_aimed_ball(layout, ball)
+    physics(layout, context, ball)
+
+
+def of_aimed_ball(layout, ball) -> None:
+    """An aimed ball's settings and figures."""
+    settings = ball.beyond_mocap_aim
+    row = layout.row(align=True)
+    row.label(text=ball.name, icon="SPHERE")
+    row.prop(settings, "live", text="", icon="LINKED" if settings.live else "UNLINKED")
+    row.operator("beyond_mocap.leave_aim", text="", icon="X")
+    column = layout.column()
+    column.use_property_split, column.use_property_decorate = True, False
+    column.enabled = not settings.handed
+    column.prop(settings, "target")
+    column.row().prop(settings, "way", expand=True)
+    if settings.way == "AIR":
+        column.prop(settings, "bounces")
+    column.prop(settings, "timing")
+    if settings.timing != "FREE":
+        column.prop(settings, "seconds" if settings.timing == "SECONDS" else "arrival")
+    column.prop(settings, "body")
+    if settings.body is not None:
+        column.prop(settings, "part")
+        if settings.part in {"foot", "hand", "tool"} and not settings.bone:
+            column.prop(settings, "side")
+        column.prop_search(settings, "bone", settings.body.data, "bones")
+        pair = column.column(align=True)
+        pair.prop(settings, "first")
+        pair.prop(settings, "last")
+    for name in ("ball", "back", "left", "follow", "human"):
+        if settings.way == "AIR" or name not in ("back", "left"):
+            column.prop(settings, name)
+    if settings.told:
+        paragraph(layout, settings.told, "ERROR")
+    table(layout, settings.figures.splitlines())
+
+
+def physics(layout, context, ball) -> None:
+    """To Blender's rigid bodies and back."""
+    row = layout.row(align=True)
+    if ball is not None and ball.beyond_mocap_aim.handed:
+        row.operator("beyond_mocap.ball_from_physics", icon="LOOP_BACK")
+        row.label(text=f"since frame {ball.beyond_mocap_aim.handover}")
+    else:
+        text = f"To Physics from Frame {context.scene.frame_current}"
+        row.operator("beyond_mocap.ball_to_physics", icon="PHYSICS", text=text)

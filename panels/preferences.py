@@ -1,11 +1,37 @@
-"""The add-on's own page in Blender's preferences: where caches go, threads, keys."""
+"""The add-on's own page in Blender's preferences: where caches go, threads, keys.
+
+The keys that are drawn are the user's own configuration, found by our operators' names, so that changes are kept by
+Blender.
+"""
 
 from __future__ import annotations
 
 import bpy
+import rna_keymap_ui
 
 from ..scene.preferences import EXTENSION, Preferences
-from .keys import draw_keys
+
+
+def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """A row for every key of the extension, under the name of the editor in which it works."""
+    configurations = context.window_manager.keyconfigs
+    for keymap in _with_our_keys(configurations.addon):
+        own = configurations.user.keymaps.find(
+            keymap.name, space_type=keymap.space_type, region_type=keymap.region_type
+        )
+        if own is None:
+            continue
+        column = layout.column()
+        column.context_pointer_set("keymap", own)
+        column.label(text=keymap.name)
+        for item in own.keymap_items:
+            if item.idname.startswith("beyond_mocap."):
+                rna_keymap_ui.draw_kmi(["ADDON", "USER", "DEFAULT"], configurations.user, own, item, column, 0)
+
+
+def _with_our_keys(configuration: bpy.types.KeyConfig | None) -> list[bpy.types.KeyMap]:
+    keymaps = configuration.keymaps if configuration is not None else ()
+    return [k for k in keymaps if any(item.idname.startswith("beyond_mocap.") for item in k.keymap_items)]
 
 
 class BeyondMocapPreferences(Preferences, bpy.types.AddonPreferences):

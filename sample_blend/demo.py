@@ -90,7 +90,7 @@ def synthesize(load, settings, steps) -> list[dict]:
     clips = load("beyond_mocap.library.build").build(settings.library_folder, progress=steps.progress)
     library_seconds = time.perf_counter() - begun
     session.keep_library(clips, None)
-    settings.library_holds = load("operators.build_library").summary(clips)
+    settings.library_holds = load("operators.library").summary(clips)
     reports = []
     for player in settings.players:
         steps.enter(player.name)

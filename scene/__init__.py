@@ -35,108 +35,22 @@
 - `export`      motions as files of Blender's exporters; `deliver` a take likewise, for the command line
 - `proposals`   words that were proposed for a clip, to be accepted or refused one by one
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
-
-The classes are registered in the order of CLASSES: what others point to comes first.
 """
 
-import bpy
-
-from . import (  # noqa: F401  (watchers are known once their modules are)
-    clips, dots, drawn_labels, freshness, lanes, live, migrate, moment_names, pins, proposals, result, rig,
-    session, settings, strip_events, strip_lines, video, view_settings, watch, word_checks,
-)
-from .aimed import live as aimed_live  # noqa: F401
-from .aimed import settings as aimed
-from .core import live as core_live
-from .markers import kept as kept_markers
-from .markers import labels as marker_labels  # noqa: F401
-from .markers import settings as markers
-from .match import child as match_child
-from .match import settings as match
-from .overlays import draw, store  # noqa: F401
-from .passes import hits_shown  # noqa: F401
-from .passes import live as passes_live  # noqa: F401
-from .passes import settings as passes
-from .ride import live as ride_live  # noqa: F401
-from .ride import measure as ride_measure  # noqa: F401
-from .ride.settings import BeyondMocapRide
-from .stream import follow as stream_follow  # noqa: F401
-from .stream import play  # noqa: F401
-from .stream import receiver  # noqa: F401
-from .stream import settings as stream
-from .throws import live as throws_live  # noqa: F401
-from .throws import settings as throws
-
-CLASSES = (
-    *result.CLASSES,
-    BeyondMocapRide,
-    *passes.CLASSES,
-    *stream.CLASSES,
-    aimed.BeyondMocapAim,
-    throws.BeyondMocapThrow,
-    *markers.CLASSES,
-    *match.CLASSES,
-    video.BeyondMocapVideo,
-    view_settings.BeyondMocapView,
-    view_settings.BeyondMocapPlayhead,
-    strip_lines.BeyondMocapLine,
-    lanes.BeyondMocapLanes,
-    *proposals.CLASSES,
-    dots.BeyondMocapDot,
-    word_checks.BeyondMocapProblem,
-    word_checks.BeyondMocapProblems,
-    rig.BeyondMocapRigBone,
-    rig.BeyondMocapRig,
-    pins.BeyondMocapPin,
-    settings.BeyondMocapPlayer,
-    settings.BeyondMocapSettings,
-    settings.BeyondMocapWork,
-    *clips.CLASSES,
-    freshness.BeyondMocapStale,
-)
-KEPT_WITH = (  # what Blender's own data carries of ours: type, property, class
-    ("Action", "beyond_mocap", strip_lines.BeyondMocapLine),
-    ("TimelineMarker", "beyond_mocap", strip_lines.BeyondMocapLine),
-    ("Object", "beyond_mocap_lanes", lanes.BeyondMocapLanes),
-    ("Object", "beyond_mocap_proposals", proposals.BeyondMocapProposals),
-    ("Object", "beyond_mocap_dot", dots.BeyondMocapDot),
-    ("Object", "beyond_mocap_ride", BeyondMocapRide),
-    ("Object", "beyond_mocap_hits", passes.BeyondMocapHits),
-    ("Object", "beyond_mocap_ball", passes.BeyondMocapBall),
-    ("Object", "beyond_mocap_aim", aimed.BeyondMocapAim),
-    ("Object", "beyond_mocap_throw", throws.BeyondMocapThrow),
-    ("Object", "beyond_mocap_cloud", markers.BeyondMocapCloud),
-    ("Scene", "beyond_mocap", settings.BeyondMocapSettings),
-    ("Scene", "beyond_mocap_markers", markers.BeyondMocapMarkers),
-    ("Scene", "beyond_mocap_match", match.BeyondMocapMatch),
-    ("Scene", "beyond_mocap_passes", passes.BeyondMocapPasses),
-    ("Scene", "beyond_mocap_stream", stream.BeyondMocapStream),
-    ("WindowManager", "beyond_mocap_streaming", stream.BeyondMocapStreaming),
-    ("WindowManager", "beyond_mocap_problems", word_checks.BeyondMocapProblems),
-    ("WindowManager", "beyond_mocap_work", settings.BeyondMocapWork),
-    ("WindowManager", "beyond_mocap_playhead", view_settings.BeyondMocapPlayhead),
-    ("WindowManager", "beyond_mocap_clips", clips.BeyondMocapClips),
-)
+from . import session
+from .core import registration
+from .markers import kept
+from .match import child
 
 
 def register():
-    """Register the data classes, in order, and hang them on Blender's own data."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-    for owner, name, cls in KEPT_WITH:
-        setattr(getattr(bpy.types, owner), name, bpy.props.PointerProperty(type=cls))
-    freshness.register()
-    core_live.register()
+    """Register the data classes, attach them to Blender's own data, and begin to watch."""
+    registration.register_package(__name__)
 
 
 def unregister():
-    """Stop what runs and forget what was made; unregister the data classes, the last one first."""
-    core_live.unregister()
-    freshness.unregister()
-    match_child.end_all()
+    """End what runs, undo what was registered, and forget what was kept in memory."""
+    child.end_all()
+    registration.unregister_package(__name__)
     session.clear()
-    kept_markers.clear()
-    for owner, name, _ in reversed(KEPT_WITH):
-        delattr(getattr(bpy.types, owner), name)
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    kept.clear()

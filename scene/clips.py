@@ -58,6 +58,8 @@ class BeyondMocapClip(bpy.types.PropertyGroup):
 class BeyondMocapClips(bpy.types.PropertyGroup):
     """The list of clips, and how it is looked through."""
 
+    attached_to = ("WindowManager.beyond_mocap_clips",)
+
     folder: StringProperty(description="The setting of the library's folder when the list was filled")
     shown: CollectionProperty(type=BeyondMocapClip, description="The clips that fit what is looked for")
     active: IntProperty(name="Clip", min=0, description="The clip that is described below the list")
@@ -69,9 +71,6 @@ class BeyondMocapClips(bpy.types.PropertyGroup):
     order: EnumProperty(name="Order", items=ORDERS, update=_refill, description="Order of the clips")
     missing: BoolProperty(description="Whether the library's folder was not there when it was last looked for")
     news: StringProperty(description="What has changed in the folder since the list was filled; empty: nothing")
-
-
-CLASSES = (BeyondMocapClip, BeyondMocapClips)
 
 
 def keep(manager: bpy.types.WindowManager, folder: str, clips, files) -> None:

@@ -55,11 +55,10 @@ class BeyondMocapProposal(bpy.types.PropertyGroup):
 class BeyondMocapProposals(bpy.types.PropertyGroup):
     """What was proposed for the clip that an armature shows."""
 
+    attached_to = ("Object.beyond_mocap_proposals",)
+
     listed: CollectionProperty(type=BeyondMocapProposal, description="By their first frame")
     active: IntProperty(name="Proposal", min=0, update=_go, description="The proposal that is looked at")
-
-
-CLASSES = (BeyondMocapProposal, BeyondMocapProposals)
 
 
 def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN", beside: bool = True) -> None:

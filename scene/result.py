@@ -68,6 +68,3 @@ class BeyondMocapShared(bpy.types.PropertyGroup):
     camera: PointerProperty(type=BeyondMocapBefore, description="What the camera's focus played before any preview")
     end_before: IntProperty(description="The scene's last frame before any preview")
     end_set: IntProperty(description="The scene's last frame as previews have set it; 0 where they have not")
-
-
-CLASSES = (BeyondMocapBefore, BeyondMocapVariant, BeyondMocapResult, BeyondMocapShared)

@@ -101,6 +101,8 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
 class BeyondMocapSettings(bpy.types.PropertyGroup):
     """All steps of one scene."""
 
+    attached_to = ("Scene.beyond_mocap",)
+
     version: IntProperty(
         name="Version", options={"HIDDEN"},
         description="Form of what is kept here, see scene/migrate.py; 0: not saved yet",
@@ -124,6 +126,8 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
 
 class BeyondMocapWork(bpy.types.PropertyGroup):
     """What runs in the background just now; on the window manager, so that undo leaves it alone."""
+
+    attached_to = ("WindowManager.beyond_mocap_work",)
 
     kind: StringProperty(description="Name of the running step; empty while nothing runs")
     text: StringProperty(description="What it is doing")

@@ -25,6 +25,8 @@ def changed(_settings, _context) -> None:
 class BeyondMocapAim(bpy.types.PropertyGroup):
     """Who strikes a ball, towards what and how."""
 
+    attached_to = ("Object.beyond_mocap_aim",)
+
     on: BoolProperty(name="Aimed", description="Whether this ball is aimed at a target")
     body: PointerProperty(
         name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=changed,

@@ -84,6 +84,8 @@ def a_cloud(_own, thing) -> bool:
 class BeyondMocapCloud(bpy.types.PropertyGroup):
     """A trial that stands in the scene as a cloud of markers."""
 
+    attached_to = ("Object.beyond_mocap_cloud",)
+
     on: BoolProperty(name="Markers", description="Whether this object is a cloud of markers")
     labels: CollectionProperty(type=BeyondMocapMarker, description="The markers, in the order of the recording")
     active_label: IntProperty(name="Marker", description="The marker chosen in the list")
@@ -121,6 +123,8 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
 class BeyondMocapMarkers(bpy.types.PropertyGroup):
     """How recordings of markers are read and worked on, per scene."""
 
+    attached_to = ("Scene.beyond_mocap_markers",)
+
 
 def is_cloud(thing: bpy.types.Object | None) -> bool:
     """Whether an object is a cloud of markers."""
@@ -154,6 +158,3 @@ def active_label(cloud: bpy.types.Object) -> BeyondMocapMarker | None:
     """The marker chosen in the list."""
     kept = cloud.beyond_mocap_cloud
     return kept.labels[kept.active_label] if 0 <= kept.active_label < len(kept.labels) else None
-
-
-CLASSES = (BeyondMocapMarker, BeyondMocapMarkerEvent, BeyondMocapCloud, BeyondMocapMarkers)

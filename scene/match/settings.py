@@ -46,6 +46,8 @@ class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
 class BeyondMocapMatch(bpy.types.PropertyGroup):
     """A match: what it is made from, what is wanted of it, and what is shown."""
 
+    attached_to = ("Scene.beyond_mocap_match",)
+
     tracking_file: StringProperty(name="Tracking", description="A provider's tracking of a whole match", **FILE)
     metadata_file: StringProperty(
         name="Metadata", description="The provider's second file; empty: one beside the first whose name fits", **FILE
@@ -92,9 +94,6 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
 def typed(value: float) -> str:
     """A float property as somebody has typed it: the shortest decimals that it keeps."""
     return str(np.float32(value)).removesuffix(".0")
-
-
-CLASSES = (BeyondMocapMatchPlayer, BeyondMocapMatch)
 
 
 def colours_of(match: BeyondMocapMatch) -> dict[str, str]:

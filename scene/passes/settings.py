@@ -129,6 +129,8 @@ class BeyondMocapHold(bpy.types.PropertyGroup):
 class BeyondMocapBall(bpy.types.PropertyGroup):
     """What a ball keeps: who carries it when, and what it played before."""
 
+    attached_to = ("Object.beyond_mocap_ball",)
+
     holds: CollectionProperty(type=BeyondMocapHold, description="Who carries the ball, and when")
     before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before somebody carried it")
 
@@ -136,6 +138,8 @@ class BeyondMocapBall(bpy.types.PropertyGroup):
 @with_settings("hits")
 class BeyondMocapHits(bpy.types.PropertyGroup):
     """What an armature keeps of its hit analysis."""
+
+    attached_to = ("Object.beyond_mocap_hits",)
 
     found: StringProperty(name="Found", options={"HIDDEN"}, description="What was found, as JSON")
     lines: StringProperty(name="Lines", options={"HIDDEN"}, description="A line for each hit motion: frame, text")
@@ -145,6 +149,8 @@ class BeyondMocapHits(bpy.types.PropertyGroup):
 @with_settings("ball.hold")
 class BeyondMocapPasses(bpy.types.PropertyGroup):
     """A passing scene and its ball."""
+
+    attached_to = ("Scene.beyond_mocap_passes",)
 
     players: CollectionProperty(type=BeyondMocapPasser, description="Who keeps the ball going")
     active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
@@ -168,12 +174,6 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     touches: CollectionProperty(type=BeyondMocapTouch, description="Touches that were solved from tracking")
     active_touch: IntProperty(name="Touch", min=0, description="The touch that is picked in the list")
     solved: StringProperty(name="Solved", options={"HIDDEN"}, description="Lines about the ball that was solved")
-
-
-CLASSES = (
-    BeyondMocapPasser, BeyondMocapPass, BeyondMocapWeights, BeyondMocapTouch, BeyondMocapHold, BeyondMocapBall,
-    BeyondMocapHits, BeyondMocapPasses,
-)
 
 
 def active_row(rows, number: int):

@@ -45,6 +45,8 @@ def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
 class BeyondMocapRide(bpy.types.PropertyGroup):
     """One armature's path editing."""
 
+    attached_to = ("Object.beyond_mocap_ride",)
+
     on: BoolProperty(name="Rides", description="Whether the armature's motion rides a curve")
     curve: PointerProperty(
         name="New Path", type=bpy.types.Object, poll=is_curve, update=follow_pick,

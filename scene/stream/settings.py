@@ -12,6 +12,8 @@ from ..core.properties import with_settings
 class BeyondMocapStream(bpy.types.PropertyGroup):
     """A stream of BVH frames from a program on this machine."""
 
+    attached_to = ("Scene.beyond_mocap_stream",)
+
     clip: StringProperty(
         name="Suit's BVH", subtype="FILE_PATH",
         description="A BVH file of the same suit, for streams that send numbers only; else empty",
@@ -30,6 +32,8 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
 class BeyondMocapStreaming(bpy.types.PropertyGroup):
     """How the stream does; of the session, in no file."""
 
+    attached_to = ("WindowManager.beyond_mocap_streaming",)
+
     on: BoolProperty(description="Whether a stream is listened to")
     state: StringProperty(description="Waiting, receiving, stalled, ended, failed or stopped")
     line: StringProperty(description="The same in a sentence")
@@ -37,6 +41,3 @@ class BeyondMocapStreaming(bpy.types.PropertyGroup):
     hit: StringProperty(description="The last strike that was recognised")
     playing: BoolProperty(description="Whether the passing scene is played live")
     played: StringProperty(description="Lines about the rally that is played live")
-
-
-CLASSES = (BeyondMocapStream, BeyondMocapStreaming)

@@ -19,6 +19,8 @@ MARK = "beyond_mocap_thrown"
 class BeyondMocapThrow(bpy.types.PropertyGroup):
     """How an armature is to throw or kick, and what came of it."""
 
+    attached_to = ("Object.beyond_mocap_throw",)
+
     target: PointerProperty(
         name="Target", type=bpy.types.Object, description="What is to be hit: any object's origin; none: the 3D cursor"
     )

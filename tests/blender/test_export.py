@@ -219,7 +219,7 @@ def test_several_at_once(rooms, body, tmp_path):
 
 
 def test_the_file_browser_shows_the_name_that_is_written(rooms, extension):
-    operator = importlib.import_module(f"{extension.__name__}.operators.export_motion").BEYOND_MOCAP_OT_export_motion
+    operator = importlib.import_module(f"{extension.__name__}.operators.rigs").BEYOND_MOCAP_OT_export_motion
     for name, format, written in (("walk", "FBX", "walk.fbx"), ("walk.glb", "FBX", "walk.fbx"),
                                   ("a.v2", "GLB", "a.v2.glb")):
         asked = SimpleNamespace(filepath=f"/here/{name}", format=format)

@@ -55,7 +55,7 @@ def test_no_two_keys_are_the_same_in_one_keymap(keymap):
 
 
 def test_the_rows_for_the_preferences_find_our_keymaps(keymap, monkeypatch):
-    rows = import_module(f"{EXTENSION}.panels.keys")
+    rows = import_module(f"{EXTENSION}.panels.preferences")
     keymap.unregister()
     with monkeypatch.context() as patch:
         patch.setattr(keymap, "ENTRIES", (keymap.Entry("NLA Editor", "NLA_EDITOR", "beyond_mocap.mirror", "F19"),))

@@ -183,7 +183,7 @@ def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
     scene, other = bpy.context.scene, bpy.data.scenes.new("Other")
     wanted = room("order").wanted(scene, str(made))
     seen = room("load").scenery(wanted, None, lambda done, text: None, lambda: False)
-    verb = importlib.import_module(f"{EXTENSION}.operators.match_verb").MatchVerb
+    verb = importlib.import_module(f"{EXTENSION}.operators.match").MatchVerb
     bpy.context.window.scene = other
     with pytest.raises(Exception, match="press Show Match"):
         verb.apply(None, scene, (wanted, seen, ()))

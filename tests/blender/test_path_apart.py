@@ -55,7 +55,7 @@ def asked(body):
 def said(extension, monkeypatch):
     """What the operator reports."""
     lines = []
-    kind = importlib.import_module(f"{extension.__name__}.operators.path_apart").BEYOND_MOCAP_OT_path_apart
+    kind = importlib.import_module(f"{extension.__name__}.operators.path_editing").BEYOND_MOCAP_OT_path_apart
     monkeypatch.setattr(kind, "tell", lambda self, kept, tell=kind.tell: (lines.append(kept), tell(self, kept)))
     return lines
 

@@ -1,5 +1,6 @@
 """Switching the extension on and off leaves nothing behind and hides no error."""
 
+import importlib
 import subprocess
 import sys
 
@@ -37,10 +38,64 @@ def test_the_tab_is_there(extension):
 
 def test_off_and_on_again(extension):
     before = our_classes()
-    extension.unregister()
-    assert our_classes() == []
-    extension.register()
-    assert our_classes() == before
+    for _ in range(2):
+        extension.unregister()
+        assert our_classes() == [] and not hasattr(bpy.types.Scene, "beyond_mocap")
+        extension.register()
+        assert our_classes() == before and hasattr(bpy.types.Scene, "beyond_mocap")
+
+
+MODULES = {
+    "a": """
+import bpy
+from .b import B
+class A(bpy.types.PropertyGroup):
+    attached_to = ("Scene.planted_a", "Object.planted_a")
+    b: bpy.props.PointerProperty(type=B)
+class BEYOND_MOCAP_PT_child(bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_label = "VIEW_3D", "UI", "Child"
+    bl_parent_id = "BEYOND_MOCAP_PT_parent"
+    def draw(self, context): pass
+""",
+    "b": """
+import bpy
+class B(bpy.types.PropertyGroup):
+    value: bpy.props.IntProperty()
+done = []
+def register(): done.append("on")
+def unregister(): done.append("off")
+""",
+    "c": """
+import bpy
+from .a import A
+class BEYOND_MOCAP_PT_parent(bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_label = "VIEW_3D", "UI", "Parent"
+    def draw(self, context): pass
+def register():
+    if BROKEN: raise RuntimeError("planted")
+""",
+}
+
+
+@pytest.mark.parametrize("broken", [False, True])
+def test_classes_are_found_in_order_and_undone(extension, tmp_path, monkeypatch, broken):
+    """What is pointed to and parents come first; an imported class is not registered again; a failure is undone."""
+    registration = importlib.import_module(f"{extension.__name__}.scene.core.registration")
+    package = f"planted_{broken}".lower()
+    (tmp_path / package).mkdir()
+    for name, text in {"__init__": "", **MODULES}.items():
+        (tmp_path / package / f"{name}.py").write_text(text.replace("BROKEN", str(broken)))
+    monkeypatch.syspath_prepend(tmp_path)
+    if broken:
+        with pytest.raises(RuntimeError, match="planted"):
+            registration.register_package(package)
+    else:
+        registration.register_package(package)
+        assert bpy.context.scene.planted_a.b.value == 0 and hasattr(bpy.types.Object, "planted_a")
+        assert bpy.types.BEYOND_MOCAP_PT_child.is_registered
+        registration.unregister_package(package)
+    assert not hasattr(bpy.types.Scene, "planted_a") and not hasattr(bpy.types, "BEYOND_MOCAP_PT_parent")
+    assert sys.modules[f"{package}.b"].done == ["on", "off"]
 
 
 def test_a_registration_error_is_passed_on_and_undone(extension, monkeypatch):

@@ -58,9 +58,9 @@ LAZY = {
 EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
-    "panels": ["panels", "scene.settings", "scene.preferences", "scene.ride.settings", "scene.ride.figure_lines",
-               "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings", "scene.match.settings",
-               "scene.throws.settings", "scene.markers.settings"],
+    "panels": ["panels", "scene.core.registration", "scene.settings", "scene.preferences", "scene.ride.settings",
+               "scene.ride.figure_lines", "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings",
+               "scene.match.settings", "scene.throws.settings", "scene.markers.settings"],
 }
 
 

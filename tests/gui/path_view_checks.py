@@ -111,7 +111,7 @@ def check_nothing_of_riders_stays_when_they_are_gone():
 
 def check_the_panel_is_quick():
     yield from a_rider()
-    area, panel, spent = window.area("VIEW_3D"), room("panels.path").BEYOND_MOCAP_PT_path, []
+    area, panel, spent = window.area("VIEW_3D"), room("panels.path_editing").BEYOND_MOCAP_PT_path, []
     fold, plain = unfold(panel), panel.draw
 
     def timed(self, context):

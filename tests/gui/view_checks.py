@@ -172,8 +172,8 @@ def check_the_panels_are_quick_with_22_players():
         return drawn
 
     opened = []
-    for name in ("quality", "view"):
-        cls = getattr(room(f"panels.{name}"), f"BEYOND_MOCAP_PT_{name}")
+    for feature, name in (("result", "quality"), ("view", "view")):
+        cls = getattr(room(f"panels.{feature}"), f"BEYOND_MOCAP_PT_{name}")
         own = {key: value for key, value in vars(cls).items() if not key.startswith("__") and key != "bl_rna"}
         own.update(bl_options=set(), bl_order=cls.bl_order - 10, draw=clocked(cls, cls.draw))
         opened.append(type(f"{cls.__name__}_opened", cls.__bases__, own))

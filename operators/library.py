@@ -1,0 +1,322 @@
+"""The library: build it, list its clips, bring one into the scene, take one out, find a moved folder."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ..beyond_mocap.annotation.labels import find_label
+from ..beyond_mocap.errors import InputError
+from ..scene import clip_annotation, clips, foreign, preferences, recordings, session, watch
+from ..scene.core import window
+from ..scene.settings import absolute, as_setting
+from .verb import BackgroundVerb, Verb
+
+if TYPE_CHECKING:
+    from ..beyond_mocap.library.library import Library
+
+
+class FolderVerb(BackgroundVerb):
+    """A verb about the library's folder."""
+
+    @classmethod
+    def poll(cls, context):
+        """A folder has to be chosen."""
+        cls.poll_message_set("Choose the library's folder first")
+        return bool(context.scene.beyond_mocap.library_folder)
+
+
+class ClipVerb(Verb):
+    """A verb about one clip of the list: the one that it is told, else the one chosen there."""
+
+    path: StringProperty(
+        name="Clip", options={"SKIP_SAVE"}, description="Below the library's folder; empty: the one chosen in the list"
+    )
+    dressed: BoolProperty(name="Body", default=True, description="With a low-poly body, not only bones")
+
+    @classmethod
+    def poll(cls, context):
+        """A clip in the list."""
+        cls.poll_message_set("No clip is listed; press Build Library or List Clips first")
+        return clips.active(context.window_manager) is not None
+
+    def clip(self, context) -> str:
+        """The clip, below the library's folder."""
+        chosen = clips.active(context.window_manager)
+        path = self.path or (chosen.path if chosen else "")
+        if not path:
+            raise InputError(self.bl_label, "no clip chosen", "a clip of the library's list")
+        return path
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a build needs to know."""
+
+    setting: str
+    folder: str
+    unit: float | None
+    rebuild: bool
+    preferences: dict  # arguments of the core's build
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """What came of it: the library (or what is wrong with it), its clips one by one, and the folder as it was read."""
+
+    setting: str
+    library: "Library | None"
+    trouble: InputError | None
+    listing: tuple
+    files: dict
+
+
+class BEYOND_MOCAP_OT_build_library(FolderVerb, bpy.types.Operator):
+    """Read all clips of the library folder, their words and foot contacts, and sort them for the search.
+The result is kept in a cache, so that the next time takes a moment; when anything in the folder has changed, all of it
+is read again. FBX, glTF and USD clips are converted first, each once"""
+
+    bl_idname = "beyond_mocap.build_library"
+    bl_label = "Build Library"
+    kind = "library"
+    queue = None  # foreign.Queue while a window waits for conversions
+    job = None
+    notes = ()
+
+    rebuild: BoolProperty(
+        name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"}
+    )
+
+    def order(self, context):
+        """Folder and unit."""
+        settings = context.scene.beyond_mocap
+        if not settings.library_folder:
+            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
+        folder = absolute(settings.library_folder)
+        unit = settings.library_unit or None
+        queue = self.queue or self.waiting(context)
+        while queue.todo:  # by a script; in a window `modal` has converted them one by one
+            queue.step()
+        self.notes = queue.notes
+        return Order(settings.library_folder, folder, unit, self.rebuild, preferences.for_build(folder))
+
+    def waiting(self, context):
+        """The clips that are to be converted."""
+        folder = absolute(context.scene.beyond_mocap.library_folder)
+        return foreign.Queue(folder, preferences.cache_folder(folder))
+
+    def start(self, context):
+        """Convert first, if there is anything to convert, then hand the build to a thread."""
+        self.queue = self.waiting(context)
+        self.scene = context.scene.session_uid
+        if not self.queue.todo:
+            super().start(context)
+
+    def modal(self, context, event):
+        """One conversion at each tick, since only the main thread may import; then as every work in the background."""
+        if self.job is not None:
+            return super().modal(context, event)
+        if event.type == "ESC" and event.value == "PRESS":
+            self.ended(context)
+            self.report({"WARNING"}, f"{self.bl_label}: cancelled, what is converted is kept")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        outcome = self.attempt(lambda: self.convert_next(context))
+        if outcome == {"CANCELLED"}:
+            self.ended(context)
+            return outcome
+        self.show(context)
+        return {"RUNNING_MODAL"}
+
+    def convert_next(self, context):
+        """The next one, or the thread where there is none."""
+        if self.queue.todo:
+            self.queue.step()
+        else:
+            super().start(context)
+
+    def show(self, context):
+        """The conversions' progress while they run."""
+        if self.job is not None:
+            return super().show(context)
+        running, queue = context.window_manager.beyond_mocap_work, self.queue
+        done = queue.total - len(queue.todo)
+        text = f"Converting {queue.todo[0].name}" if queue.todo else "Converted"
+        running.kind, running.fraction, running.text = self.kind, done / max(queue.total, 1), text
+        context.workspace.status_text_set(f"{text}   {done} of {queue.total}   ESC: cancel")
+        window.redraw()
+
+    def cancel(self, context):
+        """Blender takes the operator away."""
+        if self.job is not None:
+            self.job.cancel()
+        self.ended(context)
+
+    @staticmethod
+    def work(order, progress, cancelled, _hurry):
+        """Build it, and list its clips; where it cannot be built they are listed all the same, to be given words."""
+        from ..beyond_mocap.library.build import build
+        from ..beyond_mocap.library.listing import listed, scanned
+
+        files = watch.look(order.folder) or {}
+        asked = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
+        try:
+            built = build(order.folder, **asked, progress=progress, cancelled=cancelled)
+        except InputError as error:
+            return Built(order.setting, None, error, scanned(order.folder, asked["cache_dir"]), files)
+        return Built(order.setting, built, None, listed(built), files)
+
+    def apply(self, scene, built):
+        """Keep it, and say what it holds."""
+        clips.keep(bpy.context.window_manager, built.setting, built.listing, built.files)
+        for note in self.notes:
+            self.report({"WARNING"}, note)
+        if built.trouble is not None:
+            raise built.trouble
+        session.keep_library(built.library, scene.beyond_mocap.library_unit or None)
+        scene.beyond_mocap.library_holds = summary(built.library)
+        for note in built.library.notes:
+            self.report({"INFO"}, note)
+        self.report({"INFO"}, scene.beyond_mocap.library_holds.splitlines()[0])
+
+
+def summary(built: "Library") -> str:
+    """Lines for the panel: clips and minutes, then each gait with its speed, then key moments with their number."""
+    originals = [clip for clip in built.clips if not clip.mirrored]
+    keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
+    lines = [f"{len(originals)} clips, {built.minutes:.1f} minutes, {len(built.skeleton)} joints"]
+    lines += [f"{gait.word}: {gait.speed:.1f} m/s" for gait in built.gaits]
+    for word, count in keys.most_common():
+        lines.append(f"{find_label(word).title}: {count} {'moment' if count == 1 else 'moments'}")
+    return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class ListOrder:
+    """Which folder, and the library that was built of it in this session."""
+
+    setting: str
+    folder: str
+    cache_dir: str | None
+    built: "Library | None"
+
+
+class BEYOND_MOCAP_OT_list_clips(FolderVerb, bpy.types.Operator):
+    """List the clips of the folder with their words, without reading their motion. For speeds and quality press Build
+Library"""
+
+    bl_idname = "beyond_mocap.list_clips"
+    bl_label = "List Clips"
+    bl_options = {"REGISTER"}
+    kind = "list"
+
+    def order(self, context):
+        """The folder."""
+        settings = context.scene.beyond_mocap
+        folder = absolute(settings.library_folder)
+        watch.check(context.scene)
+        built = session.library(folder, settings.library_unit or None)
+        return ListOrder(settings.library_folder, folder, preferences.cache_folder(folder), built)
+
+    @staticmethod
+    def work(order, progress, _cancelled, _hurry):
+        """From the built library where there is one, else from the folder."""
+        from ..beyond_mocap.library.listing import listed, scanned
+
+        progress(0.0, "Listing clips")
+        files = watch.look(order.folder)
+        if files is None:
+            raise InputError(order.folder, "no such folder", "the library's folder", "press Relink Library")
+        found = listed(order.built) if order.built is not None else scanned(order.folder, order.cache_dir)
+        return order.setting, found, files
+
+    def apply(self, _scene, result):
+        """Show them."""
+        setting, found, files = result
+        clips.keep(bpy.context.window_manager, setting, found, files)
+        self.report({"INFO"}, f"clips listed: {len(found)}")
+
+
+class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
+    """The library's folder was moved: choose where it is now. Without a choice it is looked for beside this file"""
+
+    bl_idname = "beyond_mocap.relink_library"
+    bl_label = "Relink Library"
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        """A folder that was set once."""
+        cls.poll_message_set("Choose the library's folder in the field above")
+        return bool(context.scene.beyond_mocap.library_folder)
+
+    def invoke(self, context, _event):
+        """Look beside the file first; ask where nothing is found."""
+        if watch.relink(context.scene):
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def do(self, context):
+        """Set the folder."""
+        settings = context.scene.beyond_mocap
+        chosen = bpy.path.abspath(self.directory) if self.directory else ""
+        if chosen and not watch.holds_recordings(chosen):
+            raise InputError(chosen, "no recordings below it", "the library's folder", "choose another")
+        if chosen:
+            settings.library_folder = as_setting(chosen)
+        elif not os.path.isdir(absolute(settings.library_folder)) and not watch.relink(context.scene):
+            raise InputError(
+                absolute(settings.library_folder), "no such folder, nor one like it beside this file",
+                "the library's folder", "choose it in Relink Library",
+            )
+        watch.check(context.scene)
+        self.report({"INFO"}, f"library: {absolute(settings.library_folder)}")
+
+
+class BEYOND_MOCAP_OT_import_clip(ClipVerb, bpy.types.Operator):
+    """Bring this clip of the library into the scene as it was recorded: an armature with a body and the clip's
+action"""
+
+    bl_idname = "beyond_mocap.import_clip"
+    bl_label = "Import Clip"
+
+    def do(self, context):
+        """Read the file, then make the armature."""
+        path = self.clip(context)
+        clip, notes = recordings.read(context.scene.beyond_mocap, path)
+        body = recordings.show(context, clip, path, self.dressed)
+        for note in notes:
+            self.report({"INFO"}, f"{body.name}: {note}")
+        self.report({"INFO"}, f"{body.name}: {clip.duration:.1f} s, {len(clip)} frames at {clip.fps:g} per second")
+
+
+class BEYOND_MOCAP_OT_remove_clip(Verb, bpy.types.Operator):
+    """Take the active clip out of this file again: armature, body, strips and actions. The library keeps it; words that
+were not saved are lost"""
+
+    bl_idname = "beyond_mocap.remove_clip"
+    bl_label = "Remove Clip"
+
+    @classmethod
+    def poll(cls, context):
+        """An armature that shows a clip."""
+        cls.poll_message_set("Select the armature of a clip that came from the library's list")
+        return bool(clip_annotation.shown(context.object))
+
+    def do(self, context):
+        """Remove it."""
+        rig = context.object
+        if rig.library is not None or rig.override_library is not None:
+            raise InputError(rig.name, "it belongs to another file", "an object of this file")
+        if rig.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        clip_annotation.remove(rig)

@@ -1,0 +1,393 @@
+"""Optical markers: import, label and clean them, reconstruct a body, find a ball's release."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.files.whole import atomic_write
+from ..scene import linked
+from ..scene.markers import cloud, models, sets, solve, thrown
+from ..scene.markers.settings import cloud_meant, clouds, is_cloud
+from ..scene.settings import as_setting
+from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
+
+
+class OnMarkers:
+    """To be mixed into a verb: it is about the cloud of markers that is meant."""
+
+    @classmethod
+    def poll(cls, context):
+        """A cloud."""
+        cls.poll_message_set("Select a cloud of markers (Import Markers makes one)")
+        return cloud_meant(context) is not None
+
+    @staticmethod
+    def cloud(context):
+        """The cloud; InputError where it belongs to another file."""
+        thing = cloud_meant(context)
+        linked.refuse(thing, thing.data)
+        return thing
+
+    @staticmethod
+    def within(scene):
+        """The context of the scene that the work began in, also where the window shows another one by now."""
+        if bpy.context.scene == scene:
+            return nullcontext()
+        return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
+
+
+UP = (
+    ("AUTO", "Found", "As the file says, or heads above feet"),
+    *((axis, axis, f"{axis} of the file points up") for axis in ("X", "-X", "Y", "-Y", "Z", "-Z")),
+)
+
+
+class BEYOND_MOCAP_OT_import_markers(ImportVerb, bpy.types.Operator):
+    """Import recordings of optical markers (.c3d, .trc) as clouds that play. Whose labels are those of a known marker
+set know their segments at once"""
+
+    bl_idname = "beyond_mocap.import_markers"
+    bl_label = "Import Markers"
+    filename_ext = ".c3d"
+
+    filter_glob: StringProperty(default="*.c3d;*.trc", options={"HIDDEN"})
+    unit: FloatProperty(
+        name="Metres per unit", default=0.0, min=0.0, precision=5,
+        description="Size of one unit of the file in metres; 0: as the file says, or by the body's size",
+    )
+    up: EnumProperty(name="Up", items=UP, description="Which axis of the file points up")
+    subject: StringProperty(name="Subject", description="Whose markers to read, where a file holds several subjects'")
+
+    def do(self, context):
+        """Read all files, then make the clouds."""
+        from ..beyond_mocap.files.marker_files import read_markers
+
+        paths = self.chosen()
+        if not paths:
+            raise InputError("import", "no file given", "a .c3d or .trc file", "choose one")
+        unit = self.unit or context.scene.beyond_mocap_markers.unit or None
+        how = unit, self.subject or None, None if self.up == "AUTO" else self.up
+        trials = [(path, read_markers(path, *how)) for path in paths]
+        for _, trial in trials:
+            cloud.check(trial)
+        if context.mode != "OBJECT":  # what is edited would stay so beside what is then active
+            bpy.ops.object.mode_set(mode="OBJECT")
+        made = [self.add(context, path, trial) for path, trial in trials]
+        for other in context.selected_objects:
+            other.select_set(False)
+        for thing in made:
+            thing.select_set(True)
+        context.view_layer.objects.active = made[0]
+
+    def add(self, context, path: Path, trial) -> bpy.types.Object:
+        """One cloud, and what is to be said of it."""
+        thing = cloud.create(context, trial)
+        thing.beyond_mocap_cloud.file = as_setting(str(path))
+        told = list(trial.notes)
+        try:
+            told += sets.apply(thing, sets.recognised(trial.labels))
+        except InputError as error:
+            told.append(str(error))
+        thing.beyond_mocap_cloud.told = "\n".join(told)
+        for line in told:
+            self.report({"INFO"}, f"{thing.name}: {line}")
+        seen = f"{100.0 * float(trial.seen.mean()):.0f} % seen"
+        found = f"{len(trial.labels)} markers, {trial.duration:.2f} s at {trial.fps:g} per second, {seen}"
+        self.report({"INFO"}, f"{thing.name}: {found}")
+        return thing
+
+
+class BEYOND_MOCAP_FH_markers(DroppedIntoView, bpy.types.FileHandler):
+    """Recordings of optical markers dropped into the 3D view"""
+
+    bl_idname = "BEYOND_MOCAP_FH_markers"
+    bl_label = "Optical markers"
+    bl_import_operator = "beyond_mocap.import_markers"
+    bl_file_extensions = ".c3d;.trc"
+
+
+_segments: list[tuple[str, str, str]] = []
+
+
+def segments(_operator, _context):
+    """The segments to choose from; kept, since Blender does not keep the texts itself."""
+    if not _segments:
+        from ..beyond_mocap.markers.template import JOINTS
+
+        _segments.append(("NONE", "None", "No segment carries it"))
+        _segments.extend((name, name, f"The body's {name} carries it") for name in JOINTS)
+    return _segments
+
+
+class BEYOND_MOCAP_OT_assign_markers(OnMarkers, Verb, bpy.types.Operator):
+    """Say which segment carries the markers that are selected in Edit Mode, or else the one chosen in the list"""
+
+    bl_idname = "beyond_mocap.assign_markers"
+    bl_label = "Assign Markers"
+
+    segment: EnumProperty(name="Segment", items=segments, description="The segment of the body that carries them")
+
+    def do(self, context):
+        """Write it to the labels."""
+        thing = self.cloud(context)
+        names = sets.chosen(thing)
+        if not names:
+            raise InputError(thing.name, "no marker selected", "one at least", "select vertices in Edit Mode")
+        segment = "" if self.segment == "NONE" else self.segment
+        sets.assign(thing, names, segment)
+        self.report({"INFO"}, f"{', '.join(names)}: {segment or 'no segment'}")
+
+
+_sets: list[tuple[str, str, str]] = []
+
+
+def shipped(_operator, _context):
+    """The marker sets that come along; kept, since Blender does not keep the texts itself."""
+    if not _sets:
+        from ..beyond_mocap.files.marker_set_text import shipped_sets
+
+        _sets.append(("AUTO", "Recognise", "The one that the labels are of"))
+        _sets.extend((one.name, one.name.replace("_", " ").title(), one.about) for one in shipped_sets())
+    return _sets
+
+
+class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
+    """Give the markers their segments by a marker set that comes along"""
+
+    bl_idname = "beyond_mocap.use_marker_set"
+    bl_label = "Use Marker Set"
+
+    which: EnumProperty(name="Marker Set", items=shipped, description="Which one")
+
+    def do(self, context):
+        """Find it, apply it."""
+        from ..beyond_mocap.files.marker_set_text import shipped_sets
+
+        thing = self.cloud(context)
+        labels = tuple(row.name for row in thing.beyond_mocap_cloud.labels)
+        named = (one for one in shipped_sets() if one.name == self.which)
+        found = sets.recognised(labels) if self.which == "AUTO" else next(named)
+        for line in sets.apply(thing, found):
+            self.report({"WARNING"}, line)
+        self.report({"INFO"}, f"{thing.name}: {found.name}")
+
+
+class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator):
+    """Give the markers of the active cloud their segments by a marker set in a text file"""
+
+    bl_idname = "beyond_mocap.load_marker_set"
+    bl_label = "Load Marker Set"
+    filename_ext = ".txt"
+
+    filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
+
+    def do(self, context):
+        """Read it, apply it."""
+        from ..beyond_mocap.files.marker_set_text import read_marker_set
+
+        chosen = self.chosen()
+        if len(chosen) != 1:
+            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one marker set")
+        thing = self.cloud(context)
+        for line in sets.apply(thing, read_marker_set(chosen[0])):
+            self.report({"WARNING"}, line)
+
+
+class BEYOND_MOCAP_OT_save_marker_set(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
+    """Write labels, segments and landmarks of the active cloud as a marker set, for other recordings and the command
+line"""
+
+    bl_idname = "beyond_mocap.save_marker_set"
+    bl_label = "Save Marker Set"
+    bl_options = {"REGISTER"}
+    filename_ext = ".txt"
+
+    filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
+
+    def do(self, context):
+        """Put it together, write it."""
+        from ..beyond_mocap.files.marker_set_text import marker_set_text
+
+        path = Path(bpy.path.abspath(self.filepath))
+        name = "_".join(path.stem.split()) or sets.OWN
+        atomic_write(path, marker_set_text(sets.of_cloud(cloud_meant(context), name)))
+        self.report({"INFO"}, f"written to {path}")
+
+
+class BEYOND_MOCAP_OT_set_static(OnMarkers, Verb, bpy.types.Operator):
+    """The active cloud is a static trial: the other selected clouds, or all others where none is selected, get the
+places of their joints from it"""
+
+    bl_idname = "beyond_mocap.set_static"
+    bl_label = "Set Static Trial"
+
+    @classmethod
+    def poll(cls, context):
+        """Two clouds at least, one of them active."""
+        active = context.view_layer.objects.active
+        cls.poll_message_set("Make the cloud of the static trial active; there have to be others")
+        return is_cloud(active) and len(clouds(context.scene)) > 1
+
+    def do(self, context):
+        """Point to it."""
+        static = context.view_layer.objects.active
+        others = [thing for thing in clouds(context.scene) if thing != static]
+        chosen = [thing for thing in others if thing.select_get()] or others
+        linked.refuse(*chosen)
+        if static.beyond_mocap_cloud.static in chosen:
+            raise InputError(static.name, "its own static trial is among them", "a trial without", "clear it first")
+        for thing in chosen:
+            thing.beyond_mocap_cloud.static = static
+        self.report({"INFO"}, f"{static.name}: static trial of {', '.join(thing.name for thing in chosen)}")
+
+
+class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operator):
+    """Take joints and markers of the active cloud's body from a MODEL.json, as the command reconstruct saves it"""
+
+    bl_idname = "beyond_mocap.load_marker_model"
+    bl_label = "Load Marker Model"
+    filename_ext = ".json"
+
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def do(self, context):
+        """Read it, keep it with the cloud."""
+        from ..beyond_mocap.files.model_json import read_model
+
+        chosen = self.chosen()
+        if len(chosen) != 1:
+            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one MODEL.json")
+        thing = self.cloud(context)
+        models.onto(thing, read_model(chosen[0]))
+        thing.beyond_mocap_cloud.use_model = True
+        self.report({"INFO"}, f"{thing.name}: model from {chosen[0].name}")
+
+
+class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
+    """Write the model that the active cloud keeps as a MODEL.json, for other recordings and the command line"""
+
+    bl_idname = "beyond_mocap.save_marker_model"
+    bl_label = "Save Marker Model"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def do(self, context):
+        """Read it off the text, write it."""
+        from ..beyond_mocap.files.model_json import write_model
+
+        path = bpy.path.abspath(self.filepath)
+        write_model(models.of_cloud(cloud_meant(context)), path)
+        self.report({"INFO"}, f"written to {path}")
+
+
+class BEYOND_MOCAP_OT_clean_markers(OnMarkers, BackgroundVerb, bpy.types.Operator):
+    """Fill the gaps of the active cloud's markers, mend exchanged labels and jumps, and name those that nobody has
+named where the others tell. Reconstruct does the same for itself"""
+
+    bl_idname = "beyond_mocap.clean_markers"
+    bl_label = "Clean Up Markers"
+    kind = "clean markers"
+
+    def order(self, context):
+        """The trial, and which markers belong together."""
+        thing = self.cloud(context)
+        trial = cloud.read(thing, context.scene)
+        assigned = any(row.segment for row in thing.beyond_mocap_cloud.labels)
+        return thing.name, trial, sets.of_cloud(thing).clusters(trial.labels) if assigned else None
+
+    @staticmethod
+    def work(order, progress, cancelled, _hurry):
+        """Clean it."""
+        from ..beyond_mocap.markers.clean import clean
+
+        name, trial, clusters = order
+        return name, clean(trial, clusters, progress=progress, cancelled=cancelled)
+
+    def apply(self, scene, result):
+        """Other trajectories for the cloud, and what was done."""
+        name, cleaned = result
+        thing = scene.objects.get(name)
+        if not is_cloud(thing):
+            self.report({"WARNING"}, f"{name} is gone: nothing was written")
+            return
+        cloud.write(thing, cleaned.trial, scene)
+        thing.beyond_mocap_cloud.cleaned = "\n".join(cleaned.report.lines) or "nothing to mend"
+        for line in thing.beyond_mocap_cloud.cleaned.splitlines():
+            self.report({"INFO"}, f"{name}: {line}")
+
+
+class BEYOND_MOCAP_OT_reconstruct_markers(OnMarkers, BackgroundVerb, bpy.types.Operator):
+    """Find the skeleton that moves under the markers of the active cloud: an armature with an action beside it, and a
+clip of the library where asked for"""
+
+    bl_idname = "beyond_mocap.reconstruct_markers"
+    bl_label = "Reconstruct"
+    kind = "reconstruct markers"
+
+    def order(self, context):
+        """The trial, its static or model, and the settings."""
+        return solve.order_of(context.scene, self.cloud(context))
+
+    @staticmethod
+    def work(order, progress, cancelled, _hurry):
+        """Reconstruct it."""
+        from ..beyond_mocap.reconstruct import reconstruct
+
+        made = reconstruct(order.trial, order.static, order.model, order.settings, progress, cancelled)
+        return order, made
+
+    def apply(self, scene, result):
+        """Armature, action, figures, and the clip."""
+        order, made = result
+        thing = scene.objects.get(order.cloud)
+        if not is_cloud(thing):
+            self.report({"WARNING"}, f"{order.cloud} is gone: nothing was written")
+            return
+        notes = solve.add(order, made)
+        with self.within(scene):
+            body = solve.show(bpy.context, thing, made)
+        for line in (*made.warnings, *notes):
+            self.report({"INFO"}, f"{thing.name}: {line}")
+        self.report({"INFO"}, f"{body.name}: {'; '.join(solve.figures(made))}")
+
+
+class BEYOND_MOCAP_OT_find_release(OnMarkers, BackgroundVerb, bpy.types.Operator):
+    """Find out when and how fast the ball left the hand of the reconstructed body: a ball on its way, and a marker on
+the timeline"""
+
+    bl_idname = "beyond_mocap.find_release"
+    bl_label = "Find Release"
+    kind = "find release"
+
+    def order(self, context):
+        """The reconstruction, and what is known of the ball."""
+        return thrown.order_of(context.scene, self.cloud(context))
+
+    @staticmethod
+    def work(order, progress, _cancelled, _hurry):
+        """Find it."""
+        from ..beyond_mocap.release import release
+
+        name, trial, motion, settings = order
+        progress(0.1, "release")
+        return name, release(trial, motion, settings)
+
+    def apply(self, scene, result):
+        """Ball, timeline, figures."""
+        name, found = result
+        thing = scene.objects.get(name)
+        if not is_cloud(thing):
+            self.report({"WARNING"}, f"{name} is gone: nothing was written")
+            return
+        with self.within(scene):
+            thrown.show(bpy.context, thing, found)
+        for line in thrown.lines(found):
+            self.report({"INFO"}, f"{name}: {line}")

@@ -1,0 +1,351 @@
+"""A match: read its files, make and show a stretch of it, its cameras, its export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
+
+from ..beyond_mocap.errors import InputError
+from ..scene import areas, channels, export, rig, session
+from ..scene.match import cameras, child, load, order, ours, reading, show
+from ..scene.match.settings import active_of, typed
+from ..scene.measure import frames_per_second
+from ..scene.settings import as_setting
+from .verb import BackgroundVerb, DroppedIntoView, ExportVerb, Verb
+
+MAKING = 0.85
+"""Of the bar, the share of making where a match is made and shown."""
+
+
+class MatchVerb(BackgroundVerb):
+    """A verb that ends with a stretch of a match in the scene."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    def known_library(self, wanted: load.Wanted):
+        """The library where this session has it."""
+        return session.library(wanted.library, wanted.unit)
+
+    def apply(self, scene, result):
+        """Pitch, bodies, ball, cameras; and lines about what came of it."""
+        wanted, (library, scenery, lines), notes = result
+        match = scene.beyond_mocap_match
+        match.made = "" if match.folder else as_setting(wanted.folder)
+        if scene != bpy.context.scene:
+            raise InputError("match", f"scene {scene.name} is not shown in the window", "the scene that asked",
+                             "choose it and press Show Match")
+        session.keep_library(library, wanted.unit)
+        first = match.first_frame
+        took = show.show(bpy.context, scenery, first)
+        match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
+        match.shown_rate = frames_per_second(scene)
+        known = match.report.splitlines()
+        match.told = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)
+        for line in lines:
+            self.report({"WARNING"}, line)
+        seconds = scenery.end - scenery.start
+        self.report({"INFO"}, f"{len(scenery.people)} people, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
+
+
+class BEYOND_MOCAP_OT_read_match(BackgroundVerb, bpy.types.Operator):
+    """Read a provider's tracking of a whole match: fills the list of players, the teams' colours and the data report.
+The first minute is chosen"""
+
+    bl_idname = "beyond_mocap.read_match"
+    bl_label = "Read Match"
+    kind = "match file"
+
+    filepath: StringProperty(
+        name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
+        description="A tracking file; empty: the one that is chosen in the panel",
+    )
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+
+    def order(self, context):
+        """Which files. Of those that are dropped together the largest is read, which is the tracking: others are found
+        beside it."""
+        dropped = [Path(self.directory, name) for name in sorted(file.name for file in self.files) if name]
+        chosen = str(max(dropped, key=_size)) if self.directory and dropped else self.filepath
+        return reading.order_of(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
+
+    @staticmethod
+    def work(order, progress, cancelled, hurry):
+        """Read them."""
+        return reading.work(order, progress)
+
+    def apply(self, scene, result):
+        """The list."""
+        order, read = result
+        match = scene.beyond_mocap_match
+        reading.fill(match, order, read)
+        for line in match.report.splitlines()[:6]:
+            self.report({"INFO"}, line)
+        self.report({"INFO"}, f"{len(read.players)} players, {match.length_s / 60.0:.1f} minutes, {read.provider}")
+
+
+class BEYOND_MOCAP_FH_match(DroppedIntoView, bpy.types.FileHandler):
+    """A provider's tracking of a match dropped into the 3D view"""
+
+    bl_idname = "BEYOND_MOCAP_FH_match"
+    bl_label = "Match of all players"
+    bl_import_operator = "beyond_mocap.read_match"
+    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are words; tracking as text is chosen by name
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file; 0 where there is none."""
+    return path.stat().st_size if path.is_file() else 0
+
+
+WHOM = (
+    ("ALL", "All", "Tick everybody"), ("NONE", "None", "Tick nobody"), ("home", "Home", "Tick the home team alone"),
+    ("away", "Away", "Tick the away team alone"), ("ONE", "Chosen", "Tick the chosen player alone"),
+)
+
+
+class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
+    """Choose whom the match is made of"""
+
+    bl_idname = "beyond_mocap.tick_match"
+    bl_label = "Tick Players"
+
+    whom: EnumProperty(name="Whom", items=WHOM, default="ALL", description="Who is ticked")
+
+    @classmethod
+    def poll(cls, context):
+        """There is a list."""
+        cls.poll_message_set("Press Read Match first")
+        return len(context.scene.beyond_mocap_match.players) > 0
+
+    @classmethod
+    def description(cls, _context, properties):
+        """What this button does."""
+        return next(item[2] for item in WHOM if item[0] == properties.whom)
+
+    def do(self, context):
+        """Set the ticks."""
+        match = context.scene.beyond_mocap_match
+        chosen = active_of(match)
+        for player in match.players:
+            alone = player == chosen if self.whom == "ONE" else player.team == self.whom
+            player.use = self.whom == "ALL" or (self.whom != "NONE" and alone)
+
+
+class BEYOND_MOCAP_OT_make_match(MatchVerb, bpy.types.Operator):
+    """Find motion for everybody and the ball's course, from From to To, and show it. Other processes do the work, so
+Blender stays free. ESC cancels: what is finished is kept, and pressing again goes on there"""
+
+    bl_idname = "beyond_mocap.make_match"
+    bl_label = "Make Match"
+    kind = "match"
+    left = "cancelled; what is finished is kept, and pressed again it goes on there"
+
+    @classmethod
+    def poll(cls, context):
+        """A library and a match."""
+        if not context.scene.beyond_mocap.library_folder:
+            cls.poll_message_set("Choose the library's folder in step 1 first")
+            return False
+        cls.poll_message_set("Choose a tracking file of a match, or drop one into the view, first")
+        return bool(context.scene.beyond_mocap_match.tracking_file)
+
+    def order(self, context):
+        """The command line, and what is shown of its results."""
+        wanted = order.wanted(context.scene, order.folder_to_make(context.scene))
+        return order.command(context.scene), wanted, self.known_library(wanted)
+
+    @staticmethod
+    def work(asked, progress, cancelled, hurry):
+        """Make it in a process of its own, then expand it."""
+        arguments, wanted, library = asked
+        notes = child.run(arguments, lambda done, text: progress(MAKING * done, text), cancelled)
+        shown = load.scenery(
+            wanted, library, lambda done, text: progress(MAKING + (1.0 - MAKING) * done, text), cancelled
+        )
+        return wanted, shown, notes
+
+
+class BEYOND_MOCAP_OT_show_match(MatchVerb, bpy.types.Operator):
+    """Show a stretch of a made match, from From to To: everybody in kit, ball, pitch and cameras. It takes the place of
+the one that is shown"""
+
+    bl_idname = "beyond_mocap.show_match"
+    bl_label = "Show Match"
+    kind = "match"
+
+    @classmethod
+    def poll(cls, context):
+        """A library and a folder."""
+        if not context.scene.beyond_mocap.library_folder:
+            cls.poll_message_set("Choose the library's folder in step 1 first")
+            return False
+        cls.poll_message_set("Press Make Match, or choose the folder of a made match, first")
+        match = context.scene.beyond_mocap_match
+        return bool(match.folder or match.made)
+
+    def order(self, context):
+        """Folder and span."""
+        wanted = order.wanted(context.scene, order.folder_to_show(context.scene))
+        return wanted, self.known_library(wanted)
+
+    @staticmethod
+    def work(asked, progress, cancelled, hurry):
+        """Expand it."""
+        wanted, library = asked
+        return wanted, load.scenery(wanted, library, progress, cancelled), ()
+
+
+class ShownMatchVerb(Verb):
+    """A verb about the match that is shown."""
+
+    @classmethod
+    def poll(cls, context):
+        """The match that is shown."""
+        cls.poll_message_set("Press Make Match or Show Match first")
+        return bool(ours.bodies(context.scene))
+
+
+class BEYOND_MOCAP_OT_match_second(ShownMatchVerb, bpy.types.Operator):
+    """Go to this second of the shown match, and select this player. The page over a match names both for its worst
+seconds"""
+
+    bl_idname = "beyond_mocap.match_second"
+    bl_label = "Go to Match Second"
+
+    seconds: FloatProperty(name="Second", options={"SKIP_SAVE"}, description="Of the match's clock")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody")
+
+    def invoke(self, context, _event):
+        """Ask which second."""
+        return context.window_manager.invoke_props_dialog(self)
+
+    def do(self, context):
+        """Set the frame, select the body."""
+        scene, shown = context.scene, context.scene.beyond_mocap_match
+        rate = shown.shown_rate or frames_per_second(scene)  # keys stay on their frames when the scene's rate changes
+        frame = round(shown.shown_first + (self.seconds - shown.shown_start) * rate)
+        last = _last(scene)
+        if not shown.shown_first <= frame <= last:
+            end = shown.shown_start + (last - shown.shown_first) / rate
+            expected = f"{typed(shown.shown_start)} to {typed(end)} s"
+            raise InputError("match", f"{typed(self.seconds)} s is not shown", expected,
+                             "choose From and To around it and press Show Match")
+        body = self.body(scene)
+        scene.frame_set(frame)
+        if body is not None and body.name in context.view_layer.objects and context.mode == "OBJECT":
+            for other in context.selected_objects:
+                other.select_set(False)
+            body.select_set(True)
+            context.view_layer.objects.active = body
+
+    def body(self, scene) -> bpy.types.Object | None:
+        """The player's armature; InputError where he is not shown."""
+        known = {thing.get(ours.PLAYER): thing for thing in ours.bodies(scene)}
+        if self.player and self.player not in known:
+            raise InputError("match", f"{self.player} is not shown", f"one of {', '.join(map(str, known))}",
+                             "tick the player and press Show Match")
+        return known.get(self.player)
+
+
+def _last(scene: bpy.types.Scene) -> int:
+    """The last frame in which somebody moves; the scene's last one where nobody does."""
+    actions = [channels.playing(body)[0] for body in ours.bodies(scene)]
+    return round(max((action.frame_range[1] for action in actions if action is not None), default=scene.frame_end))
+
+
+WHICH = (
+    ("STAND", "Broadcast", "From the stand, following the ball"),
+    ("EYES", "Eyes", "Through the eyes of the player chosen in the list, or of the selected one"),
+)
+
+
+class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
+    """Look through one of the match's cameras"""
+
+    bl_idname = "beyond_mocap.match_camera"
+    bl_label = "Match Camera"
+
+    which: EnumProperty(name="Which", items=WHICH, default="STAND", description="The camera to look through")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the chosen one")
+
+    @classmethod
+    def description(cls, _context, properties):
+        """What this button shows."""
+        return next(item[2] for item in WHICH if item[0] == properties.which)
+
+    def do(self, context):
+        """Make it the scene's camera, and look through it in the 3D view."""
+        scene = context.scene
+        if self.which == "EYES":
+            camera = cameras.eyes(scene, self.who(context), show.ball_shown(scene))
+        else:
+            camera = cameras.stand_of(scene)
+        if camera is None:
+            raise InputError("match", "no camera in the stand", "the one that was laid", "press Show Match again")
+        scene.camera = camera
+        area = None if bpy.app.background else areas.largest(context.window.screen, "VIEW_3D")
+        if area is not None:
+            _look_through(context, area)
+
+    def who(self, context) -> bpy.types.Object:
+        """The armature that is meant: named, selected, or chosen in the list."""
+        shown = {thing.get(ours.PLAYER): thing for thing in ours.bodies(context.scene)}
+        active = context.active_object
+        if not self.player and active is not None:
+            active = active.parent if active.type == "MESH" else active
+            if active in shown.values() and active.select_get():
+                return active
+        chosen = active_of(context.scene.beyond_mocap_match)
+        wanted = self.player or (chosen.feed_id if chosen is not None else next(iter(shown)))
+        if wanted not in shown:
+            raise InputError("match", f"{wanted} is not shown", f"one of {', '.join(map(str, shown))}",
+                             "tick the player and press Show Match")
+        return shown[wanted]
+
+
+def _look_through(context, area: bpy.types.Area) -> None:
+    """The scene's camera in the 3D view, its whole frame."""
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_center_camera()
+
+
+FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
+
+
+class BEYOND_MOCAP_OT_match_export(ExportVerb, bpy.types.Operator):
+    """Write the match that is shown to one file: a skeleton and meshes for everybody, the ball, and the pitch. The
+scene stays as it is"""
+
+    bl_idname = "beyond_mocap.match_export"
+    bl_label = "Export Match"
+
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
+    format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="Form of the file")
+    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
+    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="What the root bone carries")
+    pitch: BoolProperty(name="Pitch", default=True, description="Grass, lines and goals, too")
+
+    @classmethod
+    def poll(cls, context):
+        """A match is shown."""
+        cls.poll_message_set("Show a match first")
+        return bool(ours.bodies(context.scene))
+
+    def do(self, context):
+        """Write it."""
+        path = self.out()
+        scene = context.scene
+        everybody = ours.bodies(scene)
+        bodies = [body for body in everybody if body.name in context.view_layer.objects]
+        if len(bodies) < len(everybody):
+            self.report({"WARNING"}, f"{len(everybody) - len(bodies)} are left out: their collection is excluded")
+        wanted = export.Wanted(path, self.format, self.engine, None, self.root)
+        things = ours.meshes(scene, "ball") + (ours.meshes(scene, "pitch") if self.pitch else [])
+        for line in export.write(context, bodies, wanted, things):
+            self.report({"INFO"}, line)
+        self.report({"INFO"}, f"Written: {path}")

@@ -1,0 +1,264 @@
+"""Passing scenes: their lists, their files, and the making of them."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..beyond_mocap.ball.sample_scenes import SAMPLES as SCENES
+from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.files import scene_json
+from ..beyond_mocap.files.whole import atomic_write
+from ..scene.measure import units_per_metre
+from ..scene.passes import examples, hits_shown, make, order, shown
+from ..scene.passes.settings import SAMPLES
+from .verb import BackgroundVerb, ImportVerb, Verb
+
+ROWS = (("players", "Players", "Who keeps the ball going"), ("passes", "Passes", "One after the other"))
+WHAT = (
+    ("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"),
+    ("UP", "Up", "The picked one earlier"), ("DOWN", "Down", "The picked one later"),
+)  # fmt: skip
+ACTIVE = {"players": "active_player", "passes": "active_pass"}
+RING = 3.0  # metres from the 3D cursor at which players are added
+
+
+class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
+    """Add, remove or move a player or a pass. A new player stands near the 3D cursor, or where the selected armature
+stands, which becomes his body"""
+
+    bl_idname = "beyond_mocap.passes_list"
+    bl_label = "Players and Passes"
+
+    rows: EnumProperty(name="List", items=ROWS, options={"SKIP_SAVE"}, description="Which list")
+    what: EnumProperty(name="What", items=WHAT, options={"SKIP_SAVE"}, description="What to do")
+
+    @classmethod
+    def description(cls, _context, properties):
+        """What this button does."""
+        one = {"players": "player", "passes": "pass"}[properties.rows]
+        if properties.what == "ADD" and one == "player":
+            return (
+                "Add a player near the 3D cursor; a selected armature that is nobody's yet becomes his body, and he "
+                "stands where it does"
+            )
+        if properties.what == "ADD":
+            return "Add a pass, from whoever gets the last one"
+        moved = {"UP": "earlier", "DOWN": "later"}.get(properties.what)
+        return f"Move the picked {one} {moved}" if moved else f"Remove the picked {one}"
+
+    def do(self, context):
+        """One of four things."""
+        settings = context.scene.beyond_mocap_passes
+        if self.what == "ADD":
+            return add_player(context) if self.rows == "players" else add_pass(settings)
+        rows, number = getattr(settings, self.rows), getattr(settings, ACTIVE[self.rows])
+        if not 0 <= number < len(rows):
+            raise InputError(self.rows, "none is picked", "a row of the list", "add one first")
+        if self.what == "REMOVE":
+            self.remove(settings, rows, number)
+        else:
+            self.move(settings, rows, number, number + (1 if self.what == "DOWN" else -1))
+
+    def remove(self, settings, rows, number):
+        """Take the row out; with a player his passes, his Empty and what the scene has made of him."""
+        if self.rows == "players":
+            shown.check(rows[number])
+            shown.let_go(rows[number])
+            name = rows[number].name
+            for other in reversed(range(len(settings.passes))):
+                if name in (settings.passes[other].who, settings.passes[other].to):
+                    settings.passes.remove(other)
+            order.remove_place(rows[number])
+            settings.active_pass = max(0, min(settings.active_pass, len(settings.passes) - 1))
+        else:
+            order.remove_mark(rows[number].at)
+        rows.remove(number)
+        setattr(settings, ACTIVE[self.rows], max(0, min(number, len(rows) - 1)))
+
+    def move(self, settings, rows, number, goal):
+        """Exchange it with its neighbour."""
+        if not 0 <= goal < len(rows):
+            raise InputError(self.rows, "it is at the end of the list", "a row that can be moved that way")
+        rows.move(number, goal)
+        setattr(settings, ACTIVE[self.rows], goal)
+
+
+def add_player(context) -> None:
+    """One more player."""
+    settings, scene = context.scene.beyond_mocap_passes, context.scene
+    count, units = len(settings.players), units_per_metre(scene)
+    body = context.view_layer.objects.active
+    free = body is not None and body.type == "ARMATURE" and body.library is None and body.select_get()
+    if free and not any(row.body == body for row in settings.players):
+        place, facing = standing(scene, body)
+        row = order.add_player(
+            context, body.name if not _taken(settings, body.name) else order.free_name(settings), place, facing
+        )
+        row.body = body
+        return
+    angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
+    ring = RING * (1.0 if count < 3 else 2.0)
+    x, y = scene.cursor.location.x / units, scene.cursor.location.y / units
+    order.add_player(
+        context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)), angle + math.pi
+    )
+
+
+def standing(scene, body) -> tuple[tuple[float, float], float]:
+    """Where an armature stands now, and which way it looks."""
+    from ..beyond_mocap.motion.humanoid import heading
+
+    try:
+        motion, first = hits_shown.motion_of(scene, body)
+    except InputError:
+        return order.stands(scene, body)
+    row = min(max(scene.frame_current - first, 0), len(motion) - 1)
+    return tuple(float(value) for value in motion.root_positions[row, :2]), float(heading(motion)[row])
+
+
+def add_pass(settings) -> None:
+    """One more pass, from who gets the last one to the next in the list."""
+    names = [row.name for row in settings.players]
+    if len(names) < 2:
+        raise InputError("passes", f"{len(names)} players", "two or more", "add players first")
+    last = settings.passes[-1] if len(settings.passes) else None
+    row = settings.passes.add()
+    row.who = last.to if last is not None and last.to in names else names[0]
+    row.to = names[(names.index(row.who) + 1) % len(names)]
+    if last is not None:
+        row.kind, row.bounces = last.kind, last.bounces
+    settings.active_pass = len(settings.passes) - 1
+
+
+def _taken(settings, name: str) -> bool:
+    return any(row.name == name for row in settings.players)
+
+
+class BEYOND_MOCAP_OT_passes_make(BackgroundVerb, bpy.types.Operator):
+    """Let the players of the list pass the ball as the passes say: bodies and ball are made where there are none. Each
+flight leaves one body at its strike and arrives at the next one at his"""
+
+    bl_idname = "beyond_mocap.passes_make"
+    bl_label = "Make Scene"
+    kind = "passes"
+
+    live: BoolProperty(
+        name="Live", options={"HIDDEN", "SKIP_SAVE"},
+        description="Whether an edit asked for it: what is wrong is told in the panel",
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """Players and passes."""
+        cls.poll_message_set("Add players and passes, or take a sample")
+        settings = context.scene.beyond_mocap_passes
+        return len(settings.players) > 1 and len(settings.passes) > 0
+
+    def order(self, context):
+        """What is to be made."""
+        if not self.live:
+            examples.forget()
+        return make.order_of(context.scene)
+
+    @staticmethod
+    def work(order, progress, cancelled, hurry):
+        """Play the scene."""
+        return make.work(order, progress, cancelled, hurry)
+
+    def apply(self, scene, result):
+        """Bodies and ball; what is shown is what was ordered."""
+        rows = {row.name for row in scene.beyond_mocap_passes.players}
+        if missing := [one.name for one in result.passes.players if one.name not in rows]:
+            raise InputError(
+                "players", f"{missing[0]} is gone from the list meanwhile", "the same players", "press Make Scene again"
+            )
+        make.show(scene, result)
+        self.report({"INFO"}, ", ".join(scene.beyond_mocap_passes.figures.splitlines()[:3]))
+
+    def modal(self, context, event):
+        """One that an edit asked for makes way for the next edit's without a word."""
+        if self.live and self.job.stale:
+            self.ended(context)
+            return {"CANCELLED"}
+        return super().modal(context, event)
+
+    def failed(self, message):
+        """A live edit that makes no sense just now is told in the panel; the scene shown stays."""
+        if not self.live:
+            return super().failed(message)
+        bpy.context.scene.beyond_mocap_passes.told = message
+        return {"CANCELLED"}
+
+
+class BEYOND_MOCAP_OT_passes_clear(Verb, bpy.types.Operator):
+    """Take away what Make Scene has made: bodies, ball and net. Bodies that were yours play their own motion again; the
+lists stay"""
+
+    bl_idname = "beyond_mocap.passes_clear"
+    bl_label = "Clear Scene"
+
+    @classmethod
+    def poll(cls, context):
+        """A scene is shown."""
+        cls.poll_message_set("Nothing has been made")
+        return bool(context.scene.beyond_mocap_passes.made_of)
+
+    def do(self, context):
+        """Take it away."""
+        make.clear(context.scene)
+
+
+class BEYOND_MOCAP_OT_passes_sample(Verb, bpy.types.Operator):
+    """Fill the lists with a scene to begin with. What they hold now is replaced; players of the same name keep
+their bodies"""
+
+    bl_idname = "beyond_mocap.passes_sample"
+    bl_label = "Sample Scene"
+
+    sample: EnumProperty(name="Sample", items=SAMPLES, description="Which one")
+
+    def do(self, context):
+        """Read it, fill the lists."""
+        order.fill(context, scene_json.parse_scene(SCENES[self.sample], self.sample))
+        self.report({"INFO"}, "drag the players' Empties, edit the passes, then press Make Scene")
+
+
+class BEYOND_MOCAP_OT_passes_from_json(ImportVerb, bpy.types.Operator):
+    """Fill the lists with a scene from a SCENE.json, as the command passes takes it"""
+
+    bl_idname = "beyond_mocap.passes_from_json"
+    bl_label = "Scene from File"
+    filename_ext = ".json"
+
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def do(self, context):
+        """Read it, fill the lists."""
+        chosen = self.chosen()
+        if len(chosen) != 1:
+            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one SCENE.json")
+        order.fill(context, scene_json.read_scene(chosen[0]))
+
+
+class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
+    """Write the scene as a SCENE.json, for the command passes or another file"""
+
+    bl_idname = "beyond_mocap.passes_to_json"
+    bl_label = "Scene to File"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def do(self, context):
+        """Work it out, then write."""
+        text = scene_json.scene_text(order.scene_of(context.scene))
+        atomic_write(bpy.path.abspath(self.filepath), text)
+        missing = examples.left_out(context.scene.beyond_mocap_passes)
+        self.report(
+            {"WARNING" if missing else "INFO"}, ", ".join(filter(None, (f"written to {self.filepath}", missing)))
+        )

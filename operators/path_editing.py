@@ -1,0 +1,273 @@
+"""Path editing: let a motion follow a curve that can be edited, keep bodies apart, bake or revert it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ..beyond_mocap.errors import BeyondMocapError, InputError
+from ..scene import linked
+from ..scene.measure import units_per_metre
+from ..scene.ride import curve, keep_apart, measure, riders
+from ..scene.ride.settings import choose, meant, riders as riders_in
+from .verb import Verb
+
+
+class RiderVerb(Verb):
+    """A verb about the riders that are meant; greyed, with the reason, where there are none."""
+
+    @classmethod
+    def poll(cls, context):
+        """A rider."""
+        cls.poll_message_set("Select an armature that rides a path, or its curve")
+        return bool(meant(context))
+
+
+COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
+         "description": "Control points of the curve; 0: as many as it needs to lie within 3 cm"}
+DEGREE = {"name": "Degree", "default": 3, "min": 2, "max": 5,
+          "description": "Of a NURBS: how smooth it is, and how far each control point reaches"}
+
+
+class BEYOND_MOCAP_OT_edit_path(Verb, bpy.types.Operator):
+    """Lay the selected armature's motion on a curve along its path: edit the curve (Tab), and the motion follows. A
+selected curve becomes the path instead, also of who rides already. The original action is put aside; Leave brings it
+back"""
+
+    bl_idname = "beyond_mocap.edit_path"
+    bl_label = "Edit Path"
+
+    count: IntProperty(**COUNT)
+    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
+    degree: IntProperty(**DEGREE)
+    straight: BoolProperty(name="Straight", description="A straight line, as long, instead of the original path")
+
+    @classmethod
+    def poll(cls, context):
+        """Armatures."""
+        cls.poll_message_set("Leave edit mode first (Tab)")
+        if context.mode not in {"OBJECT", "POSE"}:
+            return False
+        cls.poll_message_set("Select an armature with a motion, and a curve if it is to ride that one")
+        return bool(bodies(context))
+
+    def do(self, context):
+        """Curve and motion, and the curve active."""
+        linked.refuse(context.scene)
+        chosen = bodies(context)
+        drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
+        riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
+        if drawn is None and len(riding) == len(chosen):
+            raise InputError(
+                f"armature {chosen[0].name}", "it rides already", "one that does not", "edit its curve, or press Leave"
+            )
+        begun, used = [], drawn
+        try:
+            for body, _ in riding if drawn is not None else ():
+                riders.change(context.scene, body, drawn)
+            for body in [body for body in chosen if not body.beyond_mocap_ride.on]:
+                before = body.beyond_mocap_ride.curve
+                made = riders.begin(context, body, drawn, self.count, self.kind, self.degree, self.straight)
+                begun.append((body, before, made if made not in (drawn, before) else None))
+                used = used or made
+        except BeyondMocapError:
+            for body, before, made in begun:
+                riders.revert(body, before, made)
+            for body, before in riding:
+                with suppress(BeyondMocapError):  # who could not ride his curve before cannot now
+                    riders.change(context.scene, body, before)
+            raise
+        if context.mode == "POSE":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        choose(context, used)
+        names = ", ".join(body.name for body in chosen)
+        self.report({"INFO"}, f"{names}: edit the points of {used.name} (Tab); the motion follows")
+
+
+def bodies(context) -> list[bpy.types.Object]:
+    """The armatures that are meant: the active one first, and the other selected ones."""
+    active = context.view_layer.objects.active
+    return sorted(
+        (thing for thing in context.selected_objects if thing.type == "ARMATURE"), key=lambda thing: thing != active
+    )
+
+
+class BEYOND_MOCAP_OT_path_curve(Verb, bpy.types.Operator):
+    """Give the rider another curve: along the original path, straight, or as the path is now with other points. The
+curve before is removed if it was made here and nobody else rides it"""
+
+    bl_idname = "beyond_mocap.path_curve"
+    bl_label = "New Curve"
+
+    shape: EnumProperty(name="Shape", items=curve.SHAPES, default="FITTED", description="Where the new curve runs")
+    count: IntProperty(**COUNT)
+    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
+    degree: IntProperty(**DEGREE)
+
+    @classmethod
+    def poll(cls, context):
+        """A rider."""
+        cls.poll_message_set("Leave edit mode first (Tab)")
+        if context.mode not in {"OBJECT", "POSE"}:
+            return False
+        cls.poll_message_set("Select an armature that rides a path, or its curve")
+        return bool(meant(context))
+
+    def do(self, context):
+        """The curve, which becomes active."""
+        body = meant(context)[0]
+        made = riders.new_curve(context, body, self.shape, self.count, self.kind, self.degree)
+        if context.mode == "POSE":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        choose(context, made)
+
+
+class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
+    """Work out the rider's motion anew: after edits of the original action, while Live is off, or in a script"""
+
+    bl_idname = "beyond_mocap.update_path"
+    bl_label = "Update Path"
+
+    def do(self, context):
+        """All that are meant."""
+        for body in meant(context):
+            riders.renew(context.scene, body, anew=True)
+            measure.measure(context.scene, body)
+
+
+class BEYOND_MOCAP_OT_path_apart(Verb, bpy.types.Operator):
+    """Find where riders would run into each other or another body, and let them wait a little or make a small detour,
+as little as it takes. Of two or more selected riders only those give way; otherwise all do"""
+
+    bl_idname = "beyond_mocap.path_apart"
+    bl_label = "Keep Apart"
+
+    distance: FloatProperty(
+        name="Distance", default=0.6, min=0.05, max=20.0, soft_max=2.0, precision=2,
+        description="Metres between the middles of two bodies at least",
+    )
+    delay: FloatProperty(
+        name="Longest Wait", default=2.0, min=0.0, max=60.0, soft_max=10.0, precision=2, unit="TIME_ABSOLUTE",
+        description="Seconds that a rider may begin later",
+    )
+    detour: FloatProperty(
+        name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
+        description="Metres that a rider may leave its path to the side",
+    )
+    clear: BoolProperty(name="Clear", description="Only take back the waits and detours of before")
+
+    @classmethod
+    def poll(cls, context):
+        """A rider."""
+        cls.poll_message_set("Let an armature ride a path first (Edit Path)")
+        return bool(riders_in(context.scene))
+
+    def do(self, context):
+        """Find out, then ask."""
+        from ..beyond_mocap.polish.apart import Limits
+        from ..beyond_mocap.polish.follower import Change
+
+        bodies = meant(context)
+        bodies = bodies if len(bodies) > 1 else riders_in(context.scene)
+        if self.clear:
+            keep_apart.lay(context.scene, bodies, [Change()] * len(bodies))
+            return
+        kept = keep_apart.worked_out(context, bodies, Limits(self.distance, delay=self.delay, detour=self.detour))
+        keep_apart.lay(context.scene, bodies, kept.changes)
+        self.tell(kept)
+
+    def tell(self, kept):
+        """What was found and what was asked for."""
+        if not kept.before and not kept.left:
+            self.report({"INFO"}, f"Nobody comes within {self.distance:.2f} m of another")
+            return
+        found = "1 collision" if kept.before == 1 else f"{kept.before} collisions"
+        lines = "; ".join([found, *keep_apart.lines_of(kept)])
+        self.report({"WARNING"} if kept.left else {"INFO"}, lines)
+
+
+class BEYOND_MOCAP_OT_bake_path(RiderVerb, bpy.types.Operator):
+    """Keep the motion on its new path as an ordinary action with a key on every frame. The original action and the
+curve stay in the file"""
+
+    bl_idname = "beyond_mocap.bake_path"
+    bl_label = "Keep"
+
+    def do(self, context):
+        """All that are meant; of who could not follow lately, the last motion that could be worked out."""
+        chosen = meant(context)
+        for body in chosen:
+            riders.may_keep(body)
+        kept = [riders.keep(context.scene, body) for body in chosen]
+        riders.back_to(context, chosen)
+        self.report({"INFO"}, f"kept as {', '.join(action.name for action, _ in kept)}")
+        for line in (told for _, told in kept if told):
+            self.report({"WARNING"}, f"the last motion that could be worked out is kept: {line}")
+
+
+class BEYOND_MOCAP_OT_leave_path(RiderVerb, bpy.types.Operator):
+    """Give the armature its original motion back, exactly as it was. The curve stays, and Edit Path takes it up
+again"""
+
+    bl_idname = "beyond_mocap.leave_path"
+    bl_label = "Leave"
+
+    def do(self, context):
+        """All that are meant."""
+        chosen = meant(context)
+        riders.leave(*chosen)
+        riders.back_to(context, chosen)
+
+
+DIRECTIONS = (
+    ("LEFT", "Left", "Along -X", "TRIA_LEFT", 0),
+    ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),
+    ("FORTH", "Forth", "Along Y", "TRIA_UP", 2),
+    ("BACK", "Back", "Along -Y", "TRIA_DOWN", 3),
+    ("UP", "Up", "Along Z", "SORT_DESC", 4),
+    ("DOWN", "Down", "Along -Z", "SORT_ASC", 5),
+)
+AXES = {
+    "LEFT": (-1.0, 0.0, 0.0), "RIGHT": (1.0, 0.0, 0.0), "BACK": (0.0, -1.0, 0.0), "FORTH": (0.0, 1.0, 0.0),
+    "UP": (0.0, 0.0, 1.0), "DOWN": (0.0, 0.0, -1.0),
+}
+
+
+class BEYOND_MOCAP_OT_nudge_points(Verb, bpy.types.Operator):
+    """Move the selected control points or handles by the set step along an axis of the world, whichever way the view
+looks"""
+
+    bl_idname = "beyond_mocap.nudge_points"
+    bl_label = "Nudge Points"
+
+    direction: EnumProperty(name="Direction", items=DIRECTIONS, default="RIGHT", description="Which way, in the world")
+    step: FloatProperty(
+        name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
+        description="Metres to move; 0: the step that is set in the panel Path Editing",
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """A curve is in edit mode."""
+        cls.poll_message_set("Select a curve and go into edit mode with Tab first")
+        return context.mode == "EDIT_CURVE"
+
+    @classmethod
+    def description(cls, _context, properties):
+        """With the key that does the same."""
+        way = next(item[2].lower() for item in DIRECTIONS if item[0] == properties.direction)
+        key = {"FORTH": "Up Arrow", "BACK": "Down Arrow", "UP": "Page Up", "DOWN": "Page Down"}
+        return (f"Move the selected control points or handles by the step, {way} of the world.\n"
+                f"Alt + {key.get(properties.direction) or properties.direction.capitalize() + ' Arrow'}")
+
+    def do(self, context):
+        """Blender's own move, since it knows what a handle does to its neighbour."""
+        step = (self.step or context.scene.beyond_mocap.nudge_step) * units_per_metre(context.scene)
+        moved = bpy.ops.transform.translate(
+            "EXEC_DEFAULT", value=[step * part for part in AXES[self.direction]], orient_type="GLOBAL", mirror=False,
+            use_proportional_edit=False, snap=False,
+        )
+        if moved != {"FINISHED"}:
+            raise InputError("nudge", "no control point selected", "one or more", "click on a point first")

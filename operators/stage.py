@@ -1,0 +1,139 @@
+"""The stage: pitch, light, and cameras, also those along a path."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty
+
+from ..beyond_mocap.errors import InputError
+from ..scene import areas, path_cameras, stage
+from ..scene.ride.settings import meant, riders
+from .verb import Verb
+
+
+class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
+    """Add a pitch with its lines, a sun and a camera that follows the players once they move"""
+
+    bl_idname = "beyond_mocap.add_stage"
+    bl_label = "Add Pitch, Light and Camera"
+
+    camera: BoolProperty(name="Camera", default=True, description="Add a camera and look through it when rendering")
+
+    def do(self, context):
+        """Make it."""
+        stage.create(context, self.camera)
+
+
+class BEYOND_MOCAP_OT_path_cameras(Verb, bpy.types.Operator):
+    """Set up four cameras on all riders and their paths: from above, from the side, from three quarters, and following
+behind the active one. Pressed again it lays only those anew that nobody has moved or changed"""
+
+    bl_idname = "beyond_mocap.path_cameras"
+    bl_label = "Path Cameras"
+
+    @classmethod
+    def poll(cls, context):
+        """Somebody rides a path; edit mode has an undo of its own, which knows nothing of cameras."""
+        cls.poll_message_set("Leave edit mode first (Tab)")
+        if context.mode not in {"OBJECT", "POSE"}:
+            return False
+        cls.poll_message_set("Select an armature and press Edit Path first")
+        return bool(riders(context.scene))
+
+    def do(self, context):
+        """Look at all of them, and lay the cameras."""
+        first = next(iter(meant(context)), None)
+        kept = path_cameras.set_up(context.scene, path_cameras.route(context.scene, first))
+        if kept:
+            self.report({"INFO"}, f"kept as you have changed them: {', '.join(kept)}")
+
+
+WHICH = (
+    ("NEXT", "Next", "The next one; after the last the free view, from the free view the first"),
+    ("ABOVE", "Above", "From above, as a map: X to the right, Y up"),
+    ("SIDE", "Side", "From the side, the path across the picture"),
+    ("QUARTER", "Quarter", "From three quarters, a little above"),
+    ("BEHIND", "Behind", "Behind the body, following it"),
+    ("FREE", "Free View", "The view as it was before, and the scene's own camera"),
+)
+VIEW = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera turns a view
+_free: dict[int, tuple] = {}  # by the area's pointer: its VIEW before the first of these cameras
+
+
+class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
+    """Look through the next path camera; after the last one the free view comes back"""
+
+    bl_idname = "beyond_mocap.path_camera"
+    bl_label = "Path Camera"
+
+    which: EnumProperty(name="Which", items=WHICH, default="NEXT", description="The camera to look through")
+
+    @classmethod
+    def poll(cls, context):
+        """There are such cameras."""
+        cls.poll_message_set("Press Path Cameras in the panel Path Editing first")
+        return path_cameras.any_in(context.scene)
+
+    @classmethod
+    def description(cls, _context, properties):
+        """What this button shows, with the key that flicks."""
+        told = next(item[2] for item in WHICH if item[0] == properties.which)
+        return f"{told}.\nShift + J or Shift + Numpad 0: the next one"
+
+    def do(self, context):
+        """Make it the scene's camera, and look through it in the 3D view."""
+        scene, area = context.scene, _view(context)
+        kind = self.which if self.which != "NEXT" else _after(scene, area)
+        if kind == "FREE":
+            if area is not None and scene.camera is not None and scene.camera.get(path_cameras.MARK):
+                _look_freely(area)
+            path_cameras.give_back(scene)
+            return
+        camera = path_cameras.found(scene, kind)
+        if camera is None:
+            raise InputError("path cameras", f"no camera {path_cameras.NAMES[kind]}", "all four",
+                             "press Path Cameras in the panel Path Editing")
+        if kind == "BEHIND" and riders(scene):
+            path_cameras.follow(scene, path_cameras.route(scene, next(iter(meant(context)), None)))
+        if area is not None:
+            _look_through(area, scene.camera, camera)
+        path_cameras.take(scene, camera)
+
+
+def _view(context) -> bpy.types.Area | None:
+    """The 3D view in which the key or button was pressed, or the largest; None without a window."""
+    if bpy.app.background or context.window is None:
+        return None
+    if context.area is not None and context.area.type == "VIEW_3D":
+        return context.area
+    return areas.largest(context.window.screen, "VIEW_3D")
+
+
+def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
+    """What comes next: the free view is one of the row where there is a view."""
+    row = [kind for kind in path_cameras.KINDS if path_cameras.found(scene, kind)]
+    looked = area is None or area.spaces.active.region_3d.view_perspective == "CAMERA"
+    seen = scene.camera.get(path_cameras.MARK, "") if looked and scene.camera is not None else ""
+    if area is not None:
+        row.append("FREE")
+    return row[(row.index(seen) + 1) % len(row)] if seen in row else row[0]
+
+
+def _look_through(area: bpy.types.Area, before: bpy.types.Object | None, camera: bpy.types.Object) -> None:
+    space = area.spaces.active
+    view = space.region_3d
+    if view.view_perspective != "CAMERA" or before is None or not before.get(path_cameras.MARK):
+        place, turn = view.view_location.copy(), view.view_rotation.copy()
+        _free[area.as_pointer()] = view.view_perspective, place, turn, view.view_distance
+    if space.use_local_camera:
+        space.camera = camera
+    view.view_perspective = "CAMERA"
+
+
+def _look_freely(area: bpy.types.Area) -> None:
+    """The view as it was before; where that is not known any more, from where the camera stands."""
+    view = area.spaces.active.region_3d
+    if view.view_perspective != "CAMERA":
+        return
+    for name, value in zip(VIEW, _free.get(area.as_pointer(), ("PERSP",))):
+        setattr(view, name, value)

@@ -1,0 +1,338 @@
+"""The timeline of a player: show it, go through it, and its key moments."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
+
+from ..beyond_mocap.errors import InputError
+from ..scene import areas, bake, lanes, lay_strips, moment_names, word_checks
+from ..scene.core.live import soon
+from ..scene.settings import active_player
+from ..scene.strip_lines import said
+from ..scene.subject import can_have, clock, name_of, subject, with_lanes
+from .verb import Verb
+
+
+class TimelineVerb(Verb):
+    """A verb for the active player's timeline, or for that of a library clip that is being annotated."""
+
+    @classmethod
+    def poll(cls, context):
+        """There is somebody with strips."""
+        cls.poll_message_set("Import tracking in step 2 first, and bring its players to the timeline")
+        return subject(context) is not None
+
+    def attempt(self, action):
+        """As ever; the lines about words are worked out anew."""
+        done = super().attempt(action)
+        word_checks.keep(bpy.context)
+        return done
+
+
+class WritingVerb(TimelineVerb):
+    """A verb that brings the timeline about where there is none yet."""
+
+    @classmethod
+    def poll(cls, context):
+        """There is a player."""
+        cls.poll_message_set("Import tracking in step 2 first")
+        return can_have(context)
+
+
+class MomentVerb(TimelineVerb):
+    """A verb for the picked key moment."""
+
+    @classmethod
+    def poll(cls, context):
+        """A key moment is picked."""
+        if not super().poll(context):
+            return False
+        cls.poll_message_set("Pick a key moment first: click its name in the NLA editor or in the list")
+        return is_picked(subject(context))
+
+
+def is_picked(target: bpy.types.Object) -> bool:
+    """Whether a key moment is picked, found without reading any words."""
+    return any(marker.select for _, strip in lanes.strips(target) for marker in strip.action.pose_markers)
+
+
+def picked(target: bpy.types.Object) -> lanes.PlacedMoment:
+    """The picked key moment; InputError where there is none."""
+    found = next((moment for moment in lanes.moments(target) if moment.selected), None)
+    if found is None:
+        raise InputError(name_of(target), "no key moment is picked", "one", "click its name in the NLA editor")
+    return found
+
+
+def selected_spans(target: bpy.types.Object) -> list[lanes.PlacedSpan]:
+    """The spans whose strips are selected, by start."""
+    return [span for span in lanes.spans(target) if span.selected]
+
+
+def draw_complaints(layout, context: bpy.types.Context, item) -> None:
+    """What is wrong with the words of the span or key moment that `item()` returns, a line each."""
+    try:
+        lines = word_checks.lines_for(context.scene, item())
+    except InputError as error:
+        lines = [str(error)]
+    for line in lines:
+        layout.label(text=line, icon="ERROR")
+
+
+def playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
+    """The playhead, in seconds on the clock of the object's strips."""
+    return clock(context, target).seconds(context.scene.frame_current_final)
+
+
+class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
+    """Open the NLA editor below the 3D view, with the strips of all players in it and its Beyond Mocap tab"""
+
+    bl_idname = "beyond_mocap.show_timeline"
+    bl_label = "Show Timeline"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        """Somebody has a timeline."""
+        cls.poll_message_set("Import tracking in step 2 first")
+        return any(player.dot for player in context.scene.beyond_mocap.players)
+
+    def do(self, context):
+        """Find or open it, show its sidebar and all strips."""
+        area = areas.editor(context, "NLA_EDITOR", "HORIZONTAL", 0.4)
+        if area is None:
+            return
+        space = area.spaces.active
+        space.show_region_ui = True
+        if space.dopesheet is not None:
+            space.dopesheet.show_only_selected = False
+        uid = context.scene.session_uid
+        soon(lambda: _settle(uid), 0.1)
+        area.tag_redraw()
+
+
+def _settle(scene: int) -> None:
+    """What an editor takes only once it has been drawn: which tab is in front, and what it shows."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type != "NLA_EDITOR" or window.scene.session_uid != scene:
+                continue
+            regions = {region.type: region for region in area.regions}
+            regions["UI"].active_panel_category = "Beyond Mocap"
+            with bpy.context.temp_override(window=window, area=area, region=regions["WINDOW"]):
+                bpy.ops.nla.view_all()
+            area.tag_redraw()
+
+
+class BEYOND_MOCAP_OT_jump_to(Verb, bpy.types.Operator):
+    """Go to the frame that this line is about, and select the player's body. Where a line names several, each press
+goes to the next. Shift-click also brings the body into view"""
+
+    bl_idname = "beyond_mocap.jump_to"
+    bl_label = "Jump To"
+
+    seconds: FloatProperty(
+        name="Seconds", options={"SKIP_SAVE"}, description="Second on the tracking file's clock to go to"
+    )
+    stops: StringProperty(
+        name="Stops", options={"SKIP_SAVE"},
+        description="Seconds with blanks between, instead: to the next one behind the current frame, from the last to "
+        "the first"
+    )
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Whose body; empty: the active player's")
+    frame_view: BoolProperty(
+        name="Bring into View", options={"SKIP_SAVE"}, description="Move the 3D views so that the body is seen"
+    )
+
+    def invoke(self, context, event):
+        """As the button was pressed."""
+        self.frame_view = self.frame_view or event.shift
+        return self.execute(context)
+
+    def frame(self, scene) -> int:
+        """The scene frame to go to."""
+        try:
+            seconds = [float(text) for text in self.stops.split()] or [self.seconds]
+        except ValueError:
+            raise InputError("stops", repr(self.stops), "seconds with blanks between") from None
+        frames = sorted(int(round(bake.frame_at(scene, second))) for second in seconds)
+        return next((frame for frame in frames if frame > scene.frame_current), frames[0])
+
+    def do(self, context):
+        """Set the frame, select the body."""
+        settings = context.scene.beyond_mocap
+        if self.player and self.player not in settings.players:
+            raise InputError("player", self.player, "a name in the list", "look at step 2")
+        player = settings.players[self.player] if self.player else active_player(settings)
+        context.scene.frame_set(self.frame(context.scene))
+        body = player.body if player is not None else None
+        if body is None or body.name not in context.view_layer.objects:
+            return
+        if context.view_layer.objects.active is None or context.mode == "OBJECT":
+            for other in context.selected_objects:
+                other.select_set(False)
+            body.select_set(True)
+            context.view_layer.objects.active = body
+        if self.frame_view and not bpy.app.background:
+            _bring_into_view(context)
+
+
+def _bring_into_view(context) -> None:
+    """Let every 3D view show what is selected."""
+    for area in context.screen.areas:
+        if area.type == "VIEW_3D":
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            with context.temp_override(area=area, region=region):
+                bpy.ops.view3d.view_selected(use_all_regions=False)
+
+
+class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
+    """Put the playhead on this key moment and pick it"""
+
+    bl_idname = "beyond_mocap.go_to_moment"
+    bl_label = "Go to Key Moment"
+
+    strip: StringProperty(name="Strip", options={"SKIP_SAVE"}, description="The strip whose action has the marker")
+    index: IntProperty(name="Index", options={"SKIP_SAVE"}, description="Which marker of the action it is")
+
+    def do(self, context):
+        """Pick it, and go there."""
+        target = subject(context)
+        strip = lanes.strip_named(target, self.strip or lanes.MOMENTS)
+        markers = strip.action.pose_markers
+        if not 0 <= self.index < len(markers):
+            raise InputError(name_of(target), f"key moment {self.index} of strip {strip.name!r}", "one that is there",
+                             f"it has {len(markers)}")
+        lay_strips.pick(target, strip.name, self.index)
+        context.scene.frame_set(lanes.marker_frame(strip, markers[self.index]))
+
+
+STILL = 4  # pixels that the pointer may move before a click becomes a drag
+
+
+class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
+    """Pick the key moment whose name is under the pointer; drag it to move the moment, Esc puts it back"""
+
+    bl_idname = "beyond_mocap.pick_moment"
+    bl_label = "Pick Key Moment"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    def execute(self, context):
+        """Only a pointer can pick."""
+        return self.failed("Pick Key Moment works with the pointer in the NLA editor; Go to Key Moment picks by index")
+
+    def invoke(self, context, event):
+        """Pick what is under the pointer; where that is nothing, the click is Blender's own."""
+        region = context.region
+        if region is None or region.type != "WINDOW":
+            return {"PASS_THROUGH"}
+        name = moment_names.hit(context, region, event.mouse_region_x, event.mouse_region_y)
+        if name is None or name.target not in context.scene.objects:
+            return {"PASS_THROUGH"}
+        target = context.scene.objects[name.target]
+        if self.attempt(lambda: self.pick(target, name)) == {"CANCELLED"}:
+            return {"CANCELLED"}
+        self.target, self.begun, self.frame = name.target, event.mouse_region_x, name.frame
+        self.dragged = False
+        context.window_manager.modal_handler_add(self)
+        moment_names.redraw()
+        return {"RUNNING_MODAL"}
+
+    def pick(self, target, name):
+        """Pick it, and remember what it says."""
+        lay_strips.check_editable(target)
+        lay_strips.pick(target, name.strip, name.index)
+        self.before = next((moment for moment in lanes.moments(target) if moment.selected), None)
+        if self.before is None:
+            raise InputError(target.name, "this key moment cannot be read", "words", "rename it in the list")
+
+    def modal(self, context, event):
+        """Follow the pointer by whole frames until the button is let go."""
+        if event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
+            self.put(context, self.before.key)
+            return {"CANCELLED"}
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            context.area.header_text_set(None)
+            word_checks.keep(context)
+            return {"FINISHED"}
+        if event.type == "MOUSEMOVE":
+            self.dragged |= abs(event.mouse_region_x - self.begun) > STILL
+            if self.dragged:
+                self.follow(context, event.mouse_region_x)
+        return {"RUNNING_MODAL"}
+
+    def follow(self, context, x: float):
+        """The moment on the frame that lies as far from its own as the pointer from where it was pressed."""
+        view = context.region.view2d
+        way = view.region_to_view(x, 0)[0] - view.region_to_view(self.begun, 0)[0]
+        frame = self.frame + round(way)
+        clock = lanes.written_for(context.scene.objects[self.target])
+        back = frame == self.frame
+        self.put(context, self.before.key if back else replace(self.before.key, time=clock.seconds(frame)))
+        context.area.header_text_set(f"Frame {frame} ({frame - self.frame:+d})    Esc: put back")
+
+    def put(self, context, key):
+        """Write the key moment and show it."""
+        target = context.scene.objects[self.target]
+        now = next(moment for moment in lanes.moments(target) if moment.selected)
+        if now.key != key:
+            lay_strips.change_moment(target, now.strip, now.index, key)
+        if key == self.before.key:
+            context.area.header_text_set(None)
+        moment_names.redraw()
+
+
+class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
+    """Add a key moment at the playhead: a kick, a header, a catch, met to half a frame"""
+
+    bl_idname = "beyond_mocap.add_moment"
+    bl_label = "Add Key Moment"
+
+    words: StringProperty(name="Words", default="kick", description="What happens there; -word for what must not be")
+
+    def invoke(self, context, _event):
+        """Ask for the words."""
+        return context.window_manager.invoke_props_dialog(self, width=420)
+
+    def draw(self, context):
+        """The words, and what is wrong with them."""
+        self.layout.prop(self, "words")
+        draw_complaints(self.layout, context, lambda: said(self.words, 0.0))
+
+    def do(self, context):
+        """Set the marker, picked."""
+        said(self.words, 0.0)
+        target = with_lanes(context)
+        lay_strips.add_moment(target, said(self.words, playhead(context, target)), clock(context, target))
+
+
+class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
+    """Move the picked key moment to the playhead"""
+
+    bl_idname = "beyond_mocap.move_moment"
+    bl_label = "Move Key Moment"
+
+    frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="By how many frames; 0 moves to the playhead")
+
+    def do(self, context):
+        """Put its marker there."""
+        target = subject(context)
+        moment, clock = picked(target), lanes.written_for(target)
+        time = clock.seconds(moment.frame + self.frames) if self.frames else playhead(context, target)
+        lay_strips.change_moment(target, moment.strip, moment.index, replace(moment.key, time=time))
+
+
+class BEYOND_MOCAP_OT_delete_moment(MomentVerb, bpy.types.Operator):
+    """Take the picked key moment away"""
+
+    bl_idname = "beyond_mocap.delete_moment"
+    bl_label = "Delete Key Moment"
+
+    def do(self, context):
+        """Remove its marker."""
+        target = subject(context)
+        moment = picked(target)
+        lay_strips.remove_moment(target, moment.strip, moment.index)

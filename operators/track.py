@@ -1,0 +1,198 @@
+"""A player's track: drawn as a curve, taken from a moving object, its speeds; pins for hands, feet and gaze."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.motion.track.drawn import FASTEST
+from ..scene import bake, dots, drawn_track, linked, pins
+from ..scene.measure import units_per_metre
+from ..scene.settings import active_player, is_track
+from .player import free_name, shirt_for
+from .verb import Verb
+
+
+class BEYOND_MOCAP_OT_draw_track(Verb, bpy.types.Operator):
+    """Add a player whose track is a curve from the 3D cursor on, to be bent in edit mode. Each point has its speed in
+m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he waits"""
+
+    bl_idname = "beyond_mocap.draw_track"
+    bl_label = "Draw Track"
+
+    @classmethod
+    def poll(cls, context):
+        """Object mode, since something is added."""
+        cls.poll_message_set("Leave edit mode first (Tab)")
+        return context.mode == "OBJECT"
+
+    def do(self, context):
+        """Curve, player, dot."""
+        scene = context.scene
+        linked.refuse(scene)
+        name = free_name("Drawn", {player.name for player in scene.beyond_mocap.players})
+        drawn = drawn_track.create(context, f"{name} curve", context.collection)
+        add_player(context, drawn, name)
+        for other in context.selected_objects:
+            other.select_set(False)
+        drawn.select_set(True)
+        context.view_layer.objects.active = drawn
+        self.report({"INFO"}, f"{name}: bend the curve in edit mode (Tab), set speeds of its points, then Synthesize")
+
+
+def add_player(context, drawn: bpy.types.Object, name: str):
+    """One more player in the list, who goes where `drawn` leads; his dot is in the scene."""
+    settings = context.scene.beyond_mocap
+    player = settings.players.add()
+    player.name, player.drawn_track = name, drawn
+    player.shirt = shirt_for(len(settings.players) - 1)
+    settings.active_player = len(settings.players) - 1
+    dots.ensure(context, player)
+    return player
+
+
+class BEYOND_MOCAP_OT_track_object(Verb, bpy.types.Operator):
+    """Take the active object as a track: a curve with speeds at its points, or anything that moves (an Empty, a mesh,
+another armature's hips), by keys or constraints. It becomes a new player's, or the active player's"""
+
+    bl_idname = "beyond_mocap.track_object"
+    bl_label = "Track from Object"
+
+    for_active: bpy.props.BoolProperty(
+        name="Active Player", description="Give it to the active player in the list instead of adding one",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """An object that may be one."""
+        cls.poll_message_set("Choose a curve or a moving object first")
+        return context.object is not None and is_track(None, context.object)
+
+    def do(self, context):
+        """Read it, so that what is wrong is told, and take it."""
+        scene, chosen = context.scene, context.object
+        linked.refuse(scene)
+        player = active_player(scene.beyond_mocap)
+        if self.for_active and player is None:
+            raise InputError("players", "none in the list", "a player", "switch Active Player off to add one")
+        track = drawn_track.read(scene, chosen)
+        if self.for_active:
+            player.drawn_track = chosen
+        else:
+            names = {player.name for player in scene.beyond_mocap.players}
+            player = add_player(context, chosen, free_name(chosen.name, names))
+        seconds = track.times[-1] - track.times[0]
+        self.report({"INFO"}, f"{player.name}: {seconds:.1f} s along {chosen.name}")
+
+
+class BEYOND_MOCAP_OT_set_speed(Verb, bpy.types.Operator):
+    """Set the speed at the selected points of the active curve, in metres per second; outside edit mode at all of them.
+At a point of speed 0 the player waits. The speed is the point's Radius, the wait its Weight"""
+
+    bl_idname = "beyond_mocap.set_speed"
+    bl_label = "Set Speed"
+
+    speed: bpy.props.FloatProperty(
+        name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2, description="Metres per second; 0: a stop"
+    )
+    wait: bpy.props.FloatProperty(
+        name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
+        description="Seconds that are waited at a stop",
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """A curve."""
+        cls.poll_message_set("Choose a drawn curve first")
+        return context.object is not None and context.object.type == "CURVE"
+
+    def invoke(self, context, _event):
+        """Ask for the numbers."""
+        points = chosen(context.object)
+        if points:
+            self.speed, self.wait = min(points[0].radius, FASTEST), points[0].weight_softbody
+        return context.window_manager.invoke_props_dialog(self)
+
+    def do(self, context):
+        """Set them."""
+        drawn = context.object
+        linked.refuse(drawn, drawn.data)
+        points = chosen(drawn)
+        if not points:
+            raise InputError(f"curve {drawn.name}", "no point selected", "one or more", "select points in edit mode")
+        drawn_track.set_speed(points, self.speed, self.wait)
+        drawn.data.update_tag()
+        self.report({"INFO"}, f"points set: {len(points)}")
+
+
+def chosen(drawn: bpy.types.Object) -> list:
+    """The selected control points of a curve in edit mode, all of them otherwise."""
+    points = [point for spline in drawn.data.splines for point in drawn_track.points_of(spline)]
+    if drawn.mode != "EDIT":
+        return points
+    return [point for point in points if getattr(point, "select_control_point", getattr(point, "select", False))]
+
+
+class BEYOND_MOCAP_OT_add_pin(Verb, bpy.types.Operator):
+    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the present frame. Move it
+with G; time and hold stand in the list of pins"""
+
+    bl_idname = "beyond_mocap.add_pin"
+    bl_label = "Add Pin"
+
+    part: bpy.props.EnumProperty(name="Part", items=pins.PARTS, description="What is held")
+    at: bpy.props.EnumProperty(
+        name="At", items=(("BODY", "Body", "Where the part is now"), ("CURSOR", "3D Cursor", "At the 3D cursor")),
+        description="Where the pin is made",
+    )
+    hold: bpy.props.FloatProperty(
+        name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
+        description="Seconds for which it stays there"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """A player, and object mode."""
+        if active_player(context.scene.beyond_mocap) is None:
+            cls.poll_message_set("Import tracking or draw a track in step 2 first")
+            return False
+        cls.poll_message_set("Leave edit mode first (Tab)")
+        return context.mode == "OBJECT"
+
+    def do(self, context):
+        """Find the place, refuse a second pin of the part at that time, make it."""
+        scene, part = context.scene, self.part.replace("_", " ")
+        linked.refuse(scene)
+        player, seconds = active_player(scene.beyond_mocap), pins.second_now(scene)
+        for other in player.pins:
+            if other.part == self.part and other.time <= seconds + self.hold and seconds <= other.time + other.hold:
+                found, step = f"a pin of {part} at {other.time:.2f} s", "go to another frame, or move that one"
+                raise InputError(f"player {player.name}", found, "one place at a time", step)
+        if self.at == "BODY":
+            place = pins.body_place(context, player, self.part)
+        else:
+            place = np.array(scene.cursor.location) / units_per_metre(scene)
+        pins.add(context, player, self.part, seconds, self.hold, place, bake.collection(scene))
+        self.report({"INFO"}, f"{player.name}: {part} pinned at {seconds:.2f} s; move it with G, then Update")
+
+
+class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
+    """Take the pin that is chosen in the list away, with its Empty"""
+
+    bl_idname = "beyond_mocap.remove_pin"
+    bl_label = "Remove Pin"
+
+    @classmethod
+    def poll(cls, context):
+        """A pin."""
+        player = active_player(context.scene.beyond_mocap)
+        cls.poll_message_set("The active player has no pins")
+        return player is not None and len(player.pins) > 0
+
+    def do(self, context):
+        """Remove it and choose its neighbour."""
+        linked.refuse(context.scene)
+        player = active_player(context.scene.beyond_mocap)
+        pins.remove(player, min(player.active_pin, len(player.pins) - 1))

@@ -1,0 +1,149 @@
+"""Players: their list with its pins, and within it annotating by keys and the reference video."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.settings import active_player
+from .tab import Step, paragraph
+
+
+class BEYOND_MOCAP_UL_players(bpy.types.UIList):
+    """Players with their shirts; a tick for those that the next steps are about."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One player."""
+        row = layout.row(align=True)
+        row.prop(item, "use", text="")
+        row.prop(item, "name", text="", emboss=False)
+        shirt = row.row()
+        shirt.ui_units_x = 1.0
+        shirt.prop(item, "shirt", text="")
+        row.label(text="", icon="CHECKMARK" if item.take else "BLANK1")
+
+
+class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
+    """Who plays, where they run, and what is said about it."""
+
+    bl_label = "2  Track & Words"
+    bl_order = 2
+
+    def draw(self, context):
+        """List of players, and the files of the active one."""
+        layout, settings = self.layout, context.scene.beyond_mocap
+        layout.operator("beyond_mocap.import_tracking", icon="IMPORT")
+        row = layout.row(align=True)
+        row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
+        row.operator("beyond_mocap.track_object", text="From Object", icon="EMPTY_AXIS")
+        row = layout.row()
+        row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, "active_player", rows=3)
+        row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
+        if any(player.dot is None for player in settings.players):
+            layout.operator("beyond_mocap.place_players", icon="NLA")
+        player = active_player(settings)
+        if player is None:
+            paragraph(layout, "Import a file with positions, drop it into the view, or draw a track", "INFO")
+            return
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(player, "drawn_track")
+        if player.drawn_track is not None:
+            drawn_on(column, player)
+        else:
+            column.prop(player, "tracking_file")
+        if player.feed_id:
+            column.prop(player, "feed_id")
+            column.prop(settings, "section_start")
+            column.prop(settings, "section_end")
+        file = column.column()
+        file.active = player.annotation_text is None  # the text counts more
+        file.prop(player, "annotation_file")
+        row = column.row(align=True)
+        row.prop(player, "annotation_text")
+        row.operator("beyond_mocap.read_words", text="", icon="NLA")
+        column.prop(player, "body")
+        own(layout, player)
+        pinned(layout, player)
+
+
+class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
+    """A player's pins: what is held, when and how long."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """One pin."""
+        row = layout.row(align=True)
+        row.prop(item, "part", text="", emboss=False)
+        if item.target is None:
+            row.label(text="its Empty is gone", icon="ERROR")
+            return
+        row.prop(item, "time", text="")
+        row.prop(item, "hold", text="")
+
+
+def drawn_on(column, player) -> None:
+    """What belongs to a drawn track."""
+    if player.drawn_track.type == "CURVE":
+        column.prop(player, "drawn_start")
+        column.operator("beyond_mocap.set_speed", icon="DRIVER_DISTANCE")
+
+
+def own(layout, player) -> None:
+    """What is this player's own: height, foot, style."""
+    header, body = layout.panel("beyond_mocap_player_own", default_closed=True)
+    header.label(text="Player")
+    if body:
+        body.use_property_split, body.use_property_decorate = True, False
+        for name in ("height", "strong_foot", "style", "style_weight"):
+            body.prop(player, name)
+
+
+def pinned(layout, player) -> None:
+    """Where hands, feet and gaze have to be."""
+    header, body = layout.panel("beyond_mocap_player_pins", default_closed=True)
+    header.label(text=f"Pins: {len(player.pins)}" if player.pins else "Pins")
+    if body:
+        row = body.row()
+        row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, "active_pin", rows=2)
+        row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")
+        row = body.row(align=True)
+        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Add Pin at Body", icon="PINNED").at = "BODY"
+        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="at Cursor", icon="PIVOT_CURSOR").at = "CURSOR"
+
+
+class BEYOND_MOCAP_PT_annotate(Step, bpy.types.Panel):
+    """Where annotating begins."""
+
+    bl_label = "Annotate"
+    bl_parent_id = "BEYOND_MOCAP_PT_players"
+
+    def draw(self, context):
+        """The button, and one for the editor of strips."""
+        row = self.layout.row(align=True)
+        row.scale_y = 1.3
+        row.operator("beyond_mocap.annotate", icon="SYNTAX_ON", text="Annotate by Keys")
+        row.operator("beyond_mocap.show_timeline", icon="NLA", text="")
+
+
+class BEYOND_MOCAP_PT_video(Step, bpy.types.Panel):
+    """A movie or image sequence beside the match."""
+
+    bl_label = "Reference Video"
+    bl_parent_id = "BEYOND_MOCAP_PT_players"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """Load it, or where it is."""
+        layout, video = self.layout, context.scene.beyond_mocap.video
+        row = layout.row(align=True)
+        row.operator("beyond_mocap.load_video", icon="FILE_MOVIE", text=video.clip.name if video.clip else None)
+        if video.clip is None:
+            return
+        row.operator("beyond_mocap.remove_video", text="", icon="X")
+        layout.operator("beyond_mocap.show_video", icon="WINDOW")
+        column = layout.column(align=True)
+        column.use_property_split, column.use_property_decorate = True, False
+        row = column.row(align=True)
+        row.prop(video, "begins")
+        row.operator("beyond_mocap.move_video", text="", icon="TRIA_LEFT").frames = -1
+        row.operator("beyond_mocap.move_video", text="", icon="TRIA_RIGHT").frames = 1
+        column.prop(video, "rate")

@@ -1,0 +1,107 @@
+"""Registers whatever the modules of a package define: no list of classes has to be kept anywhere.
+
+A class is registered because it is a Blender class that a module defines; one that Blender's own data carries says so
+in `attached_to` ("Scene.beyond_mocap"). A module that has to do more has a function `register()`, `unregister()` or
+both. A package that has `register()` in its `__init__` looks after its own modules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import get_type_hints
+
+import bpy
+
+KINDS = (
+    bpy.types.PropertyGroup, bpy.types.Operator, bpy.types.FileHandler, bpy.types.UIList, bpy.types.Menu,
+    bpy.types.Panel, bpy.types.Header, bpy.types.AddonPreferences,
+)
+_undoing: dict[str, list[Callable[[], None]]] = {}
+
+
+def register_package(package: str) -> None:
+    """Register all that a package's modules define; where a step fails, undo those before it and pass the error on.
+
+    Args:
+        package: its full name, `__name__` in its `__init__`.
+    """
+    undoing = _undoing[package] = []
+    try:
+        for do, undo in _steps(package):
+            do()
+            undoing.append(undo)
+    except BaseException:
+        unregister_package(package)
+        raise
+
+
+def unregister_package(package: str) -> None:
+    """Undo what `register_package` did, the last step first."""
+    undoing = _undoing.pop(package)
+    while undoing:
+        undoing.pop()()
+
+
+def in_order(classes: Iterable[type]) -> list[type]:
+    """Classes by kind, else as they come, but each after those that it needs."""
+    classes = sorted(classes, key=lambda cls: next(n for n, kind in enumerate(KINDS) if issubclass(cls, kind)))
+    ordered: dict[type, None] = {}
+
+    def add(cls: type) -> None:
+        for needed in _needs(cls, classes):
+            add(needed)
+        ordered.setdefault(cls)
+
+    for cls in classes:
+        add(cls)
+    return list(ordered)
+
+
+def _steps(package: str) -> Iterator[tuple[Callable[[], None], Callable[[], None]]]:
+    """Pairs of what to do and what undoes it: classes, their places in Blender's data, then the modules' own hooks."""
+    modules = list(_modules(import_module(package)))
+    classes = in_order(cls for module in modules for cls in _classes(module))
+    for cls in classes:
+        yield partial(bpy.utils.register_class, cls), partial(bpy.utils.unregister_class, cls)
+    for cls in classes:
+        for place in getattr(cls, "attached_to", ()):
+            owner, _, name = place.partition(".")
+            owner = getattr(bpy.types, owner)
+            yield partial(_attach, owner, name, cls), partial(delattr, owner, name)
+    for module in modules:
+        yield getattr(module, "register", _nothing), getattr(module, "unregister", _nothing)
+
+
+def _modules(package: ModuleType) -> Iterator[ModuleType]:
+    """The modules below a package by name; of a package that registers itself only that."""
+    for found in sorted(iter_modules(package.__path__), key=lambda found: found.name):
+        module = import_module(f"{package.__name__}.{found.name}")
+        yield module
+        if found.ispkg and not hasattr(module, "register"):
+            yield from _modules(module)
+
+
+def _classes(module: ModuleType) -> list[type]:
+    """The Blender classes that a module defines, in the order of its lines."""
+    defined = [thing for thing in vars(module).values() if isinstance(thing, type)]
+    return [cls for cls in defined if cls.__module__ == module.__name__ and issubclass(cls, KINDS)]
+
+
+def _needs(cls: type, classes: list[type]) -> list[type]:
+    """Which of the classes have to be registered before this one: what its properties point to, or a panel's parent."""
+    if issubclass(cls, bpy.types.PropertyGroup):
+        pointed = [getattr(hint, "keywords", {}).get("type") for hint in get_type_hints(cls).values()]
+        return [other for other in classes if other in pointed]
+    return [other for other in classes if other.__name__ == getattr(cls, "bl_parent_id", None)]
+
+
+def _attach(owner: type, name: str, cls: type) -> None:
+    setattr(owner, name, bpy.props.PointerProperty(type=cls))
+
+
+def _nothing() -> None:
+    """The hook that a module does not have."""
