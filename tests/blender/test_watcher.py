@@ -1,5 +1,5 @@
-"""The one watcher: what raises does not end it, undo between two looks leaves nothing of what was undone, and nothing is
-left of it when the extension is switched off in the middle of anything."""
+"""The one watcher: what raises does not end it, undo between two looks leaves nothing of what was undone, and nothing
+is left of it when the extension is switched off in the middle of anything."""
 
 import importlib
 import pathlib
@@ -20,7 +20,9 @@ SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library
 @pytest.fixture(autouse=True)
 def clocks(monkeypatch):
     """Blender's own timers of windows, with the stand-in for all else."""
-    add = lambda _self, *_, **__: bpy.context.window_manager.event_timer_add(0.05, window=bpy.context.window)  # noqa: E731
+    def add(_self, *_, **__):
+        return bpy.context.window_manager.event_timer_add(0.05, window=bpy.context.window)
+
     monkeypatch.setattr(Windows, "event_timer_add", add)
 
 

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.__main__ import main
-from beyond_mocap.commands import ride_path
 from beyond_mocap.commands.told import Told
 from beyond_mocap.files import bvh
 from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.motion.gait import gait
-from beyond_mocap.polish.path_frame import FRAMES
 
 STICK = """HIERARCHY
 ROOT a { OFFSET 0 0 0 CHANNELS 6 Yposition Xposition Zposition Yrotation Xrotation Zrotation
@@ -230,10 +228,6 @@ def test_files_that_are_not_there_or_meant_twice_are_one_line(capfd, place, tmp_
         assert main(["path", str(place / "walk.bvh"), "--path", str(bend), "--out", str(out)]) == 2
         assert len(capfd.readouterr().err.splitlines()) == 1
     assert (place / "walk.bvh").read_bytes() == before
-
-
-def test_every_frame_can_be_asked_for():
-    assert ride_path._FRAMES == FRAMES
 
 
 def test_who_cannot_cycle_is_named_also_where_others_are_avoided(capfd, place, tmp_path):
