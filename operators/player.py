@@ -34,7 +34,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
     provider: EnumProperty(
         name="Provider",
         items=[("AUTO", "Guess", "By what the file looks like")]
-        + [(name, name.capitalize(), name) for name in PROVIDERS],
+        + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
         description="Whose form the file has",
     )
 

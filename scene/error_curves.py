@@ -72,7 +72,7 @@ def renew(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
 
 def _values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
     """(C, T) in the order of CURVES; where nothing is known 0, since a key needs a number."""
-    from ..beyond_mocap.evaluation import played_from_take
+    from ..beyond_mocap.evaluation.played import played_from_take
     from ..beyond_mocap.evaluation.per_frame import per_frame
     from ..beyond_mocap.evaluation.view import View
 

@@ -168,7 +168,7 @@ def _kept(made, options) -> dict:
 def _write_overview(rows, options, told: Told) -> None:
     """trials.json, and report.html where matplotlib is there to draw it."""
     from ..evaluation.plots import require_matplotlib
-    from ..evaluation.trials import trials_report
+    from ..evaluation.trials.page import trials_report
     from ..files.tables import write_report
     from ..files.whole import atomic_write
 

@@ -181,7 +181,7 @@ def is_waiting(action: Callable) -> bool:
     return action in _timers
 
 
-def register() -> None:
+def start_watching() -> None:
     """Listen, draw and look from now on, for all watchers."""
     for handler, (what, count) in EVENTS.items():
         if not (bpy.app.background and what in WITH_WINDOW):
@@ -194,7 +194,7 @@ def register() -> None:
             soon(watcher.tick, 1.0)
 
 
-def unregister() -> None:
+def stop_watching() -> None:
     """Nothing is called any more, and nothing of ours is left in the windows; each watcher ends."""
     while _handlers:
         handler, function = _handlers.pop()

@@ -88,7 +88,7 @@ class Prepared:
 
 def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
     """Everything about one take. library: what it was made from; None: nothing is compared with its recordings."""
-    from ...beyond_mocap.evaluation import played_from_take
+    from ...beyond_mocap.evaluation.played import played_from_take
     from ...beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
     from ...beyond_mocap.evaluation.view import View
 

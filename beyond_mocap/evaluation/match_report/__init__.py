@@ -4,9 +4,3 @@
 
 `folder` is what `beyond-mocap match ... --out FOLDER` wrote; docs/match-report.md says what is read from it.
 """
-
-from .page import page
-from .results import read_match_results
-from .worst import worst_seconds
-
-__all__ = ["page", "read_match_results", "worst_seconds"]

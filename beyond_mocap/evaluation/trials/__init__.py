@@ -5,7 +5,3 @@ took, where throws land, how fast they are beside a speed gun.
 
 `folder` is what `beyond-mocap reconstruct FOLDER --out OUT` wrote.
 """
-
-from .page import trials_report
-
-__all__ = ["trials_report"]

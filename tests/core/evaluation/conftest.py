@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import Timeline
-from beyond_mocap.evaluation import played_from_take
+from beyond_mocap.evaluation.played import played_from_take
 from beyond_mocap.files import bvh
 from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
-from beyond_mocap.evaluation import evaluate, played_from_take
+from beyond_mocap.evaluation.report import evaluate
+from beyond_mocap.evaluation.played import played_from_take
 from beyond_mocap.evaluation.give_way import give_way, jolts, stretches
 from beyond_mocap.library.made import MADE_FOLDER
 from beyond_mocap.motion.track import Track

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
-from beyond_mocap.evaluation.match_report import page, read_match_results, worst_seconds
+from beyond_mocap.evaluation.match_report import page
+from beyond_mocap.evaluation.match_report.results import read_match_results
+from beyond_mocap.evaluation.match_report.worst import worst_seconds
 from beyond_mocap.evaluation.match_report.strips import colours, heat_strip
 from beyond_mocap.evaluation.match_report.worst import LIMITS
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.errors import InputError
-from beyond_mocap.evaluation.trials import trials_report
+from beyond_mocap.evaluation.trials.page import trials_report
 from beyond_mocap.evaluation.trials.impacts import aligned_impacts, dominant_sides, kept
 from beyond_mocap.evaluation.trials.paired import paired
 from beyond_mocap.evaluation.trials.results import Throw, TrialResult, read_results
