@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.easing import State, quintic_between
 from ..base.time_series import interpolate
 from ..library.library import Library
 from ..motion import quaternion
@@ -176,12 +177,8 @@ def way(stance: Stance, hits: Sequence[Placed], times: np.ndarray) -> Way:
     goal = (rest, before[1] + 0.5 * before[2] * (rest - before[0]), np.zeros(2))
     slowing = after & (times < rest)
     positions[after] = goal[1]
-    positions[slowing] = hermite(times[slowing], before, goal)
+    positions[slowing] = quintic_between(times[slowing], before, goal)
     return Way(positions, facing)
-
-
-State = tuple[float, np.ndarray, np.ndarray]
-"""A second, a place (2,) m and a velocity (2,) m/s."""
 
 
 def walked(times: np.ndarray, before: State, after: State) -> np.ndarray:
@@ -192,7 +189,7 @@ def walked(times: np.ndarray, before: State, after: State) -> np.ndarray:
     rest, ready = place + 0.5 * leaves * stop, goal - 0.5 * comes * go
     walk = np.linalg.norm(ready - rest) / WALK + _SETTLE
     if end - start < _ROOM * (stop + walk + go):
-        return hermite(times, before, after)
+        return quintic_between(times, before, after)
     still = np.zeros(2)
     edges = [start, start + stop, start + stop + walk, end - go, end]
     states = [place, rest, ready, ready, goal]
@@ -201,7 +198,7 @@ def walked(times: np.ndarray, before: State, after: State) -> np.ndarray:
     for number in range(4):
         inside = (times >= edges[number]) & (times <= edges[number + 1])
         ends = [(edges[n], states[n], speeds[n]) for n in (number, number + 1)]
-        out[inside] = hermite(times[inside], *ends)
+        out[inside] = quintic_between(times[inside], *ends)
     return out
 
 
@@ -216,13 +213,3 @@ def needed(before: State, after: State) -> float:
     apart = np.linalg.norm(after[1] - 0.5 * after[2] * go - before[1] - 0.5 * before[2] * stop)
     return stop + go + float(apart) / HASTE + _SETTLE
 
-
-def hermite(times: np.ndarray, before: State, after: State) -> np.ndarray:
-    """(N, 2) m: the quintic from one state to the other without acceleration at either end."""
-    (start, place, leaves), (end, goal, comes) = before, after
-    length = max(end - start, 1e-9)
-    x = ((np.asarray(times) - start) / length)[:, None]
-    h = goal - place
-    a, b = length * leaves, length * comes
-    third, fourth, fifth = 10 * h - 6 * a - 4 * b, -15 * h + 8 * a + 7 * b, 6 * h - 3 * a - 3 * b
-    return place + a * x + third * x**3 + fourth * x**4 + fifth * x**5

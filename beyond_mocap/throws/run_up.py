@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, labels
-from ..ball.way import hermite
+from ..base.easing import quintic_between
 from ..errors import InputError, TimedLine, told_time
 from ..known_touches import solve_touches
 from ..library.features import joined as joined_frames
@@ -253,7 +253,7 @@ def _bridge(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: t
     low, high = (here, there) if way < 0 else (there, here)
     between = (times > low[0]) & (times < high[0])
     out = places.copy()
-    out[between] = hermite(times[between], low, high)
+    out[between] = quintic_between(times[between], low, high)
     return out
 
 
