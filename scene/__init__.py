@@ -37,7 +37,7 @@
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 """
 
-from . import session
+from .core import session
 from .core import registration
 from .core.live import start_watching, stop_watching
 from .markers import kept

@@ -19,7 +19,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ...beyond_mocap.errors import BeyondMocapError
+from ...beyond_mocap.base.errors import BeyondMocapError
 from . import window
 
 TICK, IDLE = 0.05, 0.4  # seconds between two looks: usually, and where there is no window or a look has failed
