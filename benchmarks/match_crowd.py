@@ -27,7 +27,8 @@ from beyond_mocap.synthesis.take import Take
 from benchmarks.effort import seconds
 from benchmarks.places import CMU_UNIT, DATA
 
-SECONDS = (60.0, 80.0)
+SECONDS = (1480.0, 1500.0)
+"""Of the recorded half: players stand close together, so that there is something to keep apart."""
 
 
 def step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:

@@ -1,7 +1,7 @@
 """Who strikes the ball when, where, with which frame of which motion, and how it flies between (Ball handling §4).
 
 The paper lets the natural flights of all frames of a ball stretch choose the strike (`pass_choice`), and then solves
-the flight between two strikes exactly (`pass_flights`); strikes follow one another as the ball travels (`pass_times`).
+the flight between two strikes exactly (`pass_flights`); strikes follow one another as the ball travels.
 They lie on whole frames of the output.
 """
 

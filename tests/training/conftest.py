@@ -1,5 +1,8 @@
-"""Nearly all time of these tests goes into compiling networks that then run for a second: compiled without optimizing."""
+"""Nearly all time of these tests goes into compiling networks that then run for a second: compiled without optimizing.
 
-import jax
+By the environment, so that processes that tests start compile the same way: bits are compared between them.
+"""
 
-jax.config.update("jax_disable_most_optimizations", True)
+import os
+
+os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "1"  # read when jax is imported

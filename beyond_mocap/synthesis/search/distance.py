@@ -16,10 +16,10 @@ CATCH_UP_FRAMES = 60
 
 # Where one block ends and the next begins: the boundary moved by a few frames to where the two clips agree best.
 #
-# Faustino §3.2.5 shifts the exit and the entry frame separately by gradient descent; the motion then changes its length,
-# key moments miss their frame and travelled distance drifts (his own §5.2.1 names this as the main source of his distance
-# errors). We shift both by the same number of frames: one clip plays a little longer and the other begins as much later,
-# so every other frame stays where it was, and with so few possibilities all of them are tried.
+# Faustino §3.2.5 shifts the exit and the entry frame separately by gradient descent; the motion then changes its
+# length, key moments miss their frame and travelled distance drifts (his own §5.2.1 names this as the main source of
+# his distance errors). We shift both by the same number of frames: one clip plays a little longer and the other
+# begins as much later, so every other frame stays where it was, and with so few possibilities all of them are tried.
 
 
 REACH = 3
